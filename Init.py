@@ -4,9 +4,13 @@
 import os
 import sys
 
+found = ""
 for entry in list(sys.path):
     mods = os.path.join(entry, "mods")
     if os.path.isfile(os.path.join(mods, "silo", "workbench", "start.py")):
-        if mods not in sys.path:
-            sys.path.insert(0, mods)
-        break
+        sys.path.remove(entry)  # else "import tests" and "import docs" would find ours
+        found = found or mods
+if found and found not in sys.path:
+    sys.path.insert(0, found)
+if found:
+    FreeCAD.__unit_test__ += ["silo.workbench.smoke"]

@@ -7,6 +7,15 @@ if sys.version_info < (3, 11):  # noqa: UP036  # the one file that an older Pyth
         "Silo needs a FreeCAD with Python 3.11 or newer; this one has {}.{}.\n".format(*sys.version_info)
     )
 else:
-    from silo.workbench.start import start
+    import silo
 
-    start()
+    if not hasattr(silo, "FREECAD_PACKAGES"):
+        place = silo.__file__ or list(silo.__path__)
+        FreeCAD.Console.PrintError(
+            f"Silo does not start: another package named silo was loaded before, from {place}. "
+            "Remove it, or the add-on that brings it, then start FreeCAD again.\n"
+        )
+    else:
+        from silo.workbench.start import start
+
+        start()

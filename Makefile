@@ -12,7 +12,7 @@ BIN := $(VENV)/bin
 DEV := $(VENV)/.installed-dev
 SERVER := $(VENV)/.installed-server
 
-.PHONY: help demo test test-machine test-windows-files test-other-disk check translations setup docs clean
+.PHONY: help demo test test-machine test-windows-files test-other-disk check translations release setup docs clean
 
 help:
 	@echo "make demo   set up and sync a real assembly with the embedded server (DEMO=--keep leaves it running)"
@@ -20,7 +20,9 @@ help:
 	@echo "make test-machine  the tests that need FreeCAD or Chromium on the machine"
 	@echo "make test-windows-files  the tests with the file semantics of Windows, simulated"
 	@echo "make test-other-disk  the tests on a disk that does not distinguish upper and lower case (Linux, FUSE)"
-	@echo "make check  ruff, mypy, import directions"
+	@echo "make docs   the site of the documentation, in build/site"
+	@echo "make release  build, try and list what would be published, in dist/; tags and publishes nothing"
+	@echo "make check  ruff, mypy, import directions, sizes, plain English"
 	@echo "make translations  bring the files for translators up to date (LANGUAGE=de begins one)"
 
 setup: $(DEV)
@@ -69,11 +71,24 @@ test-machine: setup
 translations: setup
 	$(BIN)/python scripts/translations.py $(LANGUAGE)
 
+# Builds what would be published, tries it, and leaves it in dist/ with its bill of materials; publishes and tags nothing.
+release: setup
+	$(BIN)/python scripts/release.py version
+	rm -rf dist && mkdir dist
+	DIST=dist scripts/wheel_checks.sh $(BIN)/python newest
+
+docs: setup
+	$(BIN)/python -m pip install --quiet 'mkdocs-material>=9.5,<10'
+	$(BIN)/mkdocs build
+
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python scripts/sizes.py
+	$(BIN)/python scripts/english.py
+	$(BIN)/codespell
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info

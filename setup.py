@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What a wheel holds beside the packages: the example of the demo and the add-on's own files (pyproject.toml
-has all the rest).
+"""The version, and what a wheel holds beside the packages: the example of the demo and the add-on's own files
+(pyproject.toml has all the rest; MANIFEST.in has them for the source archive).
 """
 
+import re
 from pathlib import Path
 
 from setuptools import setup
@@ -27,4 +28,5 @@ class BuildWithFiles(build_py):
             self.copy_file(str(ROOT / name), str(target))
 
 
-setup(cmdclass={"build_py": BuildWithFiles})
+(VERSION,) = re.findall(r"<version>(.*?)<", (ROOT / "package.xml").read_text("utf-8"))
+setup(version=VERSION, cmdclass={"build_py": BuildWithFiles})

@@ -68,7 +68,7 @@ def main() -> None:
 def start(version: str, folder: Path, args: argparse.Namespace) -> None:
     """The start, paired."""
     with window(version, folder) as freecad:
-        addon = freecad.home / "Mod" / "Silo"
+        addon = freecad.home / "Mod" / "silo-mod"
         aside = freecad.home / "Silo-aside"
         pairs: list[tuple[dict[str, float], dict[str, float]]] = []
         # The first run of each fills caches and compiles Python files.

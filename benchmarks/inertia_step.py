@@ -37,7 +37,8 @@ from pathlib import Path
 import numpy as np
 from silo.inertia.core import combine_arrays, place
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.options import ReadOptions
+from silo.inertia.geometry.graph import ReadOptions
+from silo.inertia.geometry.helpers import Helpers
 from silo.inertia.geometry.step.read import read_step
 from silo.inertia.geometry.read import without
 without("scipy", "networkx")
@@ -48,7 +49,8 @@ def report(stage, done, total):
     marks.setdefault(stage, time.process_time())
 options = ReadOptions(mesh_check=sys.argv[2] == "mesh", eps=float(sys.argv[3]))
 begin = time.process_time()
-assembly = read_step(Path(sys.argv[1]), options, report).assembly
+with Helpers() as nobody:
+    assembly = read_step(Path(sys.argv[1]), options, report, nobody).assembly
 parts = [assembly.prototypes[i.prototype] for i in assembly.instances]
 volume, com, unit = place(
     [p.volume_m3 for p in parts], np.array([p.com_m for p in parts]),

@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"
 
 from server_testing import Api, Databases, ServerProcess, bom, merge_body
 
-TOKEN = "silo_benchmark"
+TOKEN = "silo_benchmark_0123456789abcdef"
 ASSEMBLIES, PARTS = 8, 60
 HONEST = {400, 404, 409, 412, 503}
 

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"
 
 from server_testing import Api, Databases, ServerProcess, bom, merge_body
 
-TOKEN = "silo_benchmark"
+TOKEN = "silo_benchmark_0123456789abcdef"
 
 
 async def listen(host: str, port: int, arrivals: dict[str, list[float]], up: asyncio.Semaphore) -> None:

@@ -53,7 +53,7 @@ from server_testing import (
 from server_testing.kill import LINES, Moments, kill_rounds, killed
 from server_testing.process import command_line, forked
 
-TOKEN = "silo_faults"
+TOKEN = "silo_faults_0123456789abcdef"
 READS = 300
 P99 = 0.2
 UPLOAD = 2_000_000
@@ -617,10 +617,9 @@ def kept(url: str, files: Path, parent: str) -> tuple[list[float], bytes | None]
     """The BOM's quantities and the newest file, read from the database and the folder themselves."""
     from silo.bom.errors import NotFoundError
     from silo_server.db.engine import Database
-    from silo_server.files import FileStore
     from silo_server.services.bom.lines import lines_of
     from silo_server.services.items import get_item
-    from silo_server.services.revisions import newest_file
+    from silo_server.services.revisions import FileStore, newest_file
     from silo_server.settings import Settings
 
     db = Database(Settings(database_url=url))

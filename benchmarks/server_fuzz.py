@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"
 
 from server_testing import Api, Databases, ServerProcess, bom
 
-TOKEN = "silo_benchmark_fuzz"
+TOKEN = "silo_benchmark_fuzz_0123456789abcdef"
 CHECKS = (
     "not_a_server_error,status_code_conformance,content_type_conformance,response_schema_conformance,"
     "positive_data_acceptance,negative_data_rejection"

@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"
 from server_testing import Api, Databases, ServerProcess, bom, merge_body
 
 SIZES = (100, 1_000, 10_000)
-TOKEN = "silo_benchmark"
+TOKEN = "silo_benchmark_0123456789abcdef"
 
 
 def main() -> None:

@@ -34,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"
 
 from server_testing import Api, Databases, ServerProcess, bom, form_body, merge_body
 
-TOKEN = "silo_soak"
+TOKEN = "silo_soak_0123456789abcdef"
 EDITORS = 4
 HONEST = {200, 201, 204, 404, 409, 412, 503}
 # What a measure may differ by without meaning anything: memory and wal in MB, cpu in ms, the others counts.
@@ -108,7 +108,7 @@ def life(url: str, files: Path, seconds: float, samples: dict[str, list[float]],
         for _ in range(36):
             time.sleep(seconds * 0.9 / 36)
             look(server, api, samples)
-            samples["syncs"].append(rows(url, "bom_syncs"))
+            samples["syncs"].append(rows(url, "answers"))
             recent, times[:] = list(times), []
             spent, before = cpu_seconds(server.pid), spent
             samples["cpu"].append((spent - before) * 1000 / max(len(recent), 1))

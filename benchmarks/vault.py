@@ -70,9 +70,9 @@ from pathlib import Path
 from silo.files import documents_in
 from silo.vault.index import Index
 from silo.vault.plan import make_plan
-from silo.vault.pool import pool_of
+from silo.vault.reading import pool_of
 from silo.vault.reading import Reading
-from silo.vault.session import Question
+from silo.vault.reading import Question
 
 def main():
     folder, index, jobs, dask = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4] or None
@@ -104,11 +104,11 @@ STAGES = """
 import json, sys, time
 sys.path.insert(0, sys.argv[3])
 from pathlib import Path
-from silo.fcstd.facts import facts_of
+from silo.fcstd.library import facts_of
 from silo.fcstd.library import Library
 from silo.files import documents_in
 from silo.vault.index import Index
-from silo.vault.session import Question, Session
+from silo.vault.reading import Question, Session
 
 def read(session, question):
     library = Library(contents=session.contents, locator=session.locator)
@@ -324,7 +324,7 @@ def state(scratch: Path) -> dict[str, Any]:
             JOIN items p ON p.id = h.parent_id LEFT JOIN bom_change_lines l ON l.change_id = h.id
             LEFT JOIN items c ON c.id = l.child_id""",
         "events": "SELECT name, item_uuid, count(*) FROM events GROUP BY 1, 2",
-        "syncs": "SELECT parent_id, version, count(*) FROM bom_syncs GROUP BY 1, 2",
+        "syncs": "SELECT subject, version, count(*) FROM answers GROUP BY 1, 2",
     }
     with closing(sqlite3.connect(scratch / "silo.db")) as database:
         return {name: sorted(map(repr, database.execute(text))) for name, text in questions.items()}

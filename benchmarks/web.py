@@ -27,6 +27,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"
 
 from large_boms import upload_pictures, write_boms
 from server_testing import Api, ServerProcess
+from web_visitor import link_of
 
 TOKEN = "silo_" + "benchweb" * 5
 PAINT = "() => performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? 0"
@@ -78,7 +79,7 @@ def main() -> None:
 def _log_in(browser: Browser, base_url: str, api: Api) -> StorageState:
     context = browser.new_context(base_url=base_url)
     page = context.new_page()
-    page.goto(str(api.good("POST", "/api/users/admin/login-link")["path"]))
+    page.goto(link_of(api, "admin"))
     page.get_by_role("button", name="Log in").click()
     page.get_by_role("heading", name="Items").wait_for()
     state = context.storage_state()

@@ -29,7 +29,7 @@ RECIPE=2
 PACKAGES=(freecad freecad-python3 ca-certificates
   libgl1-mesa-dri fonts-dejavu-core procps)
 # What the add-on needs inside FreeCAD; package.xml declares the same.
-DEPENDENCIES=(requests pydantic sseclient-py)
+DEPENDENCIES=(requests pydantic)
 # Folders that belong to the machine's own system. Every other top folder (home, tmp, srv, …) is shown inside
 # the root at the same place, so a path means the same file inside and outside.
 SYSTEM_DIRS=" bin boot dev etc lib lib32 lib64 libx32 lost+found proc run sbin sys usr var "

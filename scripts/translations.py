@@ -6,8 +6,9 @@
     scripts/translations.py de         the same, and begin one for German
     scripts/translations.py --check    change nothing; exit code 1 where a file is out of date
 
-A text is what stands in ``translate("Silo", "…")`` in mods/silo/workbench or in a module of SHARED;
-both arguments must be literals.
+A text is what stands in ``translate("Silo", "…")``, or in ``QT_TRANSLATE_NOOP("Name_OfCommand", "…")``, in
+mods/silo/workbench or in a module of SHARED; both arguments must be literals. ``silo.ts`` is the template,
+without translations.
 What is translated already stays; a translation whose text is gone is marked as vanished, as Qt Linguist does.
 FreeCAD loads compiled files: ``lrelease silo_de.ts`` makes ``silo_de.qm``.
 """
@@ -43,30 +44,37 @@ class Translation:
     state: str = "unfinished"
 
 
-def texts_of(path: Path) -> list[str]:
-    """The texts of one Python file, in its order."""
+Text = tuple[str, str]
+"""Context and text."""
+
+
+def texts_of(path: Path) -> list[Text]:
+    """Return the texts of one Python file, in its order."""
     found = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "translate":
-            found.append((node.lineno, node.col_offset, _text(node, path)))
+        if isinstance(node, ast.Call):
+            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            if called in ("translate", "QT_TRANSLATE_NOOP"):
+                found.append((node.lineno, node.col_offset, _text(node, called, path)))
     return [text for _line, _column, text in sorted(found)]
 
 
-def _text(call: ast.Call, path: Path) -> str:
+def _text(call: ast.Call, called: str, path: Path) -> Text:
     values = [one.value if isinstance(one, ast.Constant) else None for one in call.args]
     match values:
-        case [context, str(text)] if context == CONTEXT:
-            return text
-    raise NotLiteral(f'{path.name}:{call.lineno}: wanted translate("{CONTEXT}", "a text"), both as literals')
+        case [str(context), str(text)] if (context == CONTEXT) is (called == "translate"):
+            return context, text
+    context = CONTEXT if called == "translate" else "Name_OfCommand"
+    raise NotLiteral(f'{path.name}:{call.lineno}: wanted {called}("{context}", "a text"), both as literals')
 
 
-def collect(folder: Path = SOURCES, also: Iterable[Path] = ()) -> dict[str, list[str]]:
+def collect(folder: Path = SOURCES, also: Iterable[Path] = ()) -> dict[Text, list[str]]:
     """Text → the files that use it, in the order of files and lines. All mistakes at once."""
-    found: dict[str, list[str]] = {}
+    found: dict[Text, list[str]] = {}
     mistakes = []
     for path in (*sorted(folder.rglob("*.py")), *also):
-        # words.py defines `translate`; its own call there passes variables on.
-        if path.name == "words.py":
+        # They define `translate`; their own calls pass variables on.
+        if path.name in ("words.py", "host.py"):
             continue
         try:
             texts = texts_of(path)
@@ -83,32 +91,34 @@ def collect(folder: Path = SOURCES, also: Iterable[Path] = ()) -> dict[str, list
     return found
 
 
-def read(path: Path) -> tuple[str, dict[str, Translation]]:
+def read(path: Path) -> tuple[str, dict[Text, Translation]]:
     """Language and translations of a .ts file; ("", {}) where there is none."""
     if not path.exists():
         return "", {}
     root = ET.parse(path).getroot()  # noqa: S314  # our own files
     known = {}
-    for message in root.iter("message"):
-        element = message.find("translation")
-        if element is not None:
-            known[message.findtext("source", "")] = Translation(element.text or "", element.get("type", ""))
+    for context in root.iter("context"):
+        for message in context.iter("message"):
+            element = message.find("translation")
+            if element is not None:
+                text = context.findtext("name", ""), message.findtext("source", "")
+                known[text] = Translation(element.text or "", element.get("type", ""))
     return root.get("language", ""), known
 
 
-def ts(texts: Mapping[str, Iterable[str]], language: str, known: Mapping[str, Translation]) -> str:
+def ts(texts: Mapping[Text, Iterable[str]], language: str, known: Mapping[Text, Translation]) -> str:
     """A .ts file: all texts, with what is known of their translations."""
     attributes = {"version": "2.1", "sourcelanguage": "en"} | ({"language": language} if language else {})
     root = ET.Element("TS", attributes)
-    context = ET.SubElement(root, "context")
-    ET.SubElement(context, "name").text = CONTEXT
-    for text, files in texts.items():
+    contexts: dict[str, ET.Element] = {}
+    gone = {text: () for text, old in known.items() if text not in texts and old.text}
+    for text, files in {**texts, **gone}.items():
+        if text[0] not in contexts:
+            contexts[text[0]] = ET.SubElement(root, "context")
+            ET.SubElement(contexts[text[0]], "name").text = text[0]
         old = known.get(text, Translation())
-        state = "unfinished" if old.state == "vanished" else old.state
-        _add(context, text, files, Translation(old.text, state))
-    for text, old in known.items():
-        if text not in texts and old.text:
-            _add(context, text, (), Translation(old.text, "vanished"))
+        state = "vanished" if text in gone else "unfinished" if old.state == "vanished" else old.state
+        _add(contexts[text[0]], text[1], files, Translation(old.text, state))
     ET.indent(root, "    ")
     return f'<?xml version="1.0" encoding="utf-8"?>\n<!DOCTYPE TS>\n{ET.tostring(root, "unicode")}\n'
 
@@ -131,8 +141,8 @@ def wanted(
 ) -> dict[Path, str]:
     """What each .ts file should hold: those that exist, and one for each of ``languages``."""
     texts = collect(sources, also)
-    found = dict.fromkeys(sorted(folder.glob("silo_*.ts")), "")
-    found |= {folder / f"silo_{language}.ts": language for language in languages}
+    found = dict.fromkeys(sorted(folder.glob("silo*.ts")), "")
+    found |= {folder / (f"silo_{language}.ts" if language else "silo.ts"): language for language in languages}
     return {path: ts(texts, read(path)[0] or new, read(path)[1]) for path, new in found.items()}
 
 
@@ -145,7 +155,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="change nothing, say what is out of date")
     args = parser.parse_args(arguments)
     try:
-        files = wanted(args.languages)
+        files = wanted(["", *args.languages])
     except NotLiteral as mistakes:
         print(mistakes, file=sys.stderr)
         return 1

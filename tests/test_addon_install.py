@@ -5,22 +5,30 @@ from __future__ import annotations
 
 import stat
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from silo.addon_install import Place, ask_freecad, install_folder, install_packages
 from silo.bom.errors import ConfigError, InputError
 from silo.files import shipped
+from silo.freecads import Place, ask_freecad, install_folder, install_packages
 
 STAND_IN = """#!{python}
-import sys, types
+import os, runpy, sys, types
+assert len(sys.argv[2]) < 200, "FreeCAD 1.1 ends at once if the text is longer"
 freecad = types.ModuleType("FreeCAD")
 freecad.getUserAppDataDir = lambda: {data!r}
-freecad.Version = lambda: ["1", "0", "2", "commit"]
+freecad.Version = lambda: {version!r}
 sys.modules["FreeCAD"] = freecad
 exec(sys.argv[2])
 """
+
+
+def stand_in(folder: Path, data: Path | str, version: str = "1.0") -> str:
+    told = [*version.split("."), "2", "commit"]
+    text = STAND_IN.format(python=sys.executable, data=str(data), version=told)
+    return program(folder / "freecadcmd", text)
 
 
 def program(path: Path, text: str) -> str:
@@ -30,15 +38,15 @@ def program(path: Path, text: str) -> str:
 
 
 def place(tmp_path: Path) -> Place:
-    return Place(tmp_path / "data", (1, 0), (3, 13))
+    return Place("freecadcmd", tmp_path / "data", tmp_path / "packages", (1, 0), (3, 13))
 
 
 def test_freecad_is_asked_for_its_folder_and_its_python(tmp_path: Path) -> None:
     """What it answers decides; nothing is guessed from the platform."""
-    command = program(tmp_path / "freecadcmd", STAND_IN.format(python=sys.executable, data="/data/FreeCAD"))
-    found = ask_freecad(command)
-    assert found == Place(Path("/data/FreeCAD"), (1, 0), sys.version_info[:2])
-    assert ask_freecad(command, Path("/other")).data == Path("/other")
+    found = ask_freecad(stand_in(tmp_path, "/data/FreeCAD"))
+    assert (found.data, found.freecad, found.python) == (Path("/data/FreeCAD"), (1, 0), sys.version_info[:2])
+    assert found.missing == {}
+    assert ask_freecad(found.command, Path("/other")).data == Path("/other")
 
 
 def test_a_freecad_that_fails_is_reported_in_a_sentence(tmp_path: Path) -> None:
@@ -48,13 +56,11 @@ def test_a_freecad_that_fails_is_reported_in_a_sentence(tmp_path: Path) -> None:
         ask_freecad(command)
 
 
-@pytest.mark.parametrize(
-    ("freecad", "folder"),
-    [((0, 20), "AdditionalPythonPackages"), ((1, 1), "AdditionalPythonPackages/py314")],
-)
-def test_packages_go_where_that_freecad_looks(freecad: tuple[int, int], folder: str) -> None:
+@pytest.mark.parametrize(("version", "inside"), [("0.20", ""), ("1.1", "py{}{}".format(*sys.version_info))])
+def test_packages_go_where_that_freecad_looks(tmp_path: Path, version: str, inside: str) -> None:
     """One folder for all in 0.20, one per Python since 1.0 (facts §7.3)."""
-    assert Place(Path("/data"), freecad, (3, 14)).packages == Path("/data") / folder
+    found = ask_freecad(stand_in(tmp_path, "/data", version))
+    assert found.packages == Path("/data") / "AdditionalPythonPackages" / inside
 
 
 def test_the_checkout_is_linked_once(tmp_path: Path) -> None:
@@ -92,18 +98,82 @@ class Linkless(type(Path())):  # type: ignore[misc]
 
 
 def test_where_no_links_can_be_made_the_addon_is_copied(tmp_path: Path) -> None:
-    told = install_folder(Place(Linkless(tmp_path / "data"), (1, 0), (3, 13)))
+    told = install_folder(replace(place(tmp_path), data=Linkless(tmp_path / "data")))
     assert "copied" in told
     assert (place(tmp_path).mod / "mods" / "silo" / "workbench" / "freecad" / "host.py").is_file()
 
 
+def test_the_folder_of_earlier_versions_goes(tmp_path: Path) -> None:
+    """FreeCAD would start both. Somebody else's of that name stays."""
+    old = tmp_path / "data" / "Mod" / "Silo"
+    (old / "mods" / "silo" / "workbench").mkdir(parents=True)
+    (old / "package.xml").touch()
+    install_folder(place(tmp_path))
+    assert not old.exists()
+    old.mkdir()
+    install_folder(place(tmp_path))
+    assert old.is_dir()
+
+
+PIP = """#!{python}
+import pathlib, sys
+words = sys.argv[1:]
+if words[0] == "-c":
+    print({version!r})
+    sys.exit()
+with open({log!r}, "a") as log:
+    print(*words, file=log)
+folder = pathlib.Path(words[words.index("--target") + 1])
+folder.mkdir(parents=True, exist_ok=True)
+for name in ("requests", "pydantic"):
+    (folder / (name + ".py")).write_text({content!r})
+"""
+
+
+def own_python(folder: Path, version: str, content: str = "") -> tuple[str, Path]:
+    """A Python with a pip that notes what it is asked for, and installs modules of that content."""
+    folder.mkdir()
+    log = folder / "log"
+    log.touch()
+    text = PIP.format(python=sys.executable, version=version, log=str(log), content=content)
+    return program(folder / "python3", text), log
+
+
+HERE = "{} {}".format(*sys.version_info)
+
+
 def test_packages_are_installed_by_freecads_own_python(tmp_path: Path) -> None:
-    """It knows its processor and version; any other Python would have to be named."""
-    log = tmp_path / "log"
-    own = program(tmp_path / "python3", f'#!/bin/sh\necho "$*" >> {log}\n')
-    found = Place(tmp_path / "data", (1, 1), (3, 11), (str(tmp_path / "none"), own))
+    """It knows its processor; one of another version would bring packages that FreeCAD cannot load."""
+    other, told_other = own_python(tmp_path / "other", "3 99")
+    own, told = own_python(tmp_path / "own", HERE)
+    found = ask_freecad(stand_in(tmp_path, tmp_path / "data"))
+    found = replace(found, pythons=(other, own), missing={"pydantic": "No module named 'pydantic'"})
     assert install_packages(found) == str(found.packages)
-    asked, installed = log.read_text().splitlines()
-    assert asked == "-m pip --version"
-    assert f"--target {found.packages}" in installed
-    assert "--python-version" not in installed
+    assert told_other.read_text() == ""
+    assert told.read_text().split() == [
+        *("-m", "pip", "install", "--quiet", "--target", str(found.packages), "pydantic>=2.10")
+    ]
+
+
+def test_what_is_there_is_replaced_only_if_nobody_can_use_it(tmp_path: Path) -> None:
+    """Other add-ons use the same folder."""
+    own, told = own_python(tmp_path / "own", HERE)
+    found = replace(ask_freecad(stand_in(tmp_path, tmp_path / "data")), pythons=(own,))
+    (found.packages / "pydantic").mkdir(parents=True)
+    assert install_packages(found) == str(found.packages)
+    assert told.read_text() == "", "nothing is missing"
+    install_packages(replace(found, missing={"requests": "No module named 'requests'"}))
+    assert "--upgrade" not in told.read_text()
+    install_packages(replace(found, missing={"pydantic": "No module named 'pydantic_core._pydantic_core'"}))
+    assert "--upgrade" in told.read_text()
+
+
+def test_success_is_an_import_inside_freecad(tmp_path: Path) -> None:
+    """pip ended well, and FreeCAD says why it does not help."""
+    own, _ = own_python(tmp_path / "own", HERE, "raise ImportError('made for another Python')")
+    found = replace(ask_freecad(stand_in(tmp_path, tmp_path / "data")), pythons=(own,))
+    command = Path(found.command)
+    bare = "sys.path[:] = [entry for entry in sys.path if 'site-packages' not in entry]\nexec(sys.argv[2])"
+    command.write_text(command.read_text().replace("exec(sys.argv[2])", bare))
+    with pytest.raises(ConfigError, match=r"FreeCAD cannot import them: .*made for another Python"):
+        install_packages(replace(found, missing={"requests": ""}))

@@ -16,16 +16,15 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from silo.batch import Options, TopResult, stopped_by, sync_top
-from silo.batch_report import JUnit, Markdown, Summary, cell
+from silo.batch import JUnit, Markdown, Options, Summary, TopResult, cell, stopped_by, sync_top
+from silo.bom.compare import MergePlan
 from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
-from silo.bom.merge import MergePlan
 from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
 from silo.bom.report import diff_rows
 from silo.bom_sync import Outcome, Resolved, Status
 from silo.fcstd import Library
 from silo.files import documents_in
-from silo.folders import scratch_folder
+from silo.platform import scratch_folder
 from silo.testing import FakeSilo
 
 
@@ -250,7 +249,7 @@ def test_text_of_others_is_shown_in_markdown_and_does_nothing(text: str) -> None
 def test_a_sentence_of_the_report_is_followed_by_the_files_that_it_does_not_name() -> None:
     """With a space between them."""
     summary = Summary(warnings={"One bolt is too many.": ["asm/T.FCStd"], "b.FCStd is odd.": ["b.FCStd"]})
-    lines = Markdown().end(summary).splitlines()
+    lines = Markdown().head(summary).splitlines()
     assert {"- One bolt is too many. (asm/T.FCStd)", "- b.FCStd is odd."} <= set(lines)
 
 

@@ -4,15 +4,17 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from silo import bom_sync
 from silo.api.wire import MergeRequest, MergeResult
+from silo.bom.compare import apply_merge, plan_merge
 from silo.bom.errors import UnreachableError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.merge import apply_merge, plan_merge
 from silo.bom.model import BomEntry, Extraction
 from silo.bom_sync import Status
 
@@ -190,3 +192,31 @@ def test_a_dry_run_reports_and_sends_nothing() -> None:
     assert outcome.plan is not None
     assert [c.part_number for c in outcome.plan.diff.added] == ["BOLT", "GEARBOX"]
     assert not silo.merges
+
+
+FILES = st.sampled_from(["/v/a.FCStd", "/v/b.FCStd", "/v/c.FCStd"])
+FINDINGS = st.builds(
+    lambda code, severity, files: Finding(code, severity, "m", tuple(map(Place, files))),
+    st.sampled_from([FindingCode.CYCLE, FindingCode.TOO_DEEP, FindingCode.MISSING_FILE]),
+    st.sampled_from(Severity),
+    st.lists(FILES, max_size=3),
+)
+
+
+@given(st.lists(FINDINGS, max_size=8), FILES)
+def test_what_blocks_an_assembly_is_an_error_in_its_file_or_a_loop_anywhere(
+    findings: list[Finding], path: str
+) -> None:
+    """In the order of the walk, each once; the same for a copy with another assembly or other findings."""
+    one = bom_sync.Resolved(BomEntry("/v/other.FCStd", object_name="A"), (), (), tuple(findings))
+    bom_sync.blocking(one)
+    other = replace(one, assembly=replace(one.assembly, doc_path=path))
+    loops = (FindingCode.CYCLE, FindingCode.TOO_DEEP)
+    wanted = [
+        finding
+        for finding in findings
+        if finding.severity is Severity.ERROR
+        and (finding.code in loops or any(place.doc_path == path for place in finding.where))
+    ]
+    assert list(bom_sync.blocking(other)) == wanted
+    assert bom_sync.blocking(replace(other, findings=())) == ()

@@ -7,10 +7,13 @@ import argparse
 import re
 from pathlib import Path
 
+import docs_hooks
+import page_commands
 import pytest
 
 from silo.bom.findings import FindingCode
 from silo.cli.main import build_parser
+from silo.workbench.settings.preferences import DEFAULTS
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [
@@ -28,6 +31,9 @@ _OTHERS = re.compile(
 TREES = ("mods", "tests", "scripts", "benchmarks", "examples")
 # Of the Fasteners workbench; and what a translator makes.
 THEIRS = ("FastenersBillOfMaterials.py", "FSutils.py")
+# Between processes of ours, or names of values.
+INSIDE = {f"SILO_{name}" for name in ("ASK_DATA", "ASK_NAMES", "OUT", "SCRIPT")}
+INSIDE |= {f"FREECAD_{name}" for name in ("PACKAGES", "USER_HOME", "USER_TEMP")}
 MADE = ("mods/silo/workbench/resources/translations/silo_de.ts",)
 
 
@@ -96,6 +102,40 @@ def test_every_command_is_in_the_readme_or_a_page() -> None:
     assert set(commands()) <= named | {"demo"}
 
 
+def test_every_remedy_is_a_command_that_there_is() -> None:
+    """The reference names options too."""
+    for code in FindingCode:
+        for command, words in told_lines(code.remedy):
+            options = commands()[command]._option_string_actions
+            assert all(option in options for option in re.findall(r"--[a-z-]+", words)), code
+
+
+def test_the_reference_has_all_that_there_is() -> None:
+    """Commands, findings, requests and command lines, as the site shows them."""
+    pages = {
+        name: getattr(docs_hooks, name)() for name in ("commands", "findings", "api", "executed", "schemas")
+    }
+    assert all(f"### {name}\n" in pages["commands"] for name in commands())
+    assert all(f"| `{code}` |" in pages["findings"] for code in FindingCode)
+    assert "### `POST /api/items/{part_number}/bom/merge`" in pages["api"]
+    linked = set(re.findall(r"\]\(#(\w+)\)", pages["api"]))
+    assert linked <= {name.lower() for name in re.findall(r"^### (\w+)$", pages["api"], re.MULTILINE)}
+    assert "silo-mod sync . --report night.md" in pages["executed"]
+    assert "Not run: needs FreeCAD" in pages["executed"]
+
+
+def test_every_setting_is_on_the_page_about_them() -> None:
+    """Environment variables of the client, and the preferences of the add-on with their defaults."""
+    page = (ROOT / "docs" / "configuration.md").read_text("utf-8")
+    server = (ROOT / "docs" / "server.md").read_text("utf-8")
+    source = "".join(path.read_text("utf-8") for path in (ROOT / "mods").rglob("*.py"))
+    for name in set(re.findall(r"\b(?:SILO|FREECAD)_[A-Z_]*[A-Z]\b", source)) - INSIDE:
+        assert f"`{name}`" in page or f"`{name}`" in server, name
+    for name, default in DEFAULTS.items():
+        shown = {"": "empty", True: "yes", False: "no"}.get(default, f"`{default}`")
+        assert re.search(rf"^\| `{name}` \| {shown} \|", page, re.MULTILINE), name
+
+
 def test_every_finding_is_explained() -> None:
     """Each code that a BOM may show stands on the page about counting."""
     page = (ROOT / "docs" / "counting.md").read_text("utf-8")
@@ -108,3 +148,49 @@ def test_the_exit_codes_are_the_same_everywhere() -> None:
     codes = "0 done, 1 differences or something left undone, 2 bad input, 3 server, 130 cancelled"
     assert codes in build_parser().format_help().replace("\n", " ")
     assert codes in (ROOT / "README.md").read_text("utf-8").replace("\n", " ").replace("codes: ", "")
+
+
+LANGUAGES = {"before", "browser", "sh", "text", "python", "json", "toml", "yaml", "csv", "sql"}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_every_block_says_what_it_is(page: Path) -> None:
+    """No command line hides in a block that is taken for a picture. A reason names tests that there are."""
+    for step in page_commands.steps(page.read_text("utf-8")):
+        assert step.kind in LANGUAGES, f"{page.name}: a block of {step.kind or 'nothing'}: {step.text}"
+        for path in re.findall(r"[\w./]+/[\w./]+", step.reason):
+            assert (ROOT / path).exists(), f"{page.name}: {path}"
+
+
+FOLLOWED = [
+    pytest.param(page, id=name)
+    for page, name in zip(PAGES, IDS, strict=True)
+    for kinds in [{step.kind for step in page_commands.steps(page.read_text("utf-8")) if not step.reason}]
+    if "sh" in kinds and "browser" not in kinds  # tests/browser/test_first_hour.py follows the others
+]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("needs_git", "needs_signals")
+@pytest.mark.parametrize("page", FOLLOWED)
+def test_the_commands_of_a_page_work_in_their_order(page: Path) -> None:
+    """As a new user copies them, with an empty home; what is printed is what the page says."""
+    assert page_commands.follow(page) == ""
+
+
+def test_a_page_that_is_wrong_is_noticed(tmp_path: Path) -> None:
+    """Another exit code, or another text, than the page says."""
+    page = tmp_path / "page.md"
+    for text, problem in (
+        ("```sh\nfalse\n```", "false\nended with 1"),
+        ("```sh\nfalse # exit code 1\n```", ""),
+        (
+            "```sh\nexport A=b\nmkdir c && cd c\n```\n```sh\necho $A; basename $PWD\n```\n```text\nb c\n```",
+            "",
+        ),
+        ("```sh\necho a\n```\n```text\nb\n```", "The page says 'b'. Printed was:\na"),
+        ("<!-- not run: it fails -->\n```sh\nfalse\n```", ""),
+    ):
+        page.write_text(text, encoding="utf-8")
+        assert page_commands.follow(page).startswith(problem), text
+        assert problem or not page_commands.follow(page)

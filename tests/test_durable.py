@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from silo.durable import private_file, private_folder, read_memory, replacing, write_memory
+from silo.platform import private_file, private_folder, read_memory, replacing, write_memory
 
 
 @pytest.mark.parametrize("before", [None, b"old"])

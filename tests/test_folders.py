@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-import silo.folders
-from silo.folders import cache_folder, config_folder, data_folder, scratch_folder
+import silo.platform
+from silo.platform import cache_folder, config_folder, data_folder, scratch_folder
 from silo_server.settings import settings_from_environment
 
 FOLDERS = [
@@ -80,7 +80,7 @@ def test_a_scratch_folder_is_gone_afterwards(tmp_path: Path) -> None:
 
 def test_all_temporary_folders_are_scratch_folders() -> None:
     """Any other fails on Windows where a program, such as a virus scanner, has a file in it open."""
-    place = Path(silo.folders.__file__)
+    place = Path(silo.platform.__file__)
     makers = [
         file.name
         for package in ("silo", "silo_server")

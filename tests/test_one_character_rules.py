@@ -12,12 +12,11 @@ from pathlib import Path
 import pytest
 from fcstd_writer import Doc, part
 
-from silo.api.address import canonical
-from silo.bom.diff import same_quantity
+from silo.api.config import canonical
+from silo.bom.compare import plan_merge, same_quantity
 from silo.bom.document import relative
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.merge import plan_merge
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import from_plain, to_plain
 from silo.bom_sync import Status, blocking, resolve, sync

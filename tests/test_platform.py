@@ -73,7 +73,7 @@ def test_every_child_is_started_with_these_options() -> None:
         if isinstance(node, ast.Call)
         and re.fullmatch(r"subprocess\.(run|Popen|call|check_\w+)", ast.unparse(node.func))
     ]
-    assert len(calls) >= 6
+    assert len(calls) >= 5
     bare = [
         f"{path}:{node.lineno}"
         for path, node in calls
@@ -176,14 +176,16 @@ def test_a_child_ends_with_its_own_children() -> None:
     # The pipe closes only when the grandchild is gone too.
     assert process.stdout.read() == b""
     process.stdout.close()
-    assert how_it_ended(process.returncode) == "signal SIGKILL"
+    assert how_it_ended(process.returncode) == "was ended (SIGKILL)"
     end(process)
 
 
 def test_words_for_exit_codes() -> None:
-    assert how_it_ended(3) == "exit code 3"
-    assert how_it_ended(-signal.SIGTERM) == "signal SIGTERM"
-    assert how_it_ended(-250) == "signal 250"
+    assert how_it_ended(3) == "ended with exit code 3"
+    assert how_it_ended(-signal.SIGTERM) == "was ended (SIGTERM)"
+    assert how_it_ended(-250) == "was ended (250)"
+    assert how_it_ended(128 + signal.SIGSEGV) == how_it_ended(-signal.SIGSEGV) == "crashed (SIGSEGV)"
+    assert how_it_ended(0xC0000005) == "crashed (0xC0000005)"
 
 
 def test_a_file_on_another_drive_keeps_its_whole_path() -> None:
@@ -229,7 +231,7 @@ def test_files_are_replaced_and_removed_patiently() -> None:
     """On Windows another program may have a file open for a moment, so nobody asks only once."""
     hasty = re.compile(r"\.unlink\(|os\.(?:replace|rename|remove|unlink)\(")
     # The lock's own file is held by us, and waits for nobody.
-    there = {ASKED_THERE, MODS / "silo" / "durable.py", MODS / "silo" / "vault" / "lock.py"}
+    there = {ASKED_THERE, MODS / "silo" / "vault" / "job.py"}
     found = [
         f"{path.relative_to(MODS)}:{number}: {line.strip()}"
         for path in MODS.rglob("*.py")
@@ -237,7 +239,7 @@ def test_files_are_replaced_and_removed_patiently() -> None:
         for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1)
         if hasty.search(line)
     ]
-    assert found == [], "use silo.durable: replace_patiently, remove_patiently, replacing"
+    assert found == [], "use silo.platform: replace_patiently, remove_patiently, replacing"
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.report import bom_json
 from silo.cli.common import read_assembly
 from silo.fcstd import Library
-from silo.spelling import Spelling
+from silo.platform import Spelling
 
 NFD = unicodedata.normalize("NFD", "Büchse")
 

@@ -11,6 +11,7 @@ from types import ModuleType
 
 import pytest
 
+SYNC, HIDE = ("Silo", "Sync"), ("Silo", "Show & <hide>")
 SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "translations.py"
 
 
@@ -30,6 +31,7 @@ def _script() -> ModuleType:
 def _sources(tmp_path: Path) -> Path:
     (tmp_path / "one.py").write_text('translate("Silo", "Sync")\ntranslate("Silo", "Show & <hide>")\n')
     (tmp_path / "two.py").write_text('f(translate("Silo", "Sync"), other("Silo", "not this"))\n')
+    (tmp_path / "three.py").write_text('words.QT_TRANSLATE_NOOP("Silo_BOM", "Sync")\n')
     return tmp_path
 
 
@@ -42,37 +44,44 @@ def test_the_committed_files_are_up_to_date(script: ModuleType) -> None:
 
 def test_a_file_for_a_new_language_has_every_text(script: ModuleType, sources: Path) -> None:
     """Ready for Qt Linguist; the next run keeps what was translated in it."""
-    ((path, text),) = script.wanted(["de"], sources, sources, ()).items()
-    assert path == sources / "silo_de.ts"
+    template, path = made = script.wanted(["", "de"], sources, sources, ())
+    assert (template, path) == (sources / "silo.ts", sources / "silo_de.ts")
+    text = made[path]
     path.write_text(
         text.replace('<translation type="unfinished" />', "<translation>Abgleichen</translation>", 1)
     )
-    assert script.wanted((), sources, sources, ()) == {path: path.read_text()}
+    template.write_text(made[template], encoding="utf-8")
+    assert script.wanted((), sources, sources, ()) == {path: path.read_text(), template: made[template]}
     language, known = script.read(path)
-    assert (language, list(known)) == ("de", ["Sync", "Show & <hide>"])
-    assert known["Sync"] == script.Translation("Abgleichen", "")
+    assert (language, list(known)) == ("de", [SYNC, HIDE, ("Silo_BOM", "Sync")])
+    assert known[SYNC] == script.Translation("Abgleichen", "")
 
 
 def test_each_text_once_with_the_files_that_use_it(script: ModuleType, sources: Path) -> None:
     """In the order of the files."""
-    assert script.collect(sources) == {"Sync": ["one.py", "two.py"], "Show & <hide>": ["one.py"]}
+    assert script.collect(sources) == {
+        SYNC: ["one.py", "two.py"],
+        HIDE: ["one.py"],
+        ("Silo_BOM", "Sync"): ["three.py"],
+    }
 
 
 def test_what_is_translated_stays_and_what_is_gone_is_marked(script: ModuleType, sources: Path) -> None:
     """Nobody's work is lost when a text changes."""
     known = {
-        "Sync": script.Translation("Abgleichen", ""),
-        "Gone": script.Translation("Weg", ""),
-        "Never done": script.Translation("", "unfinished"),
+        SYNC: script.Translation("Abgleichen", ""),
+        ("Silo", "Gone"): script.Translation("Weg", ""),
+        ("Silo", "Never done"): script.Translation("", "unfinished"),
     }
     made = sources / "silo_de.ts"
     made.write_text(script.ts(script.collect(sources), "de", known), encoding="utf-8")
     assert script.read(made) == (
         "de",
         {
-            "Sync": script.Translation("Abgleichen", ""),
-            "Show & <hide>": script.Translation("", "unfinished"),
-            "Gone": script.Translation("Weg", "vanished"),
+            SYNC: script.Translation("Abgleichen", ""),
+            HIDE: script.Translation("", "unfinished"),
+            ("Silo", "Gone"): script.Translation("Weg", "vanished"),
+            ("Silo_BOM", "Sync"): script.Translation("", "unfinished"),
         },
     )
 
@@ -84,13 +93,16 @@ def test_writing_again_changes_nothing(script: ModuleType, sources: Path) -> Non
     made.write_text(script.ts(texts, "", {}), encoding="utf-8")
     assert script.ts(texts, *script.read(made)) == made.read_text(encoding="utf-8")
     text = made.read_text(encoding="utf-8")
-    assert re.findall("<name>(.*)</name>", text) == ["Silo"]
-    assert re.findall("<source>(.*)</source>", text) == ["Sync", "Show &amp; &lt;hide&gt;"]
+    assert re.findall("<name>(.*)</name>", text) == ["Silo", "Silo_BOM"]
+    assert re.findall("<source>(.*)</source>", text) == ["Sync", "Show &amp; &lt;hide&gt;", "Sync"]
 
 
-@pytest.mark.parametrize("call", ['translate("Silo", name)', 'translate(where, "x")', 'translate("x")'])
+@pytest.mark.parametrize(
+    "call",
+    ['translate("Silo", name)', 'translate(where, "x")', 'translate("x")', 'QT_TRANSLATE_NOOP("Silo", "x")'],
+)
 def test_a_text_that_cannot_be_seen_is_a_mistake(script: ModuleType, sources: Path, call: str) -> None:
     """Qt's tools read the source, they do not run it."""
     (sources / "bad.py").write_text(f"\n{call}\n")
-    with pytest.raises(script.NotLiteral, match=r"bad\.py:2: wanted translate"):
+    with pytest.raises(script.NotLiteral, match=r"bad\.py:2: wanted (translate|QT_TRANSLATE_NOOP)"):
         script.collect(sources)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Stands the arm on a floor in MuJoCo, and holds a pose for some seconds (docs/tutorial-robot.md).
+"""Stands the arm on a floor in MuJoCo, and holds a pose for some seconds.
+
+docs/first-hour/robotics-engineer.md uses it.
 
     python examples/arm/stand.py arm_filled.urdf [PICTURE.png]
 
@@ -16,7 +18,7 @@ import mujoco
 import numpy as np
 
 from silo.inertia.calculator import read_geometry
-from silo.inertia.output.urdf import urdf_frames
+from silo.inertia.output.urdf import read_urdf
 
 HERE = Path(__file__).parent
 POSE = {"shoulder": -0.35, "elbow": 0.9, "wrist": 0.6}
@@ -62,7 +64,7 @@ def build(urdf: Path, step: Path = HERE / "arm.step") -> mujoco.MjSpec:
 
 def add_shapes(spec: mujoco.MjSpec, urdf: Path, step: Path) -> None:
     """The parts of each first-level sub-assembly, in the axes of the link of the same name. Without mass."""
-    frames = urdf_frames(urdf.read_bytes())
+    frames = read_urdf(urdf).frames
     assembly = read_geometry(step)
     colours = dict(zip(frames, COLOURS, strict=False))
     for number, part in enumerate(assembly.instances):

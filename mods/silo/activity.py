@@ -6,11 +6,12 @@ The command line shows them in English, the pane in the user's language: it pass
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
 from silo.api.wire import MergeDiff, MergeEvent, MergeResult, MergeWarning
+from silo.bom.errors import Translate, english
 
 
 @dataclass(frozen=True)
@@ -35,15 +36,6 @@ class Count(StrEnum):
     CHANGED = "changed"
     UNREFERENCED = "unreferenced"
     IN_CONFLICT = "in conflict"
-
-
-# As ``FreeCAD.Qt.translate``: (context, text) -> the text in the user's language.
-Translate = Callable[[str, str], str]
-
-
-def english(_context: str, text: str) -> str:
-    """The text as it stands here."""
-    return text
 
 
 def headline(item: str, translate: Translate = english) -> str:

@@ -2,24 +2,38 @@
 """What became of each file of a sync: what the command line and the add-on without a window share.
 
 One failure does not stop the rest; every file ends in a :class:`TopResult`, which becomes JSON here, and a
-report in :mod:`silo.batch_report`. Files that FreeCAD reads come one by one (:func:`sync_top`); those that we
+report in :mod:`silo.batch`. Files that FreeCAD reads come one by one (:func:`sync_top`); those that we
 read ourselves are one plan (:mod:`silo.vault.job`).
+
+The report of a sync, as Markdown, HTML, JSON or JUnit XML: written as the run goes, whole at every moment.
+
+What changed is written when it has happened. At the end of the run the report gets its beginning: one line
+of counts, what is new since the run before, and what needs a person, grouped by its cause. If the run ends
+early, the report says so.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import uuid
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol
+from xml.sax.saxutils import escape, quoteattr
 
 from silo.api.wire import SourceDocument
 from silo.bom.document import relative
-from silo.bom.errors import SiloError
-from silo.bom.findings import Finding
+from silo.bom.errors import DocumentError, Exit, InputError, RemoteError, SiloError, counted, listed
+from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import base_of, diff_json, entry_json, finding_json, project_folder
+from silo.bom.report import base_of, diff_json, diff_rows, entry_json, finding_json, project_folder, shorten
+from silo.bom.resolve import display_name
 from silo.bom_sync import (
     Outcome,
     Resolved,
@@ -32,6 +46,7 @@ from silo.bom_sync import (
     sync_tree,
 )
 from silo.files import sha256_of
+from silo.platform import replacing
 
 _FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)
 
@@ -58,7 +73,11 @@ class Options:
 
 @dataclass(frozen=True)
 class TopResult:
-    """What became of one file: its outcomes, or the error that kept it from being read."""
+    """What became of one file: its outcomes, or the error that kept it from being read or sent.
+
+    left
+        how many assemblies the error concerns.
+    """
 
     top: str
     base: str = ""
@@ -66,6 +85,7 @@ class TopResult:
     outcomes: tuple[Outcome, ...] = ()
     error: SiloError | None = None
     skipped: str = ""
+    left: int = 1
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -86,7 +106,9 @@ class TopResult:
 
     @property
     def fine(self) -> bool:
-        return self.error is None and all(outcome.status in _FINE for outcome in self.outcomes)
+        """True if nothing was left undone; own parts that are no items yet are."""
+        outcomes = self.outcomes
+        return self.error is None and all(one.status in _FINE and not one.assembly.own for one in outcomes)
 
 
 def sync_top(top: str, found: Extraction | SiloError, api: SyncApi, options: Options) -> TopResult:
@@ -150,7 +172,7 @@ def suggest_by_identity(
     known = _identities_before(lacking)
     if not known:
         return whole
-    from silo.fcstd.suggest import with_suggestions
+    from silo.fcstd.linked import with_suggestions
 
     entries = (*whole.entries, *whole.unresolved)
     files = None if candidates is None else tuple(candidates(known.values()))
@@ -228,3 +250,502 @@ def outcome_json(outcome: Outcome, base: str) -> dict[str, Any]:
     if outcome.status is Status.BLOCKED:
         data["blocked_by"] = [finding_json(f, base) for f in blocking(outcome.resolved)]
     return data
+
+
+_LEFT = (Status.BLOCKED, Status.UNREGISTERED, Status.FAILED)
+STATUS_WORDS = {
+    Status.MERGED: "BOM merged",
+    Status.UNCHANGED: "no change, nothing was sent",
+    Status.DRY_RUN: "preview only, nothing was sent",
+    Status.BLOCKED: "not synced: links are broken (see below; --allow-missing syncs all the same)",
+    Status.UNREGISTERED: "not synced: the assembly has no Silo part number (silo-mod register)",
+    Status.FAILED: "not synced",
+}
+# What changed, by the field of the diff.
+_CHANGES = {
+    "added": "added",
+    "quantity_changed": "quantity",
+    "conflicts": "a person decides",
+    "removed": "not in the assembly",
+}
+
+
+def cell(text: str) -> str:
+    """Text of others as Markdown that shows it and does nothing: one line, no markup, nobody is notified.
+
+    On GitHub ``@team`` and ``#12`` mean somebody, escaped or not; a space without width parts them.
+    """
+    text = "".join(c if c.isprintable() else " " for c in text).strip().replace("&", "&amp;")
+    text = re.sub(r"([@#])(?=\w)", "\\1\u200b", text)
+    return re.sub(r"([\\\\`*_\[\]<>|~$#])|^(\d*)([-+.)=])", r"\2\\\1\3", text)
+
+
+@dataclass
+class Summary:
+    """A run in numbers, and what it leaves to people.
+
+    files, fine, unread, parts
+        all that were asked for; those in order; those that could not be read; those without components of
+        others.
+    statuses
+        how many assemblies ended how.
+    unsent
+        reason → how many assemblies the server, or the way to it, kept from being sent.
+    errors, warnings
+        sentence → the files that it is about.
+    causes
+        sentence → what it has in common with others.
+    moved
+        (part, before, now), for files that carry on the identity of one that is gone.
+    before
+        the sentences of the run before; None if they are not known.
+    seconds
+        time by stage.
+    notes
+        what concerns the whole run: its index, its server.
+    """
+
+    base: str = ""
+    files: int = 0
+    fine: int = 0
+    unread: int = 0
+    parts: int = 0
+    statuses: Counter[str] = field(default_factory=Counter)
+    unsent: Counter[str] = field(default_factory=Counter)
+    lines_changed: int = 0
+    errors: dict[str, list[str]] = field(default_factory=dict)
+    warnings: dict[str, list[str]] = field(default_factory=dict)
+    causes: dict[str, str] = field(default_factory=dict)
+    findings: dict[Finding, None] = field(default_factory=dict)
+    unregistered: dict[tuple[str, str], str] = field(default_factory=dict)
+    moved: list[tuple[str, str, str]] = field(default_factory=list)
+    before: frozenset[str] | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def exit_code(self) -> Exit:
+        """The worst: 3 if the server kept anything from being sent, 1 if something else was left undone."""
+        if self.unsent:
+            return Exit.REMOTE
+        return Exit.DONE if self.fine == self.files else Exit.UNDONE
+
+    def add(self, result: TopResult) -> None:
+        """Count a file's result."""
+        self.files += 1
+        self.fine += result.fine
+        if result.skipped:
+            self.parts += 1
+        if result.error is not None:
+            self.unread += 1
+            self._fail(result.error, result.top, result.left)
+        for outcome in result.outcomes:
+            self.statuses[outcome.status.value] += 1
+            if outcome.status in (Status.MERGED, Status.DRY_RUN) and outcome.plan is not None:
+                diff = outcome.plan.diff
+                self.lines_changed += len(diff.added) + len(diff.quantity_changed)
+            if outcome.error is not None:
+                self._fail(outcome.error, outcome.assembly.doc_path, 1)
+            if outcome.status is Status.UNREGISTERED:
+                head = outcome.assembly
+                self.unregistered.setdefault(head.key, display_name(head) or head.object_name)
+        for entry in result.unregistered:
+            self.unregistered.setdefault(entry.key, display_name(entry) or entry.object_name)
+        self.add_findings(result.findings, result.top)
+
+    def _fail(self, error: SiloError, file: str, count: int) -> None:
+        if isinstance(error, RemoteError):
+            self.unsent[str(error)] += count
+        cause = error.reason if isinstance(error, DocumentError) else str(error)
+        self._note(self.errors, str(error), file, cause)
+
+    def add_findings(self, findings: Iterable[Finding], top: str = "") -> None:
+        """Count what was noticed; parts without a number have a list of their own."""
+        for finding in findings:
+            if finding.severity is Severity.INFO or finding.code is FindingCode.UNREGISTERED:
+                continue
+            self.findings.setdefault(finding)
+            where = self.errors if finding.severity is Severity.ERROR else self.warnings
+            place = finding.where[0].doc_path if finding.where else top
+            self._note(where, finding.message, place, finding.code.meaning)
+
+    def _note(self, where: dict[str, list[str]], message: str, file: str, cause: str) -> None:
+        message, file = shorten(message, self.base), shorten(file, self.base)
+        self.causes[message] = cause
+        files = where.setdefault(message, [])
+        if file not in files:
+            files.append(file)
+
+    def told(self) -> dict[str, str]:
+        """Return all that needs a person: the sentence that the next run knows it by → the report's line."""
+        several = ((words, files) for told in (self.errors, self.warnings) for words, files in told.items())
+        return {
+            **{words: f"{words}{_others(words, files)}" for words, files in several},
+            **{line: f"{line}: no part number" for line in self._without_number()},
+        }
+
+    def new(self) -> list[str] | None:
+        """Return what the run before did not have; None if that is not known."""
+        if self.before is None:
+            return None
+        return [line for words, line in self.told().items() if words not in self.before]
+
+    def _without_number(self) -> list[str]:
+        return [f"{name} ({shorten(path, self.base)})" for (path, _), name in self.unregistered.items()]
+
+    def to_json(self) -> dict[str, Any]:
+        """For machines."""
+        return {
+            "files": self.files,
+            "in_order": self.fine,
+            "parts": self.parts,
+            "assemblies": dict(self.statuses),
+            "not_sent": self.unsent.total(),
+            "lines_changed": self.lines_changed,
+            "new": self.new(),
+            "errors": [self._caused(words, files) for words, files in self.errors.items()],
+            "warnings": [self._caused(words, files) for words, files in self.warnings.items()],
+            "unregistered": [
+                {"doc_path": shorten(path, self.base), "object": name, "label": label}
+                for (path, name), label in self.unregistered.items()
+            ],
+            "moved": [{"name": name, "from": old, "to": new} for name, old, new in self.moved],
+            "notes": self.notes,
+            "seconds": {stage: round(seconds, 3) for stage, seconds in self.seconds.items()},
+        }
+
+    def _caused(self, words: str, files: list[str]) -> dict[str, Any]:
+        return {"message": words, "cause": self.causes.get(words, words), "files": files}
+
+    def sentence(self) -> str:
+        """The run in one line; first what the server kept from being sent."""
+        words = []
+        for why, count in self.unsent.most_common():
+            words.append(f"{counted(count, 'assembly', 'assemblies')} not sent: {why.rstrip('.')}. ")
+        kept = "".join(words)
+        words = [f"{self.fine} of {self.files} files in order"]
+        if self.parts:
+            words.append(f"{self.parts} of them parts")
+        words += [f"{count} {status.replace('_', ' ')}" for status, count in sorted(self.statuses.items())]
+        return f"{kept}{', '.join(words)}."
+
+    def sections(self) -> Iterator[tuple[str, list[tuple[str, list[str]]]]]:
+        """Yield what people read after the line of counts: titles, each with lines and what belongs to them.
+
+        Errors and warnings of one cause are one line. A hint about how something is modelled is in the report
+        of the first night only.
+        """
+        known = self.before or frozenset()
+        if self.before is not None:
+            yield "New since the last run", self._grouped(one for one in self.told() if one not in known)
+        yield "Errors", self._grouped(self.errors)
+        hint = FindingCode.CONSOLIDATION.meaning
+        old = {one for one in self.warnings if self.causes.get(one) == hint and one in known}
+        yield "Warnings", self._grouped(one for one in self.warnings if one not in old)
+        yield "Without a part number (silo-mod register)", [(line, []) for line in self._without_number()]
+        yield "Moved", [(f"{name}: {old} → {new}", []) for name, old, new in self.moved]
+        notes = list(self.notes)
+        if old:
+            notes.append(f"Hints that were there before: {len(old)} (silo-mod bom shows them).")
+        if self.seconds:
+            times = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in self.seconds.items())
+            notes.append(f"Time: {times}.")
+        yield "Notes", [(note, []) for note in notes]
+
+    def _grouped(self, sentences: Iterable[str]) -> list[tuple[str, list[str]]]:
+        """Return the lines of sentences; those of one cause below it, without it."""
+        lines, groups = self.told(), dict[str, list[str]]()
+        for words in sentences:
+            groups.setdefault(self.causes.get(words, words), []).append(lines[words])
+        return [
+            (of[0], [])
+            if len(of) == 1
+            else (f"{len(of)} × {cause}", [one.replace(f": {cause}", "") for one in of])
+            for cause, of in groups.items()
+        ]
+
+
+class Form(Protocol):
+    """How a report is written: a beginning, what became of each file, and an end."""
+
+    def head(self, summary: Summary | None) -> str:
+        """Return the beginning; ``summary`` is None until the run has ended."""
+        ...
+
+    def one(self, result: TopResult, number: int) -> str: ...
+
+    def end(self, summary: Summary | None) -> str:
+        """Return the end; ``summary`` is None until the run has ended."""
+        ...
+
+
+class Report:
+    """A file that is whole after every result: what is new replaces the end, and brings an end of its own."""
+
+    def __init__(self, path: str, form: Form | None = None) -> None:
+        self.path = path
+        self.trouble = ""
+        self._form = form or form_of(path)
+        self._count = 0
+        # A terminal or a pipe cannot be written again; it gets the whole at the end.
+        later = os.path.exists(path) and not os.path.isfile(path)
+        self._file: BinaryIO | None = BytesIO() if later else open(path, "w+b")  # noqa: SIM115
+        self._begin = self._end = 0
+        self._write(self._form.head(None), self._form.end(None))
+        self._begin = self._end
+
+    def add(self, result: TopResult) -> None:
+        """Write what became of a file."""
+        text = self._form.one(result, self._count)
+        self._count += bool(text)
+        if text:
+            self._write(text, self._form.end(None))
+
+    def close(self, summary: Summary | None = None) -> None:
+        """End the report; without a summary as it stands."""
+        if self._file is None:
+            return
+        try:
+            if summary is not None:
+                self._file.seek(self._begin)
+                told = self._file.read(self._end - self._begin)
+                whole = _bytes(self._form.head(summary)) + told + _bytes(self._form.end(summary))
+                if isinstance(self._file, BytesIO):
+                    self._file = BytesIO(whole)
+                else:
+                    mode = os.fstat(self._file.fileno()).st_mode & 0o777
+                    self._file.close()
+                    with replacing(Path(os.path.realpath(self.path)), mode=mode) as file:
+                        file.write(whole)
+            if isinstance(self._file, BytesIO):
+                Path(self.path).write_bytes(self._file.getvalue())
+        except OSError as error:
+            self._give_up(error)
+        with suppress(OSError):
+            self._file.close()
+
+    def _write(self, text: str, end: str) -> None:
+        if self._file is None:
+            return
+        new = _bytes(text)
+        try:
+            self._file.seek(self._end)
+            self._file.write(new + _bytes(end))
+            self._end += len(new)
+            self._file.truncate()
+            self._file.flush()
+        except OSError as error:
+            self._give_up(error)
+            with suppress(OSError):
+                self._file.close()
+            self._file = None
+
+    def _give_up(self, error: OSError) -> None:
+        self.trouble = f"{self.path} could not be written to its end: {error.strerror or error}"
+
+
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "replace")
+
+
+def form_of(path: str) -> Form:
+    """Return the form that a file's ending names. Raises InputError for another."""
+    forms: dict[str, Form] = {".md": Markdown(), ".html": Html(), ".json": Json(), ".xml": JUnit()}
+    ending = Path(path).suffix.lower()
+    if ending not in forms:
+        kinds = "Markdown (.md), HTML (.html), JSON (.json) or JUnit XML (.xml)"
+        raise InputError(f"{path}: a report is {kinds}")
+    return forms[ending]
+
+
+# --- for people -------------------------------------------------------------------------------------------
+
+
+def is_news(outcome: Outcome) -> bool:
+    """True for what a reader of a report wants to see: all but assemblies that are as they were."""
+    if outcome.status is Status.DRY_RUN:
+        return outcome.plan is not None and (outcome.plan.news or outcome.plan.diff.drifted)
+    return outcome.status is not Status.UNCHANGED
+
+
+def _changes(outcome: Outcome, base: str) -> tuple[str, str, list[tuple[str, ...]], list[str]]:
+    """Return what a reader wants of an assembly: title, file, rows of changes, and why it was not synced."""
+    head = outcome.assembly
+    who = " ".join(filter(None, (head.part_number, head.name))) or display_name(head) or head.object_name
+    # Nothing changed in a BOM that was not sent.
+    plan = outcome.plan if outcome.status not in _LEFT else None
+    rows: list[tuple[str, ...]] = [
+        (_CHANGES[kind], number, outcome.names.get(number, ""), quantity)
+        for kind, number, quantity in (diff_rows(plan.diff) if plan is not None else ())
+        if kind in _CHANGES
+    ]
+    reasons = [shorten(reason, base) for reason in reasons_of(outcome)]
+    return f"{who}: {STATUS_WORDS[outcome.status]}", shorten(head.doc_path, base), rows, reasons
+
+
+_HEADINGS = ("", "Part number", "Name", "Quantity")
+_NOT_ENDED = "The run has not ended, or was stopped here."
+
+
+class Markdown:
+    """To read, and to attach to a job."""
+
+    def head(self, summary: Summary | None) -> str:
+        lines = ["# BOM sync", "", *([cell(summary.sentence()), ""] if summary is not None else [])]
+        for title, told in summary.sections() if summary is not None else ():
+            if told:
+                lines += [f"## {cell(title)}", ""]
+                for line, more in told:
+                    lines += [f"- {cell(line)}", *(f"  - {cell(one)}" for one in more)]
+                lines.append("")
+        return "\n".join([*lines, "## Assemblies", ""])
+
+    def one(self, result: TopResult, number: int) -> str:
+        return "".join(self._assembly(one, result.base) for one in result.outcomes if is_news(one))
+
+    def _assembly(self, outcome: Outcome, base: str) -> str:
+        title, file, rows, reasons = _changes(outcome, base)
+        lines = ["", f"### {cell(title)}", "", cell(file), ""]
+        if rows:
+            lines += [f"| {' | '.join(_HEADINGS)} |", "|---|---|---|---:|"]
+            lines += [f"| {' | '.join(map(cell, row))} |" for row in rows]
+            lines.append("")
+        lines += [f"- {cell(reason)}" for reason in reasons]
+        return "\n".join(lines).rstrip("\n") + "\n"
+
+    def end(self, summary: Summary | None) -> str:
+        return f"\n*{_NOT_ENDED}*\n" if summary is None else "\nNothing else changed.\n"
+
+
+_STYLE = """:root{color-scheme:light dark}
+body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}
+table{border-collapse:collapse}p:first-of-type{font-weight:600}li,td,h3{overflow-wrap:anywhere}
+td,th{padding:.2rem .8rem .2rem 0;text-align:left;border-bottom:1px solid #8886}
+td:last-child,th:last-child{text-align:right}"""
+
+
+class Html:
+    """One page to read, in mail or in a browser."""
+
+    def head(self, summary: Summary | None) -> str:
+        parts = [
+            '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>BOM sync</title>',
+            f'<meta name="viewport" content="width=device-width"><style>{_STYLE}</style></head>',
+            "<body><h1>BOM sync</h1>",
+        ]
+        if summary is not None:
+            parts.append(_element("p", summary.sentence()))
+            for title, told in summary.sections():
+                if told:
+                    parts += [_element("h2", title), _list(told)]
+        return "\n".join([*parts, "<h2>Assemblies</h2>", ""])
+
+    def one(self, result: TopResult, number: int) -> str:
+        return "".join(self._assembly(one, result.base) for one in result.outcomes if is_news(one))
+
+    def _assembly(self, outcome: Outcome, base: str) -> str:
+        title, file, rows, reasons = _changes(outcome, base)
+        parts = [_element("h3", title), _element("p", file)]
+        if rows:
+            lines = (("th", _HEADINGS), *(("td", row) for row in rows))
+            cells = ("".join(_element(tag, one) for one in line) for tag, line in lines)
+            parts.append(f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>")
+        return "\n".join([*parts, *([_list([(reason, []) for reason in reasons])] if reasons else []), ""])
+
+    def end(self, summary: Summary | None) -> str:
+        return _element("p", _NOT_ENDED if summary is None else "Nothing else changed.") + "</body></html>\n"
+
+
+def _element(tag: str, text: str) -> str:
+    return f"<{tag}>{escape(_clean(text))}</{tag}>"
+
+
+def _list(told: Iterable[tuple[str, Sequence[str]]]) -> str:
+    text = ""
+    for line, more in told:
+        below = _list([(one, []) for one in more]) if more else ""
+        text += f"<li>{escape(_clean(line))}{below}</li>"
+    return f"<ul>{text}</ul>"
+
+
+def _others(words: str, files: Iterable[str]) -> str:
+    """Return the files of a sentence that it does not name itself."""
+    named = [file for file in files if file and os.path.basename(file) not in words]
+    return f" ({listed(named)})" if named else ""
+
+
+def reasons_of(outcome: Outcome) -> list[str]:
+    """Why an assembly was not synced."""
+    if outcome.error is not None:
+        return [str(outcome.error)]
+    return [finding.message for finding in blocking(outcome.resolved)] if outcome.status in _LEFT else []
+
+
+# --- for machines ---------------------------------------------------------------------------------------
+
+
+class Json:
+    """``{"results": […], "ended": true, "summary": {…}}``."""
+
+    def head(self, summary: Summary | None) -> str:
+        return '{"results": ['
+
+    def one(self, result: TopResult, number: int) -> str:
+        return ("," if number else "") + "\n" + json.dumps(result_json(result))
+
+    def end(self, summary: Summary | None) -> str:
+        if summary is None:
+            return '\n], "ended": false}\n'
+        told = [finding_json(finding, summary.base) for finding in summary.findings]
+        data: Mapping[str, Any] = {**summary.to_json(), "findings": told}
+        return f'\n], "ended": true, "summary": {json.dumps(data)}}}\n'
+
+
+class JUnit:
+    """For CI: a test case per assembly, and per file that could not be read."""
+
+    def head(self, summary: Summary | None) -> str:
+        summary = summary or Summary()
+        count = summary.statuses
+        left = count[Status.BLOCKED] + count[Status.UNREGISTERED]
+        tests, errors = count.total() + summary.unread, count[Status.FAILED] + summary.unread
+        return (
+            '<?xml version="1.0" encoding="UTF-8"?>\n<testsuites>\n<testsuite name="silo-mod sync" '
+            f'tests="{tests}" failures="{left}" errors="{errors}">'
+        )
+
+    def one(self, result: TopResult, number: int) -> str:
+        if result.error is not None:
+            return self._case(result.top, result.top, "error", str(result.error))
+        cases = []
+        for outcome in result.outcomes:
+            head = outcome.assembly
+            name = " ".join(filter(None, (head.part_number, display_name(head) or head.object_name)))
+            path = shorten(head.doc_path, result.base)
+            if outcome.status not in _LEFT:
+                cases.append(self._case(path, name))
+                continue
+            why = "; ".join(reasons_of(outcome)) or STATUS_WORDS[outcome.status]
+            kind = "error" if outcome.status is Status.FAILED else "failure"
+            cases.append(self._case(path, name, kind, shorten(why, result.base)))
+        return "".join(cases)
+
+    def _case(self, file: str, name: str, kind: str = "", why: str = "") -> str:
+        head = f"\n<testcase classname={_attribute(file)} name={_attribute(name)}"
+        if not kind:
+            return f"{head}/>"
+        return f"{head}><{kind} message={_attribute(why)}/></testcase>"
+
+    def end(self, summary: Summary | None) -> str:
+        told = _NOT_ENDED
+        if summary is not None:
+            told = "\n".join([summary.sentence(), *(f"new: {line}" for line in summary.new() or ())])
+        return f"\n<system-out>{escape(_clean(told))}</system-out>\n</testsuite>\n</testsuites>\n"
+
+
+def _clean(text: str) -> str:
+    return "".join(c if c.isprintable() or c == "\n" else "�" for c in text)
+
+
+def _attribute(text: str) -> str:
+    return quoteattr(_clean(text).replace("\n", " "))

@@ -18,8 +18,8 @@ import os.path
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from functools import partial
-from typing import Any, Protocol
+from functools import cached_property, partial
+from typing import Any, Protocol, cast
 
 from silo.api.wire import (
     Component,
@@ -30,15 +30,13 @@ from silo.api.wire import (
     MergeResult,
     SourceDocument,
 )
-from silo.bom.diff import diff_bom
+from silo.bom.compare import MergePlan, diff_bom, plan_merge
 from silo.bom.document import relative
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
-from silo.bom.identity import walk_entries
-from silo.bom.left_out import LeftOut, components_of, left_out_of
 from silo.bom.links import extract, extract_bom_links
-from silo.bom.merge import MergePlan, plan_merge
-from silo.bom.model import BomDiff, BomEntry, Extraction
+from silo.bom.model import BomDiff, BomEntry, Extraction, walk_entries
+from silo.bom.report import LeftOut, components_of, left_out_of
 from silo.bom.resolve import (
     ItemLookup,
     Known,
@@ -89,6 +87,25 @@ class Status(StrEnum):
     FAILED = "failed"  # the server or the way to it
 
 
+class _Findings(tuple[Finding, ...]):
+    """The findings of a whole tree, whose assemblies each ask for what blocks them."""
+
+    @cached_property
+    def _by_file(self) -> Mapping[str, list[int]]:
+        """Where the errors of each file stand; under "" the loops, which block every assembly."""
+        found: dict[str, list[int]] = {}
+        for number, finding in enumerate(self):
+            if finding.severity is Severity.ERROR:
+                loop = finding.code in (FindingCode.CYCLE, FindingCode.TOO_DEEP)
+                for path in [""] if loop else dict.fromkeys(place.doc_path for place in finding.where):
+                    found.setdefault(path, []).append(number)
+        return found
+
+    def blocking(self, path: str) -> tuple[Finding, ...]:
+        known = self._by_file
+        return tuple(self[number] for number in sorted({*known.get("", ()), *known.get(path, ())}))
+
+
 @dataclass(frozen=True)
 class Resolved:
     """One assembly with its direct children as the server knows them."""
@@ -99,6 +116,10 @@ class Resolved:
     findings: tuple[Finding, ...]
     # UUID of an assembly → what the server remembers of its last sync; a server that does not is not in it.
     last_syncs: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.findings, _Findings):
+            object.__setattr__(self, "findings", _Findings(self.findings))
 
     @property
     def unregistered(self) -> tuple[BomEntry, ...]:
@@ -321,15 +342,8 @@ def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | N
 
 
 def blocking(resolved: Resolved) -> tuple[Finding, ...]:
-    """The findings that keep this assembly from being synced: those in its own file, and loops anywhere."""
-    anywhere = (FindingCode.CYCLE, FindingCode.TOO_DEEP)
-    mine = resolved.assembly.doc_path
-    return tuple(
-        finding
-        for finding in resolved.findings
-        if finding.severity is Severity.ERROR
-        and (finding.code in anywhere or any(place.doc_path == mine for place in finding.where))
-    )
+    """Return the findings that keep this assembly from being synced: those in its own file, and all loops."""
+    return cast(_Findings, resolved.findings).blocking(resolved.assembly.doc_path)
 
 
 def assemblies(resolved: Resolved) -> Iterator[Resolved]:

@@ -5,14 +5,18 @@ from __future__ import annotations
 
 import glob
 import hashlib
+import json
 import os
+import time
 from codecs import BOM_UTF8
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields
 from itertools import chain
 from pathlib import Path
 
 from silo.bom.errors import ConfigError, DocumentError, InputError
-from silo.spelling import Spelling
+from silo.platform import Spelling, hold_lock, one_path, read_memory, replacing
 
 IGNORE_FILE = ".siloignore"
 
@@ -121,6 +125,91 @@ def _meant(top: str) -> list[str]:
     if glob.has_magic(top) and not os.path.lexists(top):
         return sorted(glob.glob(top)) or [top]
     return [top]
+
+
+PROJECT_FILE = ".silo-project.json"
+_PATIENCE_S = 10.0
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a project remembers of a file, by its path relative to the root, with ``/``.
+
+    document
+        the UUID of the file in Silo: that of its item, or its own.
+    sha256
+        the content that is in Silo or on its way there; "" before the first commit.
+    uid
+        FreeCAD's UUID of the document. A copy has it too, so it shows a new name only if the old one is gone.
+    """
+
+    document: str
+    sha256: str = ""
+    uid: str = ""
+
+
+@dataclass(frozen=True)
+class Project:
+    """A project folder. The file :data:`PROJECT_FILE` marks its root and remembers its files; who shares or
+    copies the folder shares that too."""
+
+    root: str
+
+    @classmethod
+    def of(cls, path: Path | str) -> Project | None:
+        """Return the project that a file or folder lies in; None where no folder above it is one."""
+        folder = one_path(os.fspath(path))
+        while True:
+            if os.path.isfile(os.path.join(folder, PROJECT_FILE)):
+                return cls(folder)
+            above = os.path.dirname(folder)
+            if above == folder:
+                return None
+            folder = above
+
+    def place(self, path: str) -> str | None:
+        """Return the path of a file relative to the root, with ``/``; None outside."""
+        real = one_path(path)
+        inside = real.startswith(os.path.join(self.root, ""))
+        return os.path.relpath(real, self.root).replace(os.sep, "/") if inside else None
+
+    def path(self, place: str) -> str:
+        """Return where a file of the project lies."""
+        return os.path.join(self.root, *place.split("/"))
+
+    def files(self) -> dict[str, Kept]:
+        """Return what is remembered of each file, by place."""
+        told = read_memory(Path(self.root, PROJECT_FILE)).get("files")
+        names = {one.name for one in fields(Kept)}
+        return {
+            str(place): Kept(**{key: str(value) for key, value in one.items() if key in names})
+            for place, one in (told.items() if isinstance(told, dict) else ())
+            if isinstance(one, dict) and one.get("document")
+        }
+
+    def note(self, known: Mapping[str, Kept | None]) -> None:
+        """Remember these files, None to forget one. Raises DocumentError where the folder takes nothing."""
+        try:
+            with self._alone():
+                files = {place: asdict(kept) for place, kept in self.files().items() if place not in known}
+                files |= {place: asdict(kept) for place, kept in known.items() if kept is not None}
+                with replacing(Path(self.root, PROJECT_FILE), mode=0o644) as out:
+                    out.write(json.dumps({"files": files}, indent=1, sort_keys=True).encode())
+        except OSError as error:
+            raise DocumentError(
+                os.path.join(self.root, PROJECT_FILE), f"cannot be written ({error.strerror or error})"
+            ) from error
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Held while the file is read and written: two commits may run side by side."""
+        path, until = os.path.join(self.root, f"{PROJECT_FILE}.lock"), time.monotonic() + _PATIENCE_S
+        while (lock := hold_lock(path)) is None:
+            if time.monotonic() > until:
+                raise OSError(f"{path}: another program holds it and does not end")
+            time.sleep(0.02)
+        with lock:
+            yield
 
 
 def job_text(env: Mapping[str, str]) -> str | None:

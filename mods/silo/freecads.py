@@ -3,18 +3,61 @@
 
 Gathered from FreeCAD's installers and packages (the Windows installer for all users or for one, the bundle
 for macOS, Debian, conda, Snap, Flatpak). Of several versions the newest comes first. Standard library only.
+
+Which files a running FreeCAD of this user has open: it would later overwrite what we write there.
+
+FreeCAD (0.20 to 1.1) keeps a folder ``<program>_Doc_<Uid>_<hash>_<number>`` in its cache for each open
+document, the hash being the first six digits of the SHA-1 of the file's path, and holds a lock on
+``<program>_<number>.lock`` while it runs (App/Document.cpp, Gui/Application.cpp; seen in all three). Where
+the platform cannot say whether a lock is held, nothing is known and nothing is said; the same goes for a
+FreeCAD of another user or machine. Standard library only.
+
+FreeCAD as a child process: BOMs of many files, read by ``freecadcmd``, each on its own.
+
+``freecadcmd script.py args`` would open the arguments as files, run a failing script twice and exit 0 all the
+same (measured, 0.20 to 1.1). So: ``-c`` with runpy, arguments in a file that the environment names, results
+in another one, whose lines also show at which file FreeCAD died or hung. It is then started again for the
+rest.
+
+The add-on into a FreeCAD on this machine: its folder into ``Mod``, its packages where FreeCAD looks.
+
+FreeCAD itself is asked where that is and which Python it has (facts §7.2, §7.3): 0.20 takes packages from
+``AdditionalPythonPackages``, later ones from ``AdditionalPythonPackages/py<XY>``. The packages are chosen for
+FreeCAD's Python, not for the one that runs this, and FreeCAD imports them before this reports success.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO, Any
 
-from silo.platform import NAME
-from silo.spelling import Spelling
+from silo import FREECAD_PACKAGES, platform
+from silo.bom.errors import ConfigError, DocumentError, InputError, SiloError
+from silo.bom.model import Extraction
+from silo.bom.report import from_plain
+from silo.files import shipped
+from silo.platform import (
+    NAME,
+    Spelling,
+    child_options,
+    is_locked,
+    python_beside,
+    remove_patiently,
+    scratch_folder,
+)
 
 _COMMANDS = ("freecadcmd", "FreeCADCmd", "freecadcmd-daily", "freecad.cmd")
 _FLATPAK = "org.freecad.FreeCAD"
@@ -157,3 +200,532 @@ def _glob(env: Mapping[str, str], root: Path, pattern: str) -> Iterator[Path]:
 
 def _version(path: Path) -> list[tuple[int, ...]]:
     return [tuple(map(int, re.findall(r"\d+", part))) for part in path.parts]
+
+
+_FOLDER = re.compile(r"(?P<program>.+)_Doc_[0-9a-fA-F-]{36}_(?P<hash>[0-9a-f]{6})_(?P<number>\d+)")
+
+
+class OpenInFreecad:
+    """What the FreeCADs that use these cache folders have open now.
+
+    but_not
+        the number of a FreeCAD that does not count; by default this process, should it be one. Our own lock
+        must not even be looked at, since closing the file would give the lock up.
+    """
+
+    def __init__(self, caches: Iterable[str | Path], but_not: str = str(os.getpid())) -> None:
+        self._hashes = frozenset(found for cache in caches for found in _open_in(cache, but_not))
+
+    def has(self, *paths: str) -> bool:
+        """True where a file, by any of these spellings, is open in FreeCAD."""
+        return any(_hash(path) in self._hashes for path in paths if path)
+
+    def has_file(self, path: str) -> bool:
+        """True where a file is open in FreeCAD under its given, its absolute or its real path.
+
+        FreeCAD writes "/" on Windows too.
+        """
+        absolute = os.path.abspath(path)
+        spellings = (path, absolute, os.path.realpath(path))
+        return self.has(*spellings, *(spelt.replace("\\", "/") for spelt in spellings))
+
+
+def open_in_any() -> OpenInFreecad:
+    """What any FreeCAD of this user has open now."""
+    return OpenInFreecad(cache_folders())
+
+
+def open_in_others(own_folder: str) -> OpenInFreecad:
+    """What FreeCADs other than this one have open now.
+
+    own_folder
+        the cache folder of a document that is open here (``Document.TransientDir``); without it, nothing is
+        said.
+    """
+    cache, name = os.path.split(own_folder.rstrip("/\\"))
+    own = _FOLDER.fullmatch(name)
+    return OpenInFreecad((), "") if own is None else OpenInFreecad((cache,), own["number"])
+
+
+def _hash(path: str) -> str:
+    return hashlib.sha1(os.fsencode(path), usedforsecurity=False).hexdigest()[:6]
+
+
+def _open_in(cache: str | Path, but_not: str) -> frozenset[str]:
+    try:
+        names = os.listdir(cache)
+    except OSError:
+        return frozenset()
+    found = [match for name in names if (match := _FOLDER.fullmatch(name)) and match["number"] != but_not]
+    locks = {f"{match['program']}_{match['number']}.lock" for match in found}
+    alive = {lock for lock in locks if is_locked(os.path.join(cache, lock))}
+    # A folder whose lock is free is what a FreeCAD that crashed has left behind.
+    return frozenset(m["hash"] for m in found if f"{m['program']}_{m['number']}.lock" in alive)
+
+
+HEADLESS = Path(__file__).resolve().parent / "workbench" / "headless.py"
+# FreeCAD opens large assemblies in minutes; this is per file.
+TIMEOUT_S = 900.0
+_POLL_S = 0.05
+_ASK_S = 120.0
+_CODE = 'import os, runpy; runpy.run_path(os.environ["SILO_SCRIPT"], run_name="__main__")'
+
+
+def find_freecadcmd(given: str | None = None, env: Mapping[str, str] = os.environ) -> str:
+    """The ``freecadcmd`` to start: the given one, ``SILO_FREECADCMD``, or one found. ConfigError if none."""
+    wanted = given or env.get("SILO_FREECADCMD")
+    if wanted:
+        found = shutil.which(wanted)
+        if found is None:
+            raise ConfigError(
+                f"{wanted} cannot be run; SILO_FREECADCMD must name FreeCAD's freecadcmd, its AppImage "
+                "or what Flatpak exports (…/flatpak/exports/bin/org.freecad.FreeCAD)"
+            )
+        return found
+    found = next(commands(env), None)
+    if found is None:
+        raise ConfigError(
+            "no FreeCAD found: freecadcmd is not on the PATH, nor where FreeCAD is usually installed. "
+            "Install FreeCAD, or set SILO_FREECADCMD to its freecadcmd or AppImage"
+        )
+    return found
+
+
+_VERSION = """
+import FreeCAD, json, os
+with open(os.environ["SILO_OUT"], "w") as out:
+    json.dump([int(part) for part in FreeCAD.Version()[:2]], out)
+"""
+
+
+def freecad_for(saved_by: tuple[int, ...]) -> tuple[str, str]:
+    """A FreeCAD that can open what this version saved: its command, and its own version.
+
+    The first here that is no older, else the newest. What ``SILO_FREECADCMD`` names is taken as it is.
+    ConfigError if there is none.
+    """
+    given = [find_freecadcmd()] if os.environ.get("SILO_FREECADCMD") else None
+    known: list[tuple[tuple[int, ...], str]] = []
+    for command in given or commands():
+        with suppress(ConfigError):
+            known.append((tuple(ask_inside(command, _VERSION, {})), command))
+            if known[-1][0] >= saved_by:
+                break
+    version, command = max(known, key=lambda one: one[0]) if known else ((), find_freecadcmd())
+    return command, ".".join(map(str, version)) or "of an unknown version"
+
+
+def ask_inside(command: str, script: str, env: Mapping[str, str]) -> Any:
+    """Run a script inside FreeCAD; return the JSON that it wrote to the file ``SILO_OUT``. ConfigError.
+
+    The script goes in a file: FreeCAD 1.1 ends at once if the text behind ``-c`` has some 250 characters.
+    """
+    shared = exchange_folder(command)
+    if shared is not None:
+        os.makedirs(shared, exist_ok=True)
+    with scratch_folder("silo-ask-", shared) as folder:
+        out, path, log = (Path(folder) / name for name in ("answer.json", "ask.py", "log.txt"))
+        path.write_text(script, encoding="utf-8")
+        try:
+            with open(log, "wb") as said:
+                run = subprocess.run(
+                    [*start(command), "-c", _CODE],
+                    stdin=subprocess.DEVNULL,
+                    stdout=said,
+                    stderr=subprocess.STDOUT,
+                    cwd=folder,
+                    env={**os.environ, **env, "SILO_SCRIPT": str(path), "SILO_OUT": str(out)},
+                    timeout=_ASK_S,
+                    check=False,
+                    **platform.child_options(),
+                )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise ConfigError(f"{command} does not answer: {error}") from error
+        try:
+            return json.loads(out.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            how, words = _last_words(run.returncode, log)
+            raise ConfigError(f"{command} did not answer: it {how}. It said: {words}") from None
+
+
+def run_freecad(
+    tops: Sequence[str],
+    assembly: str | None = None,
+    *,
+    command: str | None = None,
+    timeout_s: float = TIMEOUT_S,
+    env: Mapping[str, str] | None = None,
+    hardware: bool = True,
+    witness: dict[str, list[dict[str, Any]]] | None = None,
+) -> Iterator[tuple[str, Extraction | SiloError]]:
+    """Read each file in FreeCAD; results in order, as they come.
+
+    timeout_s
+        for one file, FreeCAD's start included.
+    env
+        set in FreeCAD's environment beside our own, such as ``FREECAD_USER_HOME``.
+    witness
+        takes what the geometry of each file says (``silo.workbench.freecad.witness``), by file.
+
+    A file that FreeCAD cannot read, dies of or hangs on gives its error, and the rest is still read.
+    ConfigError where there is no FreeCAD, or where it does not start.
+    """
+    freecadcmd = find_freecadcmd(command)
+    rest = [os.path.abspath(top) for top in tops]
+    told = dict(zip(rest, tops, strict=True))
+    settings = {"assembly": assembly, "no_hardware": not hardware, "verify": witness is not None}
+    given = {key: value for key, value in settings.items() if value}
+    while rest:
+        with FreeCADRun(freecadcmd, {**given, "tops": rest}, timeout_s, env or {}) as run:
+            for line in run.lines():
+                top = told[rest.pop(0)]
+                if witness is not None:
+                    witness[top] = line.get("witness", [])
+                yield top, _result(line)
+        if rest:
+            # The process is over, and this file was not finished.
+            failed = rest.pop(0)
+            yield told[failed], run.failure(failed)
+
+
+def _result(line: Mapping[str, Any]) -> Extraction | SiloError:
+    """The answer of one line, or the error that the script inside FreeCAD wrote into it."""
+    error = line.get("error")
+    if error is None:
+        return from_plain(line["extraction"])
+    if error.get("path") and error.get("reason"):
+        return DocumentError(error["path"], error["reason"])
+    return InputError(error["message"])
+
+
+@dataclass
+class FreeCADRun:
+    """One process that reads files in FreeCAD (``HEADLESS``), and writes its results as JSON lines.
+
+    job
+        stands in the file that ``SILO_ARGS_FILE`` names, with the file where ``lines`` go.
+    timeout_s
+        for one line, FreeCAD's start included.
+    """
+
+    freecadcmd: str
+    job: Mapping[str, Any]
+    timeout_s: float
+    env: Mapping[str, str]
+    begun: bool = False
+    timed_out: bool = False
+    _folder: tempfile.TemporaryDirectory[str] = field(init=False)
+    _process: subprocess.Popen[bytes] | None = None
+    _how: str = ""
+    _said: str = ""
+
+    def __post_init__(self) -> None:
+        shared = exchange_folder(self.freecadcmd)
+        if shared is not None:
+            os.makedirs(shared, exist_ok=True)
+        self._folder = scratch_folder("silo-freecad-", shared)
+
+    @property
+    def _results(self) -> Path:
+        return Path(self._folder.name) / "results.jsonl"
+
+    @property
+    def _log(self) -> Path:
+        return Path(self._folder.name) / "log.txt"
+
+    def __enter__(self) -> FreeCADRun:
+        self._results.touch()
+        job = Path(self._folder.name) / "job.json"
+        job.write_text(json.dumps({**self.job, "lines": str(self._results)}), encoding="utf-8")
+        env = {
+            **os.environ,
+            **self.env,
+            "SILO_SCRIPT": str(HEADLESS),
+            "SILO_ARGS_FILE": str(job),
+        }
+        try:
+            with open(self._log, "wb") as log:
+                self._process = subprocess.Popen(
+                    [*start(self.freecadcmd), "-c", _CODE],
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    # FreeCAD reads a FreeCAD.cfg in the current folder; here is none.
+                    cwd=self._folder.name,
+                    env=env,
+                    **platform.child_options(group=True),
+                )
+        except OSError as error:
+            self._folder.cleanup()
+            raise ConfigError(f"{self.freecadcmd} cannot be started: {error.strerror or error}") from error
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop()
+        if self._process is not None:
+            self._how, self._said = _last_words(self._process.returncode, self._log)
+        self._folder.cleanup()
+
+    def lines(self) -> Iterator[dict[str, Any]]:
+        """The results as they are written; ends with the process, or with its time."""
+        assert self._process is not None  # entered
+        deadline = time.monotonic() + self.timeout_s
+        with open(self._results, encoding="utf-8") as results:
+            while True:
+                # Asked first: what a process wrote before it ended is read in this same round.
+                over = self._process.poll() is not None
+                for line in _complete_lines(results):
+                    deadline = time.monotonic() + self.timeout_s
+                    self.begun = "begun" in line
+                    if not self.begun:
+                        yield line
+                        # The reader may have taken its time; FreeCAD's runs from now.
+                        deadline = time.monotonic() + self.timeout_s
+                if over:
+                    return
+                if time.monotonic() > deadline:
+                    self.timed_out = True
+                    return
+                time.sleep(_POLL_S)
+
+    def failure(self, path: str) -> SiloError:
+        """Why the file that was being read has no result. ConfigError where FreeCAD never got that far."""
+        if self.timed_out:
+            return DocumentError(path, f"FreeCAD did not finish it within {self.timeout_s:g} s")
+        if not self.begun:
+            raise ConfigError(f"{self.freecadcmd} did not work: it {self._how}. It said: {self._said}")
+        return DocumentError(path, f"FreeCAD died while it read this file: it {self._how}")
+
+    def _stop(self) -> None:
+        if self._process is not None:
+            platform.end(self._process)
+
+
+def _complete_lines(file: IO[str]) -> Iterator[dict[str, Any]]:
+    while True:
+        place = file.tell()
+        line = file.readline()
+        if not line.endswith("\n"):
+            file.seek(place)
+            return
+        yield json.loads(line)
+
+
+# FreeCAD catches the signals of a crash, prints where it was, and ends with 1 like any program (0.20 to 1.1).
+_CRASHED = re.compile(r"Program received signal (SIGSEGV|SIGABRT|SIGILL|SIGFPE)")
+
+
+def _last_words(code: int, log: Path) -> tuple[str, str]:
+    """How a FreeCAD ended, and the last lines that it said, without those of a crash."""
+    text = log.read_text(encoding="utf-8", errors="replace")
+    if crash := _CRASHED.search(text):
+        code, text = -signal.Signals[crash[1]], text[: crash.start()]
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return platform.how_it_ended(code), " / ".join(lines[-3:]) or "nothing"
+
+
+# The Addon Manager's name for it, so that there is one folder however it came there; and the name before.
+FOLDER, OLD_FOLDER = "silo-mod", "Silo"
+
+_ASK = """
+import importlib, json, os, sys
+import FreeCAD
+version = [int(part) for part in FreeCAD.Version()[:2]]
+data = os.environ["SILO_ASK_DATA"] or FreeCAD.getUserAppDataDir()
+packages = os.path.join(data, "AdditionalPythonPackages")
+if version >= [1, 0]:
+    packages = os.path.join(packages, "py%d%d" % sys.version_info[:2])
+if packages not in sys.path:
+    sys.path.append(packages)
+missing = {}
+for name in os.environ["SILO_ASK_NAMES"].split():
+    try:
+        importlib.import_module(name)
+    except Exception as error:
+        missing[name] = "%s: %s" % (type(error).__name__, error)
+try:
+    from addonmanager_freecad_interface import Preferences
+    constraints = Preferences().get("pip_constraints_path") or ""
+except Exception:
+    constraints = ""
+with open(os.environ["SILO_OUT"], "w", encoding="utf-8") as out:
+    json.dump({"data": data, "packages": packages, "freecad": version, "python": sys.version_info[:2],
+               "prefix": sys.base_exec_prefix, "missing": missing, "constraints": constraints}, out)
+"""
+_ASK_SECONDS, _PIP_SECONDS = 60.0, 600.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """A FreeCAD: how it is started, its data folder, its folder for packages, its version and its Python's.
+
+    pythons
+        where that Python may be started.
+    missing
+        import name of a package that the add-on needs → what importing it inside FreeCAD says.
+    constraints
+        where FreeCAD's add-on manager has its list of versions that go together; "" without one.
+    """
+
+    command: str
+    data: Path
+    packages: Path
+    freecad: tuple[int, int]
+    python: tuple[int, int]
+    pythons: tuple[str, ...] = ()
+    missing: Mapping[str, str] = field(default_factory=dict)
+    constraints: str = ""
+
+    @property
+    def mod(self) -> Path:
+        """Where the add-on goes."""
+        return self.data / "Mod" / FOLDER
+
+
+def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Place:
+    """Ask FreeCAD for its folders and versions, and let it import what the add-on needs. Raises ConfigError.
+
+    data
+        stands for the data folder that it names.
+    """
+    command = find_freecadcmd(freecadcmd)
+    env = {"SILO_ASK_DATA": str(data or ""), "SILO_ASK_NAMES": " ".join(FREECAD_PACKAGES)}
+    told = ask_inside(command, _ASK, env)
+    (major, minor), python = told["freecad"], told["python"]
+    return Place(
+        command,
+        Path(told["data"]),
+        Path(told["packages"]),
+        (major, minor),
+        (python[0], python[1]),
+        (*python_beside(told["prefix"]), *python_beside(os.path.dirname(os.path.realpath(command)))),
+        told["missing"],
+        told["constraints"],
+    )
+
+
+def _pip_words(run: subprocess.CompletedProcess[str]) -> str:
+    return next(iter((run.stderr or run.stdout).strip().splitlines()[-1:]), "it said nothing")
+
+
+def _run(command: list[str], seconds: float, **more: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        timeout=seconds,
+        check=False,
+        **child_options(),
+        **more,
+    )
+
+
+def _has_pip(python: str, version: tuple[int, int] | None = None) -> bool:
+    """True if this is a Python with pip, of that version."""
+    code = "import pip, sys; print(*sys.version_info[:2])"
+    try:
+        ran = _run([python, "-c", code], _ASK_SECONDS)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return not ran.returncode and (version is None or ran.stdout.split() == [str(part) for part in version])
+
+
+def _any_python() -> str:
+    """A Python with pip. Inside FreeCAD, ``sys.executable`` is FreeCAD."""
+    found = (sys.executable, shutil.which("python3"), shutil.which("python"), shutil.which("py"))
+    for python in found:
+        if python and "freecad" not in os.path.basename(python).lower() and _has_pip(python):
+            return python
+    raise ConfigError(
+        "no Python with pip was found on this computer. Install pip (on Debian and Ubuntu: apt install "
+        "python3-pip), or Python from python.org, then try again"
+    )
+
+
+def install_folder(place: Place, source: Path | None = None, *, copy: bool = False) -> str:
+    """Link (or copy) the add-on into ``Mod``; returns what was done. A stranger's folder is left alone.
+
+    source
+        holds what FreeCAD's loaders want at its root: the checkout, or what a wheel ships, which is copied.
+    """
+    source = source or shipped()
+    if not (source / "package.xml").is_file():
+        raise InputError(f"{source} holds no package.xml; install silo-mod again")
+    whole = (source / "mods" / "silo").is_dir()
+    copy = copy or not whole
+    _remove_old(place)
+    target = place.mod
+    if target.is_symlink() and target.resolve() == source:
+        return f"{target} leads to this checkout already"
+    if target.exists() or target.is_symlink():
+        if not copy or target.is_symlink() or not (target / "package.xml").is_file():
+            raise InputError(f"{target} is there already; move it away, then repeat")
+        shutil.rmtree(target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if copy:
+        names = ("Init.py", "InitGui.py", "package.xml", "LICENSE", "README.md")
+        target.mkdir()
+        for name in names:
+            shutil.copy2(source / name, target / name)
+        modules = source / "mods" / "silo" if whole else Path(__file__).parent
+        without = shutil.ignore_patterns("__pycache__", "shipped")
+        shutil.copytree(modules, target / "mods" / "silo", ignore=without)
+        if (source / "docs").is_dir():
+            shutil.copytree(source / "docs", target / "docs", ignore=shutil.ignore_patterns("decisions"))
+        return f"copied to {target}"
+    try:
+        target.symlink_to(source, target_is_directory=True)
+    except OSError:  # Windows lets only administrators and developers make links
+        return f"{install_folder(place, source, copy=True)} (this system makes no links)"
+    return f"{target} now leads to this checkout"
+
+
+def _remove_old(place: Place) -> None:
+    """Remove the add-on under the name of earlier versions: FreeCAD would start both."""
+    old = place.data / "Mod" / OLD_FOLDER
+    if (old / "package.xml").is_file() and (old / "mods" / "silo" / "workbench").is_dir():
+        remove_patiently(old) if old.is_symlink() else shutil.rmtree(old)
+
+
+def install_packages(place: Place) -> str:
+    """Install what the add-on lacks inside this FreeCAD, and have FreeCAD import it; return where it is.
+
+    What is there already stays as it is, for other add-ons use it too. ConfigError if FreeCAD still cannot
+    import one of the packages.
+    """
+    version = "{}.{}".format(*place.python)
+    if place.python < (3, 11):
+        raise ConfigError(f"this FreeCAD has Python {version}; the add-on needs 3.11 or newer")
+    if not place.missing:
+        return str(place.packages)
+    names = [FREECAD_PACKAGES[name] for name in place.missing]
+    install = ["install", "--quiet", "--target", str(place.packages), *names]
+    # What lies there and cannot be imported, such as for another Python, is of no use to anybody.
+    if any((place.packages / name).exists() for name in place.missing):
+        install.append("--upgrade")
+    own = next((python for python in place.pythons if _has_pip(python, place.python)), None)
+    if own is not None:  # FreeCAD's own knows which packages fit it, and which processor it is made for
+        command = [own, "-m", "pip", *install]
+    else:
+        command = [_any_python(), "-m", "pip", *install]
+        command += ["--python-version", version, "--implementation", "cp", "--only-binary=:all:"]
+    run = _run([*command, *_constraint(place)], _PIP_SECONDS)
+    if (
+        run.returncode and place.constraints
+    ):  # the list is somewhere on the Internet, the packages may be near
+        run = _run(command, _PIP_SECONDS)
+    if run.returncode:
+        raise ConfigError(f"pip could not install {', '.join(names)} for Python {version}: {_pip_words(run)}")
+    left = ask_freecad(place.command, place.data).missing
+    if left:
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in left.items())
+        raise ConfigError(f"the packages are in {place.packages}, but FreeCAD cannot import them: {reasons}")
+    return str(place.packages)
+
+
+def _constraint(place: Place) -> list[str]:
+    if not place.constraints:
+        return []
+    return ["--constraint", "{}/{}.{}/constraints.txt".format(place.constraints.rstrip("/"), *place.python)]

@@ -3,6 +3,21 @@
 
 Where a difference shows in what Python offers (a module, a constant, an error's number), that is asked
 instead of the platform's name, so that tests can put either in its place.
+
+The user's folders for configuration, data and caches, by the platform's own rules.
+
+Client and server ask here, so that what one wrote the other finds. The add-on inside FreeCAD may only need
+three packages, so the few lines of ``platformdirs`` that matter are here: the XDG base directories,
+``~/Library`` on macOS, ``%APPDATA%`` and ``%LOCALAPPDATA%`` on Windows. ``SILO_HOME`` names one folder for
+all of them, on every platform. Standard library only.
+
+Files that are replaced whole or not at all, or are for their owner only. Standard library only.
+
+One path per file: without symlinks, each name as its folder lists it. Standard library only.
+
+Windows and macOS find ``Part.FCStd`` under ``part.fcstd`` too, and macOS finds a name in any Unicode normal
+form. Two spellings are one file there, and must be one component and one item. Such a disk is recognised by
+asking it, not by the platform: Linux mounts such disks, and macOS can have case-sensitive ones.
 """
 
 from __future__ import annotations
@@ -10,18 +25,42 @@ from __future__ import annotations
 import ctypes
 import errno
 import importlib
+import json
 import os
 import re
 import signal
 import socket
 import stat
+import string
 import struct
 import subprocess
 import sys
+import tempfile
+import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
-from typing import Any, BinaryIO, Protocol
+import unicodedata
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol
+
+if TYPE_CHECKING:
+    from concurrent.futures import ProcessPoolExecutor
+
+
+__all__ = [
+    "Stamp",
+    "private_file",
+    "private_folder",
+    "read_memory",
+    "remove_patiently",
+    "replace_patiently",
+    "replacing",
+    "stamp_of",
+    "sync_folder",
+    "write_memory",
+]
+
 
 NAME = sys.platform
 WINDOWS = os.name == "nt"
@@ -297,12 +336,55 @@ def end(process: subprocess.Popen[Any]) -> None:
         process.wait()
 
 
+def workers(count: int, begin: Callable[..., None], *arguments: Any) -> ProcessPoolExecutor:
+    """Return a pool of processes that do work for this one: Ctrl-C is its affair, and none outlives it.
+
+    ``begin`` is called in each of them, with the arguments.
+    """
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_all_start_methods, get_context
+
+    # Never by fork: a library may have threads that hold locks.
+    context = get_context("forkserver" if "forkserver" in get_all_start_methods() else "spawn")
+    return ProcessPoolExecutor(count, context, initializer=_begin_worker, initargs=(begin, arguments))
+
+
+def _begin_worker(begin: Callable[..., None], arguments: tuple[Any, ...]) -> None:
+    from multiprocessing import parent_process
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if (parent := parent_process()) is not None:
+
+        def watch() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=watch, daemon=True).start()
+    begin(*arguments)
+
+
+def end_workers(pool: ProcessPoolExecutor) -> None:
+    """End a pool at once, whatever its processes do; Python has its own way from 3.14 on."""
+    for process in list(pool._processes.values()):
+        process.kill()
+    pool.shutdown(wait=True, cancel_futures=True)
+
+
+_CRASHES = {"SIGSEGV", "SIGABRT", "SIGILL", "SIGBUS", "SIGFPE"}
+
+
 def how_it_ended(code: int) -> str:
-    """The exit code of a child in words: ``signal SIGSEGV``, ``exit code 3``."""
-    if code >= 0:
-        return f"exit code {code}"
+    """The exit code of a child in words, such as ``crashed (SIGSEGV)`` or ``ended with exit code 3``.
+
+    A shell that started the child adds 128 to the signal; Windows has codes from 0xC0000000 on for crashes.
+    """
     known = {int(number): number.name for number in signal.Signals}
-    return f"signal {known.get(-code, -code)}"
+    name = known.get(code - 128 if code > 128 else -code, str(-code) if code < 0 else "")
+    if code >= 0xC0000000:
+        return f"crashed (0x{code:08X})"
+    if name:
+        return f"{'crashed' if name in _CRASHES else 'was ended'} ({name})"
+    return f"ended with exit code {code}"
 
 
 def python_beside(prefix: str) -> list[str]:
@@ -314,13 +396,7 @@ def python_beside(prefix: str) -> list[str]:
 # --- network --------------------------------------------------------------------------------------------
 
 
-class SocketOptions(Protocol):
-    """A socket, as far as its options go."""
-
-    def setsockopt(self, level: int, option: int, value: int, /) -> None: ...
-
-
-def own_the_port(sock: SocketOptions, constants: Any = socket) -> None:
+def own_the_port(sock: socket.socket, constants: Any = socket) -> None:
     """Let no second server listen on the same port, and this one start again at once after its end.
 
     On Windows SO_REUSEADDR means that two may share the port; there the exclusive use is asked for.
@@ -332,3 +408,252 @@ def own_the_port(sock: SocketOptions, constants: Any = socket) -> None:
 
 # Worker processes share one listening socket, which Windows does not hand to the event loop of a child.
 WORKERS_CAN_SHARE_A_SOCKET = not WINDOWS
+
+
+_FOLDER = "silo-mod"
+_LOCAL, _ROAMING = ("LOCALAPPDATA", "AppData/Local"), ("APPDATA", "AppData/Roaming")
+
+
+def _folder(
+    env: Mapping[str, str], platform: str, xdg: str, unix: str, mac: str, windows: tuple[str, str]
+) -> Path:
+    if os.path.isabs(whole := env.get("SILO_HOME", "")):
+        return Path(whole) / xdg[len("XDG_") : -len("_HOME")].lower()
+    home = Path(env.get("HOME") or Path.home())
+    if platform == "win32":
+        variable, default = windows
+        return Path(env.get(variable) or Path.home() / default) / _FOLDER
+    # XDG says that a relative path is to be ignored.
+    chosen = env.get(xdg, "")
+    if chosen and os.path.isabs(chosen):
+        return Path(chosen) / _FOLDER
+    return home / (mac if platform == "darwin" else unix) / _FOLDER
+
+
+def config_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
+    """Where the configuration lives (not created here)."""
+    return _folder(env, platform, "XDG_CONFIG_HOME", ".config", "Library/Application Support", _ROAMING)
+
+
+def data_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
+    """Where what must not be lost lives: the outbox, the journal of registrations, the embedded database.
+
+    On Windows not in the roaming profile: a database that is copied between machines while it is open is soon
+    a broken one.
+    """
+    return _folder(env, platform, "XDG_DATA_HOME", ".local/share", "Library/Application Support", _LOCAL)
+
+
+def cache_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
+    """Where what can be made again lives."""
+    return _folder(env, platform, "XDG_CACHE_HOME", ".cache", "Library/Caches", _LOCAL)
+
+
+def scratch_folder(prefix: str, parent: Path | str | None = None) -> tempfile.TemporaryDirectory[str]:
+    """A temporary folder, as a context manager of its path; below ``parent``, else where the system has them.
+
+    A file in it that another program still has open (Windows) stays, and is no error.
+    """
+    return tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True)
+
+
+Stamp = tuple[int, int, int]
+"""What changes when a file is written: its time in ns, its size, its number on the disk."""
+
+
+@contextmanager
+def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO]:
+    """Write the new content of a file: at any moment ``path`` has all of the old content or all of the new.
+
+    The new file can be read by its owner only, unless ``mode`` says otherwise. Where writing fails or the
+    block raises, the old content stays and nothing lies beside it. Raises OSError.
+    """
+    target = Path(path)
+    # Beside the target, so that the rename at the end stays within one file system.
+    handle, temporary = tempfile.mkstemp(prefix=f".{target.name[:50]}.", suffix=".part", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        if mode is not None:
+            os.chmod(temporary, mode)
+        replace_patiently(temporary, target)
+    except BaseException:
+        with suppress(OSError):  # the first error is the one to report
+            remove_patiently(temporary)
+        raise
+    sync_folder(target.parent)
+
+
+def read_memory(path: Path) -> dict[str, Any]:
+    """What a small JSON file remembers; {} where it is not there, damaged, or no JSON object.
+
+    For files whose loss costs a repeated question and never an answer.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def write_memory(path: Path, content: Mapping[str, Any]) -> OSError | None:
+    """Write what :func:`read_memory` reads, for its owner only. The error where that is not possible."""
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with replacing(path) as file:
+            file.write(json.dumps(content, indent=1, sort_keys=True).encode())
+    except OSError as error:
+        return error
+    return None
+
+
+def replace_patiently(source: Path | str, target: Path | str) -> None:
+    """``os.replace``, which on Windows waits for a program that has the target open. Raises OSError."""
+    patiently(lambda: os.replace(source, target))
+
+
+def remove_patiently(path: Path | str) -> None:
+    """Delete a file, which on Windows waits for a program that has it open; none there is fine. OSError."""
+    patiently(lambda: Path(path).unlink(missing_ok=True))
+
+
+def private_folder(path: Path | str) -> None:
+    """Make a folder for its owner only, and close one that is there to others. Raises OSError."""
+    os.makedirs(path, mode=0o700, exist_ok=True)
+    _close_to_others(path)
+
+
+def private_file(path: Path | str) -> None:
+    """Make a file for its owner only, or close the one that is there to others. Raises OSError."""
+    os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
+    _close_to_others(path)
+
+
+def stamp_of(path: Path | str | int) -> Stamp | None:
+    """The stamp of a file, by its path or as an open one; None where there is no file."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return (status.st_mtime_ns, status.st_size, status.st_ino)
+
+
+def _close_to_others(path: Path | str) -> None:
+    mode = stat.S_IMODE(os.stat(path).st_mode)
+    if mode & 0o077:
+        with suppress(OSError):  # another user's, who has opened it to us
+            os.chmod(path, mode & ~0o077)
+
+
+_LISTED_AT_MOST = 50_000
+# Disks differ in what is another case of ß or µ, never of A to Z.
+_OTHER_CASE = str.maketrans(string.ascii_letters, string.ascii_letters.swapcase())
+
+
+class Spelt(NamedTuple):
+    """A path. ``plain`` is its real path in the spelling asked for, ``path`` in that of the folders."""
+
+    path: str
+    plain: str
+    there: bool
+
+
+class Spelling:
+    """Finds the one path of a file; remembers folders for one session."""
+
+    def __init__(self) -> None:
+        self._folders: dict[str, tuple[str, str]] = {}
+        self._canonical: dict[str, str] = {}
+        self._exact: set[str] = set()  # folders that find a name in its own spelling only
+        self._listings: dict[str, dict[str, list[tuple[str, int]]]] = {}
+
+    def real(self, path: str) -> str:
+        """``os.path.realpath`` with each name as its folder lists it; also for paths that are not there."""
+        return self.look(os.path.abspath(path)).path
+
+    def look(self, path: str) -> Spelt:
+        """The same for an absolute path, with what was asked for and whether anything is there."""
+        folder, name = os.path.split(path)
+        if not name:
+            found = os.path.realpath(path)
+            return Spelt(self._as_listed(found), found, os.path.lexists(found))
+        if folder not in self._folders:
+            plain = os.path.realpath(folder)
+            self._folders[folder] = plain, self._as_listed(plain)
+        plain, real_folder = self._folders[folder]
+        candidate = os.path.join(real_folder, name)
+        try:
+            status = os.lstat(candidate)
+        except (OSError, ValueError):
+            return Spelt(candidate, os.path.join(plain, name), False)
+        if stat.S_ISLNK(status.st_mode):
+            target = os.path.realpath(candidate)
+            return Spelt(self._as_listed(target), target, os.path.lexists(target))
+        listed = self._listed(real_folder, name, status)
+        return Spelt(os.path.join(real_folder, listed), os.path.join(plain, name), True)
+
+    def is_plain(self, path: str) -> bool:
+        """True where what is known to lie there, and to be no symlink, has no other path."""
+        folder, _, name = path.rpartition(os.sep)
+        if name.isascii() and folder in self._exact and self._folders.get(folder) == (folder, folder):
+            return True
+        return self.look(path).path == path
+
+    def _as_listed(self, real: str) -> str:
+        """A path without symlinks, each name as its folder lists it."""
+        known = self._canonical.get(real)
+        if known is None:
+            folder, name = os.path.split(real)
+            if not name or folder == real:
+                known = real
+            else:
+                parent = self._as_listed(folder)
+                try:
+                    name = self._listed(parent, name, os.lstat(os.path.join(parent, name)))
+                except (OSError, ValueError):
+                    pass  # nothing is there, so nothing lists it
+                known = os.path.join(parent, name)
+            self._canonical[real] = known
+        return known
+
+    def _listed(self, folder: str, name: str, status: os.stat_result) -> str:
+        if name.isascii() and folder in self._exact:
+            return name
+        cases = (name.translate(_OTHER_CASE), name.swapcase())
+        spellings = {*cases, *(unicodedata.normalize(form, name) for form in ("NFC", "NFD"))} - {name}
+        # Not compared by number: some network disks number each spelling of a file otherwise, or its entry in
+        # a listing, and a disk may still answer with the number of a file that was deleted a moment ago.
+        if not any(os.path.lexists(os.path.join(folder, other)) for other in spellings):
+            if name.isascii() and spellings:
+                self._exact.add(folder)
+            return name
+        listed = self._listing(folder).get(folded(name), [])
+        if not listed or any(other == name for other, _ in listed):  # both may be files of their own
+            return name
+        # Windows distinguishes normal forms, so several may be there: the number decides where it can.
+        return next((other for other, number in listed if number == status.st_ino), listed[0][0])
+
+    def _listing(self, folder: str) -> dict[str, list[tuple[str, int]]]:
+        """Names and inode numbers of a folder's entries, by :func:`folded` name."""
+        known = self._listings.get(folder)
+        if known is None:
+            known = self._listings[folder] = {}
+            try:
+                with os.scandir(folder) as found:
+                    for _, item in zip(range(_LISTED_AT_MOST), found, strict=False):
+                        known.setdefault(folded(item.name), []).append((item.name, item.inode()))
+            except OSError:
+                pass  # a folder that cannot be listed shows nothing; names stay as they were given
+        return known
+
+
+def one_path(path: str) -> str:
+    """:meth:`Spelling.real` for a single look."""
+    return Spelling().real(path)
+
+
+def folded(name: str) -> str:
+    """Equal for names that differ in case or normal form only."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFD", name).casefold())

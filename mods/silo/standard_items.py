@@ -13,10 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import SiloError
-from silo.bom.identity import walk_entries
-from silo.bom.model import BomEntry
-from silo.durable import read_memory, write_memory
-from silo.folders import data_folder
+from silo.bom.model import BomEntry, walk_entries
+from silo.platform import data_folder, read_memory, write_memory
 
 # Each costs a request, and only while nobody has registered the part.
 MOST_LOOKED_UP = 200

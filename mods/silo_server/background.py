@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What a server does beside its requests, on threads of its own: nobody waits for it, it waits for nobody.
 
-:class:`TokenUses` writes down when tokens were used. :class:`Probe` looks whether the database and the file
-store are there, so that ``/health`` and ``/ready`` answer while every other thread and connection is taken.
+:class:`Later` writes down when tokens were used, and keeps summaries of products. :class:`Probe` looks
+whether the database and the file store are there, so that ``/health`` and ``/ready`` answer while every other
+thread and connection is taken.
 """
 
 from __future__ import annotations
@@ -19,26 +20,27 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import SiloError
 from silo_server.db.engine import Database, mode_of
-from silo_server.errors import cause_of
-from silo_server.files import FileStore
 from silo_server.services.access.credentials import note_token_uses
+from silo_server.services.bom.summary import keep_looks, keep_summaries
+from silo_server.services.revisions import FileStore
+from silo_server.settings import cause_of
 
 logger = logging.getLogger("silo_server")
 
-USES_SECONDS = 1.0
+LATER_SECONDS = 1.0
 # [s] A probe that takes longer says no for the time being.
 HEALTH_SECONDS, READY_SECONDS = 0.2, 2.0
 # [bytes] With less, a database soon cannot write what is asked of it.
 MIN_FREE = 64 * 1024 * 1024
 
 
-class TokenUses:
-    """The thread that writes down when tokens were used last."""
+class Later:
+    """The thread that writes down what no request waits for: uses of tokens, summaries of products."""
 
     def __init__(self, db: Database) -> None:
         self._db = db
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="silo-token-uses", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="silo-later", daemon=True)
 
     def start(self) -> None:
         """Begin."""
@@ -52,11 +54,13 @@ class TokenUses:
     def _run(self) -> None:
         ending = False
         while not ending:
-            ending = self._stopping.wait(USES_SECONDS)
+            ending = self._stopping.wait(LATER_SECONDS)
             try:
                 note_token_uses(self._db)
+                keep_summaries(self._db)
+                keep_looks(self._db)
             except (SQLAlchemyError, SiloError) as error:
-                logger.debug("the last use of tokens is noted later: %s", cause_of(error))
+                logger.debug("the uses of tokens and the summaries are kept later: %s", cause_of(error))
 
 
 @dataclass(frozen=True, slots=True)

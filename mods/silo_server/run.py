@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Run the server: in the foreground, by several worker processes, or on a thread of another program."""
+"""Run the server: in the foreground, by several worker processes, or on a thread of another program.
+
+The first start: newest schema, a first admin, a first token; every start: old things are cleared away.
+"""
 
 from __future__ import annotations
 
@@ -9,33 +12,193 @@ import ipaddress
 import multiprocessing
 import multiprocessing.connection
 import os
+import shutil
 import signal
 import socket
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, replace
+from datetime import timedelta
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
+import anyio.to_thread
 import uvicorn
-from fastapi import FastAPI
-from sqlalchemy import make_url
+from fastapi import APIRouter, FastAPI
+from fastapi.openapi.utils import get_openapi
+from sqlalchemy import func, make_url, select
 from sqlalchemy.exc import SQLAlchemyError
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from silo.bom.errors import ConfigError
-from silo.folders import scratch_folder
-from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port
-from silo_server.app import create_app, observed
-from silo_server.bootstrap import Welcome, prepare
-from silo_server.db.engine import Database
-from silo_server.errors import cause_of
-from silo_server.operation.metrics import SHARED
-from silo_server.operation.requests import log_to_stderr
-from silo_server.services.access import credentials
-from silo_server.settings import Settings, settings_from_environment
+from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port, scratch_folder
+from silo_server import http
+from silo_server.background import Later, Probe
+from silo_server.db.engine import WRITERS_WAITING, Database, Tx
+from silo_server.db.migrate import upgrade
+from silo_server.db.tables import events, users
+from silo_server.events import Hub
+from silo_server.http import BodyLimit, Compressed, Observed, SecurityHeaders, log_to_stderr
+from silo_server.operation.housekeeping import keep_tidy, tidy
+from silo_server.operation.metrics import SHARED, Metrics
+from silo_server.services import search
+from silo_server.services.access import accounts, credentials, logins
+from silo_server.services.revisions import FileStore
+from silo_server.settings import MIB, Clock, Settings, cause_of, settings_from_environment, stamp, utc_now
+from silo_server.values import Role
+
+START_TOKEN_DAYS = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Welcome:
+    """What the person who starts the server sees. ``login_secret`` belongs behind ``/login/link/``.
+
+    Without an active admin there is no user, no token and no link. A token of the environment that lets
+    nobody in is not shown: ``warnings`` say why.
+    """
+
+    username: str | None
+    token: str | None
+    login_secret: str | None
+    warnings: Sequence[str] = ()
+
+
+def prepare(db: Database, token: str | None = None, *, reset_admin: str | None = None) -> Welcome:
+    """Bring the database up to date and let the first admin in.
+
+    token
+        ``SILO_API_TOKEN``, made a token of the first admin; a new one is made where None.
+    reset_admin
+        the user with this name becomes an active admin, is made where there is none, and is let in: the way
+        back for those who locked themselves out.
+    """
+    upgrade(db)
+    with db.write(even_when_read_only=True) as tx:
+        if tx.conn.scalar(select(func.count()).select_from(users)) == 0:
+            settings = tx.settings
+            accounts.create_user(tx, settings.admin_username, Role.ADMIN, password=settings.admin_password)
+        if reset_admin is not None:
+            accounts.make_admin(tx, reset_admin)
+        admin = accounts.get_user(tx, reset_admin) if reset_admin else _first_admin(tx)
+        secret, dead = token if admin else None, ""
+        if admin and token is None:
+            expires = stamp(tx.at + timedelta(days=START_TOKEN_DAYS))
+            secret = credentials.create_token(tx, admin.id, credentials.START_TOKEN, expires=expires)[1]
+        elif admin and token is not None and (dead := credentials.take_configured_token(tx, admin.id, token)):
+            secret = None
+        link = logins.create_login_link(tx, admin.username) if admin else None
+        search.ensure_index(tx)
+        last = tx.conn.scalar(select(events.c.at).order_by(events.c.id.desc()).limit(1)) or ""
+        late = stamp(tx.at + timedelta(minutes=1))
+    behind = f"The clock is behind: the last change is of {last}, and now it is {stamp(db.clock())}. Set it."
+    tidy(db, FileStore(db.settings.storage))
+    warnings = [behind] if last > late else []
+    if dead:
+        warnings.append(f"SILO_API_TOKEN lets nobody in: {dead}. Put a new one there.")
+    return Welcome(admin.username if admin else None, secret, link, warnings)
+
+
+def _first_admin(tx: Tx) -> accounts.User | None:
+    row = tx.conn.execute(
+        select(users).where(users.c.role == Role.ADMIN.value, users.c.active).order_by(users.c.id).limit(1)
+    ).one_or_none()
+    return accounts.to_user(row) if row is not None else None
+
+
+VERSION = "0.1.0"
+READING_THREADS = 40
+# Routes are matched in this order; /items/by-uuid and /items/search stand before /items/{part_number}.
+
+
+def routers() -> tuple[APIRouter, ...]:
+    """Return all routes; imported late, for they are half of the import, and a backup needs none of them."""
+    from silo_server.routes import bom, documents, items, system
+    from silo_server.web import pages
+
+    return (
+        system.router,
+        system.auth_router,
+        items.router,
+        items.revisions_router,
+        documents.router,
+        bom.router,
+        bom.several,
+        bom.review_router,
+        bom.transfer_router,
+        *pages.ROUTERS,
+    )
+
+
+def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
+    """The server as an ASGI application; ``bootstrap.prepare`` has brought the database up to date."""
+    from silo_server.routes.context import Server
+
+    db = Database(settings, clock)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        # Changes that wait hold a thread each; what is left is for those who read.
+        anyio.to_thread.current_default_thread_limiter().total_tokens = WRITERS_WAITING + READING_THREADS
+        hub, files, uses = Hub(db), FileStore(settings.storage), Later(db)
+        probe = Probe(db, files)
+        app.state.server = Server(settings, db, hub, files, probe)
+        await hub.start()
+        uses.start()
+        ending = asyncio.Event()
+        tidying = asyncio.create_task(keep_tidy(db, files, ending))
+        yield
+        ending.set()
+        await tidying
+        await hub.stop()
+        probe.stop()
+        await asyncio.to_thread(uses.stop)
+        db.close()
+
+    # The interactive pages of FastAPI load scripts from elsewhere, which our CSP forbids; the document stays.
+    metrics = Metrics()
+    app = FastAPI(
+        title="silo-mod server",
+        version=VERSION,
+        openapi_url="/api/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+    )
+    for router in routers():
+        app.include_router(router)
+    http.install(app)
+    from silo_server.web import pages
+
+    pages.install(app)
+    app.add_middleware(BodyLimit, settings=settings)
+    app.add_middleware(SecurityHeaders)
+    app.add_middleware(Compressed)
+    app.state.metrics = metrics
+    app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
+    return app
+
+
+def app_from_environment() -> Observed:
+    """For other ASGI servers: ``uvicorn --factory silo_server.run:app_from_environment``."""
+    settings = settings_from_environment()
+    return observed(create_app(settings), settings)
+
+
+def observed(app: FastAPI, settings: Settings) -> Observed:
+    """The application as it is served: with request ids, log, metrics, below its sub-path."""
+    return Observed(app, settings, app.state.metrics)
+
+
+def _openapi(app: FastAPI) -> dict[str, Any]:
+    if app.openapi_schema is None:
+        from silo_server.routes.context import complete
+
+        app.openapi_schema = complete(get_openapi(title=app.title, version=app.version, routes=app.routes))
+    return app.openapi_schema
+
 
 START_SECONDS = 60
 SHUTDOWN_SECONDS = 10
@@ -56,7 +219,8 @@ class RunningServer:
 class Greeting:
     """What a server says of itself when it starts. ``public``: other machines reach it.
 
-    A token that was given to it is not shown whole: logs are read by many.
+    A token that was given to it is not shown whole: logs are read by many. ``warnings``: what is wrong with
+    its settings.
     """
 
     url: str
@@ -64,6 +228,7 @@ class Greeting:
     login_url: str | None
     database: str
     public: bool
+    warnings: Sequence[str] = ()
 
     def lines(self) -> list[str]:
         """For people, and for scripts that look for the first address and the token."""
@@ -78,7 +243,7 @@ class Greeting:
         if self.public:
             warning = "This server can be reached from other machines. Put TLS before it (docs/server.md)."
             lines.append(warning)
-        return lines
+        return [*lines, *(f"Warning:     {warning}" for warning in self.warnings)]
 
 
 def _tell(greeting: Greeting) -> None:
@@ -175,6 +340,8 @@ def serve(
             "(--workers 1); it answers several requests at once."
         )
     given = token or os.environ.get("SILO_API_TOKEN") or None
+    if given:
+        credentials.check_configured_secret(given)
     sock = _bind(host, port)  # first: where the port is taken, no token is made that nobody sees
     try:
         welcome = _prepare(settings, given, reset_admin)
@@ -182,12 +349,15 @@ def serve(
         sock.close()
         raise
     base_url = _base_url(host, sock.getsockname()[1])
+    own = settings
     settings = replace(settings, public_url=settings.public_url or base_url)
     database, login_url = _without_password(settings), _login_url(settings, welcome)
     shown = welcome.token
     if shown and given:
         shown = f"{credentials.shown_prefix(given)}… (the one you gave)"
-    greeting = Greeting(base_url, shown, login_url, database, not is_loopback(host))
+    warnings = [*start_warnings(own, is_loopback(host)), *welcome.warnings]
+    settings = replace(settings, warnings=tuple(warnings))
+    greeting = Greeting(base_url, shown, login_url, database, not is_loopback(host), warnings)
     # uvicorn passes Ctrl-C on when it has ended in good order; to the person that is no error.
     with sock, suppress(KeyboardInterrupt):
         if workers == 1:
@@ -197,6 +367,33 @@ def serve(
             with scratch_folder("silo-metrics-") as shared:
                 os.environ[SHARED] = shared
                 _run_workers(settings, workers, sock)
+
+
+def start_warnings(settings: Settings, loopback: bool) -> list[str]:
+    """Return what is wrong with the settings of a server; ``loopback``: only this machine sees it."""
+    public = settings.public_url or ""
+    free = shutil.disk_usage(_nearest(settings.storage)).free
+    known = {
+        "SILO_PUBLIC_URL is not set: login links begin with the address that the server listens on.": not (
+            public or loopback
+        ),
+        "SILO_PUBLIC_URL begins with https and SILO_SECURE_COOKIES is off: set it to yes.": public.startswith(
+            "https:"
+        )
+        and not settings.secure_cookies,
+        "SILO_TRUSTED_PROXIES is *: whoever reaches the server chooses the address that it writes down.": (
+            "*" in settings.trusted_proxies
+        ),
+        f"The disk of {settings.storage} has {free // MIB} MiB left: make room, or changes fail.": free
+        < 1024 * MIB,
+    }
+    return [warning for warning, wrong in known.items() if wrong]
+
+
+def _nearest(folder: Path) -> Path:
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    return folder
 
 
 @contextmanager

@@ -1,19 +1,112 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What a server needs to know before it starts; one frozen value, passed in, never read from a global."""
+"""What a server needs to know before it starts; one frozen value, passed in, never read from a global.
+
+The server's additions to the error tree: the same faults, with the HTTP status that is exact for them.
+"""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from silo.bom.errors import ConfigError
+from silo.bom.errors import (
+    ConfigError,
+    ConflictError,
+    RejectedError,
+    RemoteError,
+    UnreachableError,
+    VersionConflictError,
+)
 from silo.bom.numbers import yes_or_no
-from silo.folders import data_folder
+from silo.platform import data_folder
+
+Clock = Callable[[], datetime]
+
+
+def utc_now() -> datetime:
+    """Now, in UTC."""
+    return datetime.now(UTC)
+
+
+def stamp(when: datetime) -> str:
+    """As stored: microseconds always, so that text order is time order (``2026-02-08T22:15:00.000000Z``)."""
+    return when.astimezone(UTC).replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"
+
+
+def wire(stored: str | None) -> str | None:
+    """As sent to clients, to the microsecond, so that a time that came from here means the same moment again.
+
+    Without the fraction where there is none, as in the spec (``2026-02-08T22:15:00Z``).
+    """
+    return None if stored is None else stored.replace(".000000Z", "Z")
+
+
+def spec_time(stored: str) -> str:
+    """As the spec's events have it: whole seconds (``2026-02-08T22:15:00Z``)."""
+    return stored[:19] + "Z"
+
+
+class TooLargeError(RejectedError):
+    """413: more than the server takes in one request; the message names the limit."""
+
+    status_hint = 413
+    code = "too_large"
+
+
+class TooManyAttemptsError(RemoteError):
+    """429: too many failed logins; ``retry_after`` seconds until the next try is looked at."""
+
+    status_hint = 429
+    code = "too_many_attempts"
+
+    def __init__(self, message: str, retry_after: int) -> None:
+        super().__init__(message)
+        self.retry_after = retry_after
+
+
+class InDoubtError(UnreachableError):
+    """503 without ``Retry-After``: it is not known whether the change was stored."""
+
+    status_hint = 503
+    code = "unavailable"
+
+
+class DuplicateError(ConflictError):
+    """409: there is one already."""
+
+    code = "duplicate"
+
+
+class LinesChangedError(VersionConflictError):
+    """Lines are no longer as the person saw them, who therefore decides again; ``line_ids`` names them."""
+
+    def __init__(self, message: str, line_ids: Sequence[str]) -> None:
+        super().__init__(message)
+        self.line_ids = tuple(line_ids)
+
+
+class ArchivedPartsError(ConflictError):
+    """A state of a BOM would bring archived parts back, and nobody said that it may."""
+
+    def __init__(self, part_numbers: Sequence[str]) -> None:
+        super().__init__(
+            f"nothing was restored: {', '.join(part_numbers[:10])}"
+            f"{' and others' if len(part_numbers) > 10 else ''} would come back and"
+            f" {'is' if len(part_numbers) == 1 else 'are'} archived; say that they may (with_archived)"
+        )
+        self.part_numbers = tuple(part_numbers)
+
+
+def cause_of(error: BaseException) -> str:
+    """What the database's driver or the operating system said, in one line; no SQL and no values."""
+    return str(getattr(error, "orig", None) or error).strip().partition("\n")[0] or type(error).__name__
+
 
 MIB = 1024 * 1024
 
@@ -49,12 +142,15 @@ class Settings:
         events kept for replay; a client that was away longer gets ``reset``.
     sync_days, sync_bytes
         for how long, and how much of, the answers to merges are kept for a repeated request.
+    warnings
+        what was wrong with the settings at the start, for the page of the system; not from the environment.
     history_days, audit_days
         older changes of BOMs are folded into one, older lines of the audit list deleted; 0 keeps all.
     """
 
     database_url: str
     files_dir: Path | None = None
+    warnings: tuple[str, ...] = ()
     read_only: bool = False
     heartbeat_seconds: float = 30.0
     poll_seconds: float = 1.0

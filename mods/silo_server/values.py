@@ -1,14 +1,98 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The server's own frozen values, between the services and whoever shows them."""
+"""The server's own frozen values, between the services and whoever shows them.
+
+JSON that users give us (properties, a line's metadata): what is let in, and how it is stored.
+
+One guard (:func:`json_problem`) stands on every way in. What it accepts, :func:`dumps` and
+``routes.context.json_answer`` can always write.
+"""
 
 from __future__ import annotations
 
+import json
+import math
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from enum import StrEnum
 from typing import Any, NamedTuple, TypeVar
 
-from silo_server.clock import wire
+from silo.bom.errors import RejectedError
+from silo.bom.resolve import character_problem
+from silo_server.settings import wire
+
+MAX_DEPTH = 32
+MAX_BYTES = 256 * 1024
+MAX_KEY = 200
+# JSON does not tell 1e300 from a whole number of 301 digits, and so neither do we: what a double can hold.
+MAX_NUMBER = sys.float_info.max
+# The same as it is written, which is what the API document's readers compare with.
+_MAX_WHOLE = int(Decimal(repr(MAX_NUMBER)))
+_DIGITS = 309
+
+
+def dumps(value: Any) -> str:
+    """Compact JSON text, as stored and sent."""
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
+
+
+def json_problem(value: Any) -> str | None:
+    """What is wrong with a JSON value that a user gave, None where nothing is."""
+    stack = [(value, 1)]
+    while stack:
+        part, depth = stack.pop()
+        if depth > MAX_DEPTH and isinstance(part, dict | list | tuple):
+            return f"wanted at most {MAX_DEPTH} levels of nesting, got more"
+        if isinstance(part, dict):
+            for key in part:
+                if problem := character_problem(key):
+                    return problem
+                if len(key) > MAX_KEY:
+                    return f"wanted keys of at most {MAX_KEY} characters, got {key[:60]!r}"
+            stack.extend((below, depth + 1) for below in part.values())
+        elif isinstance(part, list | tuple):
+            stack.extend((below, depth + 1) for below in part)
+        elif problem := _scalar_problem(part):
+            return problem
+    size = len(dumps(value).encode())
+    if size > MAX_BYTES:
+        return f"wanted at most {MAX_BYTES // 1024} KiB of JSON, got {size // 1024} KiB"
+    return None
+
+
+def check_json(name: str, value: Any) -> None:
+    """Raise RejectedError, naming the field, unless the value may be stored."""
+    problem = json_problem(value)
+    if problem is not None:
+        raise RejectedError(f"{name}: {problem}", [f"{name}: {problem}"])
+
+
+def merge_patch(target: Any, patch: Any) -> Any:
+    """``target`` after a JSON merge patch (RFC 7386): null removes a member, objects merge.
+
+    The patch has passed the guard, which bounds how deep this goes.
+    """
+    if not isinstance(patch, dict):
+        return patch
+    merged = dict(target) if isinstance(target, dict) else {}
+    for key, value in patch.items():
+        if value is None:
+            merged.pop(key, None)
+        else:
+            merged[key] = merge_patch(merged.get(key), value)
+    return merged
+
+
+def _scalar_problem(value: Any) -> str | None:
+    if isinstance(value, str):
+        return character_problem(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return f"wanted finite numbers, got {value}"
+    if isinstance(value, int) and not -_MAX_WHOLE <= value <= _MAX_WHOLE:
+        return f"wanted numbers of at most {_DIGITS} digits, got a longer one; send it as text"
+    return None
+
 
 T = TypeVar("T")
 
@@ -94,7 +178,7 @@ class NewEvent:
 @dataclass(frozen=True, slots=True)
 class Item:
     """An item. ``id`` is internal, ``uuid`` what the world knows; ``bom_version`` counts its BOM's states,
-    ``version`` its own. ``created_as``: the number (case-folded) that it was asked for under."""
+    ``version`` its own. ``texts`` are the columns of :class:`silo.api.wire.ItemTexts`."""
 
     id: int
     uuid: str
@@ -104,24 +188,45 @@ class Item:
     item_type: str
     schema: str | None
     category: str | None
-    sourcing_type: str | None
-    long_description: str | None
+    texts: Mapping[str, str | None]
     thumbnail_key: str | None
     properties: Mapping[str, Any]
     current_revision: int
     bom_version: int
     version: int
-    created_as: str | None
     created_at: str
     created_by: str
     updated_at: str
     updated_by: str
     archived_at: str | None
 
+    @property
+    def subject(self) -> str:
+        """What people read in messages."""
+        return self.part_number
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A file with revisions of its own, or with those of the item ``item_id``. ``uuid`` is what the world
+    knows."""
+
+    id: int
+    uuid: str
+    item_id: int | None
+    current_revision: int
+    created_at: str
+    created_by: str
+
+    @property
+    def subject(self) -> str:
+        """What people read where an item has its part number."""
+        return f"document {self.uuid}"
+
 
 @dataclass(frozen=True, slots=True)
 class Revision:
-    """A revision of an item: a property snapshot and, where one was uploaded, a file.
+    """A revision of an item: a property snapshot and, where one was uploaded, a file; or one of a document.
 
     base_revision, file_path, links
         what the client said of the file (:class:`silo.api.wire.Revision`).

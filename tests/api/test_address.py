@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from silo.api.address import ServerAddress, may_carry_token, origin_of
+from silo.api.config import ServerAddress, may_carry_token, origin_of
 from silo.bom.errors import ConfigError, InputError
 
 
@@ -19,6 +19,9 @@ from silo.bom.errors import ConfigError, InputError
         ("https://silo.example.com/api/", "https://silo.example.com/api", "https://silo.example.com"),
         ("https://host/silo/api", "https://host/silo/api", "https://host/silo"),
         ("https://host/plm", "https://host/plm", "https://host/plm"),
+        ("127.0.0.1:8080", "http://127.0.0.1:8080/api", "http://127.0.0.1:8080"),
+        ("localhost:8080/silo", "http://localhost:8080/silo", "http://localhost:8080/silo"),
+        ("[::1]:8000", "http://[::1]:8000/api", "http://[::1]:8000"),
         ("http://[::1]:8000", "http://[::1]:8000/api", "http://[::1]:8000"),
     ],
 )
@@ -33,6 +36,8 @@ def test_api_is_appended_only_where_the_address_has_no_path(written: str, api: s
     [
         "",
         "silo.example.com",
+        "127.0.0.1x:8080",
+        "localhost.example.com:8080",
         "ftp://host",
         "http://",
         "http://host:99999",

@@ -12,9 +12,9 @@ from uuid import uuid4
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.files import Origin
-from silo.api.wire import MergeEntry, MergeRequest, MergeResult, SourceDocument
-from silo.bom.diff import diff_bom
+from silo.api.files import DocumentId, Origin
+from silo.api.wire import HeldItem, LinkedFile, MergeEntry, MergeRequest, MergeResult, SourceDocument
+from silo.bom.compare import diff_bom
 from silo.bom.errors import (
     ConflictError,
     CycleError,
@@ -86,7 +86,8 @@ def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> Non
         }
 
     client, fake = methods(SiloClient), methods(FakeSilo)
-    assert set(client) - set(fake) == {"close", "events", "modules", "thumbnail"}
+    # The fake has no connection, no pages and no pictures.
+    assert set(client) - set(fake) == {"begin_login", "close", "events", "modules", "thumbnail"}
     assert set(fake) - set(client) == {"set_mode"}
     for name in set(client) & set(fake):
         assert client[name] == fake[name], name
@@ -454,3 +455,78 @@ def test_the_bom_of_a_file_that_would_undo_the_newest_is_refused(
     with pytest.raises(refusal):
         silo.merge_bom(number, wanted)
     assert silo.get_bom(number) == []
+
+
+def test_a_file_of_several_items_has_revisions_of_its_own(silo: Silo, tmp_path: Path) -> None:
+    """Its UUID is named by the first upload; each item in it knows it, with its object and its file."""
+    items = [silo.create_item("kindred-rd", "M01", name) for name in ("Left", "Right")]
+    uuid = DocumentId(uuid4())
+    held = [HeldItem(item=item.id, object=f"Part{n}") for n, item in enumerate(items)]
+    held.append(HeldItem(item=str(uuid4()), object="NotInSilo"))
+    origin = Origin(base_revision=0, file_path="parts/both.FCStd", items=held)
+    for number, content in enumerate((b"one", b"two"), start=1):
+        (tmp_path / "both.FCStd").write_bytes(content)
+        base = origin.model_copy(update={"base_revision": number - 1})
+        made = silo.upload_file(
+            uuid, tmp_path / "both.FCStd", "c", idempotency_key=f"{uuid}{number}", origin=base
+        )
+        again = silo.upload_file(
+            uuid, tmp_path / "both.FCStd", "c", idempotency_key=f"{uuid}{number}", origin=base
+        )
+        assert (made.revision_number, again.revision_number) == (number, number)
+    (tmp_path / "both.FCStd").write_bytes(b"three")
+    old = origin.model_copy(update={"base_revision": 1})
+    with pytest.raises(NewerRevisionError) as refused:
+        silo.upload_file(uuid, tmp_path / "both.FCStd", origin=old)
+    assert refused.value.revision["revision_number"] == 2
+    assert [one.revision_number for one in silo.revisions(uuid)] == [2, 1]
+    silo.download_file(uuid, tmp_path / "back", 1)
+    assert (tmp_path / "back").read_bytes() == b"one"
+    for item in items:
+        (document,) = silo.documents_of(item.part_number)
+        assert (document.id, document.part_number, document.revision_number) == (uuid, "", 2)
+        assert (document.file_name, document.file_path) == ("both.FCStd", "parts/both.FCStd")
+        assert document.file_checksum == hashlib.sha256(b"two").hexdigest()
+        assert silo.get_item(item.part_number).current_revision == 0
+        assert silo.revisions(item.part_number) == []
+    wanted = [(f"Part{n}", item.part_number) for n, item in enumerate(items)]
+    assert [(one.object, one.part_number) for one in document.holds] == wanted
+
+
+def test_the_file_of_one_item_is_one_document_with_the_numbers_of_the_item(
+    silo: Silo, tmp_path: Path
+) -> None:
+    """Sent to either address it arrives at both; an upload by the item's number needs no change."""
+    item = silo.create_item("kindred-rd", "M01", "Alone")
+    uuid = DocumentId(item.id)
+    assert silo.get_documents([item.id]) == {}
+    for content, to in ((b"a", item.part_number), (b"b", uuid)):
+        (tmp_path / "p.FCStd").write_bytes(content)
+        silo.upload_file(to, tmp_path / "p.FCStd")
+    assert [one.revision_number for one in silo.revisions(item.part_number)] == [2, 1]
+    assert [one.revision_number for one in silo.revisions(uuid)] == [2, 1]
+    found = silo.get_documents([item.id.upper(), str(uuid4())])
+    assert list(found) == [item.id]
+    assert found[item.id].part_number == item.part_number
+    assert [(one.item, one.object) for one in found[item.id].holds] == [(item.id, "")]
+    assert [one.id for one in silo.documents_of(item.part_number)] == [item.id]
+
+
+def test_a_file_without_an_item_is_used_by_what_links_to_it(silo: Silo, tmp_path: Path) -> None:
+    """Until a newer revision links to it no more; a link names the document or the item."""
+    (tmp_path / "f.FCStd").write_bytes(b"f")
+    sheet, user = DocumentId(uuid4()), silo.create_item("kindred-rd", "A01", "Top", item_type="assembly")
+    part = silo.create_item("kindred-rd", "M01", "Part")
+    silo.upload_file(sheet, tmp_path / "f.FCStd")
+    silo.upload_file(part.part_number, tmp_path / "f.FCStd")
+    links = [LinkedFile(path="sheet.FCStd", document=sheet), LinkedFile(path="p.FCStd", item=part.id)]
+    silo.upload_file(user.part_number, tmp_path / "f.FCStd", origin=Origin(links=links))
+    assert [one.id for one in silo.get_document(sheet).used_by] == [user.id]
+    assert silo.get_document(sheet).holds == []
+    top = silo.get_document(user.id)
+    assert {one.id for one in top.linked} == {str(sheet), part.id}
+    assert top.links == links
+    silo.upload_file(user.part_number, tmp_path / "f.FCStd", origin=Origin(links=links[1:]))
+    assert silo.get_document(sheet).used_by == []
+    with pytest.raises(NotFoundError):
+        silo.get_document(str(uuid4()))

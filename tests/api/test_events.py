@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.events import SELDOM, Connection, ConnectionState, EventListener
+from silo.api.config import Pause
+from silo.api.events import SELDOM, Connection, ConnectionState, EventListener, ServerEvent
 from silo.api.policy import Backoff
-from silo.api.sse import ServerEvent
 from silo.bom.errors import AuthError, ServerFaultError, UnreachableError
 from silo.testing import FakeSilo
 
@@ -166,18 +166,68 @@ def test_a_mark_that_the_server_refuses_is_given_up(
     assert server.seen[1].headers["Last-Event-ID"] is None
 
 
-@pytest.mark.parametrize("status", [401, 403])
-def test_a_token_that_is_refused_is_not_tried_again(
-    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any, status: int
+@pytest.mark.parametrize(("status", "again"), [(401, None), (403, SELDOM)])
+def test_a_token_that_is_refused_waits_for_a_person(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any, status: int, again: float
 ) -> None:
-    """The end, until a person acts; then start() begins anew."""
+    """The thread lives on and wakes where a person acts: a new token, or *Retry all*."""
     server.on(EVENTS, answer(status, {"error": "x"}), stream(frame(1), stay=True))
-    with Watch(client) as watch:
-        assert "token" in watch.state(Connection.REFUSED).message
-        watch.listener._thread.join(60)  # type: ignore[union-attr]
-        assert (watch.pauses, len(server.seen)) == ([], 1)
-        watch.listener.start()
+    with Watch(client, wait=lambda wake, seconds: wake.wait(60)) as watch:
+        state = watch.state(Connection.REFUSED)
+        assert ("token" in state.message, state.retry_in) == (True, again)
+        assert len(server.seen) == 1
+        watch.listener.retry_now()
         assert watch.event().id == "1"
+
+
+def test_a_login_page_waits_for_a_person_too(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """A proxy with single sign-on redirects what has no session."""
+    server.on(EVENTS, answer(302, "", {"Location": "/login"}), stream(frame(1), stay=True))
+    with Watch(client, wait=lambda wake, seconds: wake.wait(60)) as watch:
+        assert "login" in watch.state(Connection.REFUSED).message
+        watch.listener.retry_now()
+        assert watch.event().id == "1"
+
+
+class Shared:
+    """The pause of a server, as the queue and the live connection share it."""
+
+    def __init__(self, pause: Pause | None = None) -> None:
+        self.pause = pause
+
+    def clock(self) -> float:
+        return 1000.0
+
+    def get(self) -> Pause | None:
+        return self.pause
+
+    def set(self, pause: Pause | None) -> None:
+        self.pause = pause
+
+
+def test_the_pause_of_the_queue_is_that_of_the_connection(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """Noted by either, kept by both; ended by an event, unless the server named the time."""
+    server.on(EVENTS, answer(503, {"error": "busy"}, {"Retry-After": "40"}), stream(frame(1), stay=True))
+    pauses = Shared(Pause(1600.0, "the queue was put off", "busy", 3, told=True))
+    asked: list[int] = []
+    with Watch(client, pauses=pauses, wait=lambda _wake, _seconds: asked.append(len(server.seen))) as watch:
+        said = watch.state(Connection.OFFLINE)
+        assert (said.message, said.retry_in) == ("the queue was put off", 600.0)
+        assert watch.state(Connection.OFFLINE).retry_in == 40.0
+        watch.event()
+    assert asked == [0, 1]
+    assert pauses.pause is not None
+    assert (pauses.pause.until, pauses.pause.failures, pauses.pause.told) == (1040.0, 4, True)
+    server.on(EVENTS, answer(503, {"error": "unavailable"}), stream(frame(2), stay=True))
+    pauses.pause = None
+    with Watch(client, pauses=pauses) as watch:
+        watch.state(Connection.OFFLINE)
+        watch.event()
+        assert pauses.pause is None
 
 
 def test_a_server_without_events_is_asked_again_but_rarely(

@@ -11,8 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.api.client import SiloClient
-from silo.api.policy import LONGEST_TOLD, Backoff, Retries, Scope, Then, Verdict, judge, may_repeat
-from silo.api.replies import WebPageError
+from silo.api.policy import (
+    LONGEST_TOLD,
+    Backoff,
+    Retries,
+    Scope,
+    Then,
+    Verdict,
+    WebPageError,
+    judge,
+    may_repeat,
+)
 from silo.bom import errors
 from silo.bom.errors import (
     BusyError,
@@ -35,11 +44,12 @@ VERDICTS = {
     "BusyError": ALL_RETRY,
     "AuthError": (Scope.ALL, Then.PERSON),
     "ForbiddenError": (Scope.KIND, Then.PERSON),
-    "NotFoundError": ENTRY_PERSON,
+    "NotFoundError": (Scope.ENTRY, Then.RETRY),
     "RouteMissingError": (Scope.KIND, Then.RETRY),
     "RejectedError": ENTRY_PERSON,
     "ReadOnlyError": ALL_RETRY,
     "ServerFaultError": (Scope.ENTRY, Then.RETRY),
+    "SeveralAssembliesError": ENTRY_PERSON,
     "ConflictError": ENTRY_PERSON,
     "CycleError": ENTRY_PERSON,
     "VersionConflictError": ENTRY_PERSON,

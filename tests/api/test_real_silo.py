@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fcstd_writer import Doc, Raw, locals_
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from real_silo import FAULTS, TOKEN, Moods, RealSilo, real_silo
 
 from silo.api.client import SiloClient
-from silo.api.events import Connection, ConnectionState, EventListener
+from silo.api.events import Connection, ConnectionState, EventListener, ServerEvent
 from silo.api.policy import Retries
-from silo.api.sse import ServerEvent
 from silo.batch import Options, TopResult, sync_top
 from silo.bom.errors import InputError, SiloError
 from silo.bom_sync import Status, compare, resolve
@@ -33,6 +33,8 @@ from silo.outbox.entry import Commit, State
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.registering.on_disk import proposals_for, register_all
+from silo.vault.project import commits, find_project, keep, name_documents, read_project
+from silo.vault.project import compare as compare_project
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "gearbox"
 NAMES = 9
@@ -329,10 +331,9 @@ def test_the_queue_keeps_the_pause_that_the_server_named(tmp_path: Path, fault: 
             for request in range(LENGTHS["queue"]):
                 silo.faults[len(silo.seen) + request] = fault
                 report = send_all(desk.outbox, client)
-                (entry,) = desk.outbox.entries()
-                assert report.failed == [entry]
-                assert f"in {seconds} s" in entry.reason
-                assert entry.next_attempt == now[0] + seconds
+                assert report.pause is not None
+                assert f"in {seconds} s" in report.pause.reason
+                assert (report.pause.until, report.pause.told) == (now[0] + seconds, True)
                 asked = len(silo.seen)
                 now[0] += seconds - 1
                 send_all(desk.outbox, client)
@@ -374,8 +375,10 @@ def test_what_waits_for_a_newer_silo_is_sent_by_itself_after_the_upgrade(tmp_pat
                 assert send_all(desk.outbox, client).sent == []
                 (entry,) = desk.outbox.entries()
                 assert entry.state is State.WAITING
-                assert now[0] < entry.next_attempt <= now[0] + 900
-                now[0] = entry.next_attempt
+                pause = desk.outbox.pause(silo.url, entry.item)
+                assert pause is not None
+                assert now[0] < pause.until <= now[0] + 900
+                now[0] = pause.until
             silo.moods = Moods()
             assert len(send_all(desk.outbox, client).sent) == 1
         assert len(silo.named("Housing").files) == 1
@@ -455,3 +458,38 @@ def test_the_whole_fault_table(tmp_path: Path, case: Case, moods: Moods) -> None
     if case.command == "push" and moods.properties == "nowhere":
         pytest.skip("nothing is written where the properties cannot be read")
     after_a_fault(tmp_path, case, moods)
+
+
+def test_a_silo_without_documents_gets_each_file_where_it_can(tmp_path: Path) -> None:
+    """One of several parts at its main part, a sheet as an attachment of the assembly with the link; once."""
+    root = tmp_path / "robot"
+    with real_silo(Moods()) as silo, SiloClient(silo.url, TOKEN) as client:
+        left, right, top = (
+            client.create_item("kindred-rd", "M01", name, item_type="part").id for name in ("L", "R", "T")
+        )
+
+        def marked(uuid: str) -> dict[str, Any]:
+            return {"SiloItemId": Raw("App::PropertyString", f'<String value="{uuid}"/>')}
+
+        both = Doc(label="Both").add("Part::Box", "Left", Height=1.0, **marked(left))
+        both.add("Part::Box", "Right", Height=1.0, **marked(right)).save(root / "Both.FCStd")
+        Doc(label="S").add("Spreadsheet::Sheet", "Sheet").save(root / "Sheet.FCStd")
+        doc = Doc(label="Top", meta={"SiloUUID": top}).link("L1", "Both.FCStd", "Left")
+        doc.link("L2", "Both.FCStd", "Right").link("S", "Sheet.FCStd", "Sheet")
+        doc.add("Assembly::AssemblyObject", "Asm", Group=locals_("L1", "L2"), Type="Assembly")
+        doc.save(root / "Top.FCStd")
+        store = Store(tmp_path / "outbox.sqlite3")
+        for _again in range(2):
+            found = name_documents(read_project([str(root)], find_project([str(root)])), client)
+            for file, one in commits(found, compare_project(found, client, store)):
+                keep(found.project, store, file, one, client.base_url)
+            report = send_all(store, client, force=True)
+            assert (report.held, report.failed, report.stopped_by) == ([], [], None)
+        items = {item.description: item for item in silo.items.values()}
+        assert list(items["L"].files.values()) == [(root / "Both.FCStd").read_bytes()]
+        assert items["R"].files == {}
+        assert list(items["T"].files.values()) == [(root / "Top.FCStd").read_bytes()]
+        assert items["T"].attachments == [("Sheet.FCStd", (root / "Sheet.FCStd").read_bytes())]
+        assert sorted(line["child_part_number"] for line in items["T"].lines) == sorted(
+            [items["L"].part_number, items["R"].part_number]
+        )

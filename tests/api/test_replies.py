@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.api.failures import Where
-from silo.api.replies import Reply, complaint, error_of
+from silo.api.policy import Reply, Where, complaint, error_of
 from silo.api.wire import BomLine, Item
 from silo.bom.errors import (
     AuthError,

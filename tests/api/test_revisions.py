@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from silo.api.revisions import MayHaveArrivedError, SentFile, find_arrived, is_there
+from silo.api.files import MayHaveArrivedError, SentFile, find_arrived, is_there
 from silo.api.wire import Revision
 from silo.bom.errors import NotFoundError, UnreachableError
 from silo.outbox.entry import Commit, State
@@ -108,7 +108,7 @@ def test_retry_after_a_look_sends_the_file(tmp_path: Path) -> None:
     stored = silo.items[number.casefold()]
     stored.revisions[0] = rev(1, file_key="x")
     stored.files.clear()
-    stored.uploads.clear()  # this server keeps neither checksums nor keys of requests
+    silo.answers.clear()  # this server keeps neither checksums nor keys of requests
     assert send_all(outbox, silo, force=True).held
     assert outbox.entries()[0].state is State.HELD
     outbox.retry(entry.id)

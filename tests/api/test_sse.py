@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.api.sse import ServerEvent, SseParser, parse
+from silo.api.events import ServerEvent, SseParser, parse
 from silo.bom.errors import ServerFaultError
 
 MERGE = {

@@ -38,8 +38,8 @@ def test_importing_the_core_loads_the_standard_library_only() -> None:
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_modules_fit_on_some_screens(source: Path) -> None:
-    """About 300 lines, 400 at most."""
-    assert len(source.read_text(encoding="utf-8").splitlines()) <= 400
+    """One concept each, 800 lines at most."""
+    assert len(source.read_text(encoding="utf-8").splitlines()) <= 800
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))

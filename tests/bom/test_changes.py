@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.bom.changes import Assembly, changes_json, compare_assemblies, compare_three
+from silo.bom.compare import Assembly, changes_json, compare_assemblies, compare_three
 from silo.bom.model import BomEntry
 
 

@@ -36,6 +36,10 @@ def counts(found: Extraction) -> dict[tuple[str, str], int]:
     return {entry.key: entry.quantity for entry in found.entries}
 
 
+def own(found: Extraction) -> dict[str, int]:
+    return {line.object_name: line.quantity for line in found.assembly.own}
+
+
 def only(found: Extraction, code: FindingCode) -> Finding:
     (finding,) = found.findings_of(code)
     return finding
@@ -414,12 +418,13 @@ def test_a_suppressed_draft_array_leaves_its_original(top: Doc, bolt: Any) -> No
     assert counts(extract(top.assembly(link, draft(top, "A", link, 6, Suppressed=True)))) == {BOLT: 1}
 
 
-def test_a_draft_array_of_local_geometry_is_local_geometry(top: Doc, bolt: Any) -> None:
-    """A pattern of a body that is modelled here is no component."""
+def test_a_draft_array_of_a_body_shows_so_many_of_it(top: Doc, bolt: Any) -> None:
+    """A pattern of a body that is modelled here is no component, but so many own parts."""
     body = top.body("Rib")
     found = extract(top.assembly(body, draft(top, "Ribs", body, 5), top.link("L1", bolt)))
     assert counts(found) == {BOLT: 1}
-    assert "Rib, Ribs" in only(found, FindingCode.LOCAL_GEOMETRY).message
+    assert own(found) == {"Rib": 5}
+    assert "Rib" in only(found, FindingCode.LOCAL_GEOMETRY).message
 
 
 # --- what is no component ---------------------------------------------------------------------------------
@@ -505,14 +510,16 @@ def test_a_reference_to_a_face_is_no_component(top: Doc, bolt: Any) -> None:
     assert "Face1" in only(found, FindingCode.SUB_ELEMENT_LINK).message
 
 
-def test_local_geometry_is_one_finding_for_an_assembly(top: Doc, bolt: Any) -> None:
-    """What is modelled in the assembly's file is reported once, with its number."""
-    cut = [top.add("Part::Box", "Base"), top.add("Part::Box", "Tool"), top.add("Part::Cut", "Cut")]
-    found = extract(top.assembly(*cut, top.link("L1", bolt)))
+def test_own_parts_are_lines_and_one_finding(top: Doc, bolt: Any) -> None:
+    """What is modelled in the assembly's file is listed with its count; what a cut uses up is not."""
+    base, tool = top.add("Part::Box", "Base"), top.add("Part::Box", "Tool")
+    cut = top.add("Part::Cut", "Cut", Base=base, Tool=tool)
+    found = extract(top.assembly(base, tool, cut, top.link("L1", bolt)))
+    assert own(found) == {"Cut": 1}
+    assert all(line.silo_uuid is None for line in found.assembly.own)
     finding = only(found, FindingCode.LOCAL_GEOMETRY)
-    assert finding.severity is Severity.INFO
-    assert "3 objects" in finding.message
-    assert "Base, Cut, Tool" in finding.message
+    assert finding.severity is Severity.WARNING
+    assert "1 own part is no item" in finding.message
 
 
 def test_local_geometry_of_parts_is_not_reported(top: Doc) -> None:
@@ -521,12 +528,20 @@ def test_local_geometry_of_parts_is_not_reported(top: Doc) -> None:
     assert extract(top.assembly(top.link("L1", doc.part("Part", doc.body())))).findings == ()
 
 
-def test_a_part_of_another_add_on_without_a_link_is_reported(top: Doc, bolt: Any) -> None:
-    """A2plus embeds shapes; it cannot be counted, and is not passed over in silence."""
-    part = top.add("Part::FeaturePython", "b_Bolt_001", sourceFile="./bolt.FCStd", a2p_Version="0.4")
-    found = extract(top.assembly(part, top.link("L1", bolt)))
-    assert counts(found) == {BOLT: 1}
-    assert only(found, FindingCode.FOREIGN_COMPONENT).severity is Severity.WARNING
+def test_what_a2plus_imported_is_the_part_in_its_file(top: Doc, bolt: Any) -> None:
+    """A2plus embeds shapes and links nothing; ``sourceFile`` says what each part is."""
+    problem = LinkProblem(FindingCode.MISSING_FILE, "./gone.FCStd")
+    top.__dict__["imported"] = lambda file: problem if "gone" in file else bolt
+
+    def part(name: str, file: str) -> Any:
+        return top.add("Part::FeaturePython", name, sourceFile=file, a2p_Version="0.4")
+
+    parts = [part("A", "./bolt.FCStd"), part("B", ".\\bolt.FCStd"), part("C", "./gone.FCStd"), part("D", "")]
+    found = extract(top.assembly(*parts, top.link("L1", bolt)))
+    assert counts(found) == {BOLT: 3, ("/v/gone.FCStd", ""): 1}
+    assert own(found) == {"D": 1}
+    assert [place.obj for place in only(found, FindingCode.FOREIGN_COMPONENT).where] == ["D"]
+    assert only(found, FindingCode.MISSING_FILE).blocks
 
 
 def test_an_in_document_link_to_something_with_components_counts_them(top: Doc, bolt: Any) -> None:
@@ -543,12 +558,11 @@ def test_a_chain_through_the_own_file_ends_in_the_other(top: Doc, bolt: Any) -> 
     assert counts(extract(top.assembly(top.link("L1", source)))) == {BOLT: 1}
 
 
-def test_a_chain_through_another_file_back_home_is_construction_geometry(top: Doc) -> None:
+def test_a_chain_through_another_file_back_home_shows_an_own_part(top: Doc) -> None:
     """The end lies in the assembly's own file."""
     there = Doc("/v/mid.FCStd").link("There", top.body("Layout"))
     found = extract(top.assembly(top.link("L1", there)))
-    assert found.entries == ()
-    assert found.findings_of(FindingCode.IN_DOCUMENT_LINK)
+    assert (found.entries, own(found)) == ((), {"Layout": 1})
 
 
 @pytest.mark.parametrize(

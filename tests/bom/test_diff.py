@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from silo.bom import BomDiff, BomEntry, FindingCode, Severity, diff_bom
-from silo.bom.diff import as_number, same_quantity
+from silo.bom.compare import as_number, same_quantity
 
 
 def local(**quantities: Any) -> list[BomEntry]:
@@ -227,3 +227,21 @@ def test_a_missing_component_whose_line_is_known_keeps_that_one_only() -> None:
     diff = diff_bom([], lines, missing=[(lid["file"], lid["object"])])
     assert [change.part_number for change in diff.kept] == ["P-1"]
     assert [change.part_number for change in diff.removed] == ["P-2"]
+
+
+@pytest.mark.parametrize("source", ["assembly", "manual"])
+@pytest.mark.parametrize("unit", ["m", "box", "kg", "1000 pcs"])
+def test_a_line_in_another_unit_is_a_persons(unit: str, source: str) -> None:
+    """CAD counts pieces: the same number of metres is a conflict, and nothing makes boxes of pieces."""
+    diff = diff_bom(local(P=9), [line("P", 9, source, unit=unit)])
+    told = {"part_number": "P", "local_quantity": 9, "remote_quantity": 9, "unit": unit}
+    assert diff.conflicts == (told,)
+    assert not diff.quantity_changed + diff.unchanged + diff.removed
+    assert f"has 9 {unit}" in diff.findings[0].message
+
+
+@pytest.mark.parametrize("unit", [None, "", " ", "pcs", "Pcs.", "ea", "Stück", "pieces"])
+def test_pieces_have_many_names(unit: str | None) -> None:
+    """A line whose unit means pieces is CAD's as any other."""
+    assert diff_bom(local(P=9), [line("P", 9, unit=unit)]).unchanged == ({"part_number": "P", "quantity": 9},)
+    assert diff_bom(local(P=9), [line("P", 8, unit=unit)]).quantity_changed

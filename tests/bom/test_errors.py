@@ -9,7 +9,7 @@ import re
 import pytest
 
 from silo.bom import errors
-from silo.bom.errors import CycleError, DocumentError, RejectedError, SiloError
+from silo.bom.errors import CycleError, DocumentError, RejectedError, SiloError, counted, listed
 
 CLASSES = [cls for _, cls in inspect.getmembers(errors, inspect.isclass) if issubclass(cls, SiloError)]
 
@@ -54,3 +54,22 @@ def test_errors_carry_what_they_know() -> None:
     assert "A → B → A" in str(CycleError(["A", "B", "A"]))
     assert RejectedError("no", ["entry 0", "entry 3"]).problems == ("entry 0", "entry 3")
     assert RejectedError("no").problems == ()
+
+
+@pytest.mark.parametrize(
+    ("number", "text"), [(0, "0 links"), (1, "1 link"), (2, "2 links"), (1000, "1000 links")]
+)
+def test_counted(number: int, text: str) -> None:
+    """Never "1 links"."""
+    assert counted(number, "link") == text
+
+
+def test_counted_with_another_plural() -> None:
+    """Words that take no s."""
+    assert (counted(1, "body", "bodies"), counted(2, "body", "bodies")) == ("1 body", "2 bodies")
+
+
+def test_listed() -> None:
+    """As many as fit, and how many more."""
+    assert listed(["a", "b"]) == "a, b"
+    assert listed(list("abcdef"), 4) == "a, b, c, d and 2 more"

@@ -14,6 +14,8 @@ from silo.bom import BomEntry, Finding, FindingCode, Severity, choose_assembly, 
 from silo.bom.document import LinkProblem
 from silo.bom.findings import respelt_findings
 from silo.bom.resolve import consolidation_findings, unregistered_findings
+from silo.bom.walk.notes import Notes
+from silo.bom.walk.roles import Reader
 
 
 class Scene:
@@ -118,6 +120,23 @@ def newer() -> Iterable[Finding]:
     return scene.walked(scene.top.link("L", scene.bolt))
 
 
+def no_role() -> Iterable[Finding]:
+    """A container with a list that no FreeCAD gives it."""
+    scene = Scene()
+    odd = scene.top.part("Odd", ElementList=[screw(scene.top, "Lost")])
+    return scene.walked(odd, scene.top.link("L", scene.bolt))
+
+
+def two_roles() -> Iterable[Finding]:
+    """A screw of the assembly, taken for one that lies beside it."""
+    scene = Scene()
+    one = screw(scene.top)
+    notes = Notes(lambda obj: str(obj.Document.FileName))
+    reader = Reader(notes, lambda obj: (obj.Document.FileName, obj.Name), None, beside=lambda _top: [one])
+    reader.contents(scene.top.assembly(one))
+    return notes.findings()
+
+
 SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     **{
         code: broken(code)
@@ -134,7 +153,9 @@ SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     },
     FindingCode.CYCLE: cycle,
     FindingCode.TOO_DEEP: too_deep,
-    FindingCode.IN_DOCUMENT_LINK: met_by_a_member(lambda s: s.top.link("L", s.top.body("Layout"))),
+    FindingCode.IN_DOCUMENT_LINK: met_by_a_member(
+        lambda s: s.top.link("L", s.top.add("Sketcher::SketchObject", "Layout"))
+    ),
     FindingCode.SUB_ELEMENT_LINK: met_by_a_member(lambda s: s.top.link("L", (s.bolt, "Face1"))),
     FindingCode.NO_COMPONENT: met_by_a_member(
         lambda s: s.top.link("L", Doc("/v/master.FCStd").add("Spreadsheet::Sheet", "Sheet"))
@@ -159,7 +180,7 @@ SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     FindingCode.NEWER_FREECAD: newer,
     FindingCode.LOCAL_GEOMETRY: met_by_a_member(lambda s: s.top.body("Local")),
     FindingCode.FOREIGN_COMPONENT: met_by_a_member(
-        lambda s: s.top.add("Part::FeaturePython", "b_Bolt", sourceFile="b.FCStd", a2p_Version="0.4")
+        lambda s: s.top.add("Part::FeaturePython", "b_Bolt", sourceFile="", a2p_Version="0.4")
     ),
     FindingCode.NO_CONTAINER: lambda: loose(beside=False),
     FindingCode.BESIDE_ASSEMBLY: lambda: loose(beside=True),
@@ -167,6 +188,8 @@ SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     FindingCode.RESPELT: lambda: respelt_findings(
         ["/v/top.FCStd records A.FCStd; taken was a.FCStd"], "/v/top.FCStd"
     ),
+    FindingCode.NO_ROLE: no_role,
+    FindingCode.TWO_ROLES: two_roles,
     FindingCode.EMPTY_BOM: lambda: extract(Doc("/v/top.FCStd").assembly()).findings,
     FindingCode.COPIED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/b.FCStd", "B")),
     FindingCode.SHARED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/a.FCStd", "B")),
@@ -192,6 +215,8 @@ BLOCKING = {
     FindingCode.CYCLE,
     FindingCode.TOO_DEEP,
     FindingCode.ARRAY_SIZE,
+    FindingCode.NO_ROLE,
+    FindingCode.TWO_ROLES,
 }
 
 
@@ -241,3 +266,8 @@ def test_labels_are_text(label: str) -> None:
 def test_severities_are_ordered_words() -> None:
     """What machines read in JSON."""
     assert [severity.value for severity in Severity] == ["info", "warning", "error"]
+
+
+def test_every_code_has_a_meaning_and_a_remedy() -> None:
+    """Reports group by the meaning, and the reference lists both."""
+    assert all(code.meaning and code.remedy for code in FindingCode)

@@ -9,8 +9,7 @@ import pytest
 from fakes import BareDocument, BarePart, Doc, ForwardingLink
 
 from silo.bom import FindingCode, Severity, extract
-from silo.bom.identity import identity_findings, identity_of, meta_key, walk_entries
-from silo.bom.model import BomEntry
+from silo.bom.model import BomEntry, identity_findings, identity_of, meta_key, walk_entries
 
 PLACES = ("object SiloItemId", "object SiloUUID", "Meta per object", "document SiloUUID", "Meta")
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from fakes import BareAssembly, BareDocument, BareLink, BarePart, BareThing, Doc, ForwardingLink, edit
 
-from silo.bom import FindingCode, Severity, extract, extract_bom_links
+from silo.bom import FindingCode, extract, extract_bom_links
 from silo.bom.links import MAX_LEVELS
 from silo.bom.model import BomEntry
 
@@ -58,14 +58,12 @@ def test_entries_come_in_the_order_of_the_group() -> None:
     assert [entry.doc_path for entry in extract_bom_links(asm)] == ["/v/c.FCStd", "/v/a.FCStd", "/v/b.FCStd"]
 
 
-def test_a_link_into_its_own_file_is_construction_geometry() -> None:
-    """In-document links are no components (spec §1), and are reported."""
+def test_a_link_into_its_own_file_is_no_component() -> None:
+    """In-document links are no components (spec §1): what they show are own parts, no items yet."""
     top = Doc("/v/top.FCStd")
     found = extract(top.assembly(top.link("L1", top.body("Layout")), top.link("L2", bolt_in())))
     assert counts(found.entries) == {("/v/bolt.FCStd", "Body"): 1}
-    (finding,) = found.findings_of(FindingCode.IN_DOCUMENT_LINK)
-    assert finding.severity is Severity.INFO
-    assert finding.where[0].obj == "L1"
+    assert counts(found.assembly.own) == {("/v/top.FCStd", "Layout"): 1}
 
 
 def test_one_document_by_two_objects_is_still_one_document() -> None:
@@ -73,7 +71,7 @@ def test_one_document_by_two_objects_is_still_one_document() -> None:
     asm_doc, other_view = Doc("/v/top.FCStd"), Doc("/v/top.FCStd")
     found = extract(asm_doc.assembly(asm_doc.link("L1", other_view.body())))
     assert found.entries == ()
-    assert found.findings_of(FindingCode.IN_DOCUMENT_LINK)
+    assert counts(found.assembly.own) == {("/v/top.FCStd", "Body"): 1}
 
 
 def test_a_symlinked_folder_does_not_make_two_components() -> None:
@@ -87,7 +85,7 @@ def test_a_symlinked_folder_does_not_make_two_components() -> None:
     found = extract(asm, canonical=lambda path: path.replace("/alias/", "/real/"))
     assert counts(found.entries) == {("/real/bolt.FCStd", "Body"): 2}
     assert found.assembly.doc_path == "/real/top.FCStd"
-    assert [f.code for f in found.findings] == [FindingCode.IN_DOCUMENT_LINK]
+    assert counts(found.assembly.own) == {("/real/top.FCStd", "Layout"): 1}
 
 
 def test_places_of_findings_are_in_the_same_spelling_as_entries() -> None:

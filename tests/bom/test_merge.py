@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from silo.bom import BomDiff, apply_merge, plan_merge
-from silo.bom.merge import MergePlan, summary
+from silo.bom.compare import MergePlan, summary
 
 NOW = "2026-02-08T22:15:00Z"
 

@@ -11,7 +11,7 @@ import pytest
 
 from silo.bom.errors import ConfigError, InputError
 from silo.bom.model import BomEntry
-from silo.bom.naming import (
+from silo.bom.resolve import (
     Categories,
     Rule,
     assembly_categories,
@@ -234,3 +234,65 @@ def test_a_file_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "rules.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(ConfigError, match="utf-8"):
         category_rules(find_schema(None), {RULES: str(tmp_path / "rules.toml")})
+
+
+STANDARDS = {
+    "ISO 4762 M4×16": "F01",
+    "ASME B18.3.1A 1/4in": "F01",
+    "ISO 4032 M4": "F05",
+    "ASME B18.2.2.1A 1/4in": "F05",
+    "Tee nut 4PWTI M4": "F05",
+    "PEM press nut M4": "F05",
+    "IUT heat insert M3": "F07",
+    "PCB standoff M3": "F07",
+    "PCB spacer M3": "F07",
+    "ISO 7089 M4": "F06",
+    "ISO 2338 4×20": "F08",
+    "DIN 471 10": "F10",
+    "Threaded rod M6": "F02",
+    "DIN 580 M8": "F03",
+    "SAE USS 1/4in": "F06",
+}
+
+
+@pytest.mark.parametrize("designation", STANDARDS)
+def test_a_standard_part_gets_the_category_of_its_kind(designation: str) -> None:
+    """Numbers are for ever: a nut was registered, checked and certain, as a screw."""
+    guess = proposed_category(standard(designation), designation, shipped())
+    assert (guess.code, guess.is_sure) == (STANDARDS[designation], True)
+
+
+def shipped() -> Categories:
+    schema = describe(find_schema(None))
+    return Categories(categories_of(schema), rules_of(schema))
+
+
+def standard(designation: str) -> BomEntry:
+    return BomEntry("a.FCStd", object_name="o", standard=designation)
+
+
+@pytest.mark.parametrize(
+    ("known", "code", "sure"),
+    [
+        ({"S": "Screws", "P": "Parts"}, "S", False),
+        ({"P": "Parts", "N": "Wing nuts", "M": "Nuts"}, "N", False),
+        ({"F": "Fasteners", "P": "Parts"}, "F", True),
+        ({"S": "Screws", "N": "Nuts"}, "N", True),
+    ],
+)
+def test_a_nut_where_no_category_or_several_are_for_nuts(
+    known: dict[str, str], code: str, sure: bool
+) -> None:
+    guess = proposed_category(standard("ISO 4032 M4"), "ISO 4032 M4", known)
+    assert (guess.code, guess.is_sure) == (code, sure)
+
+
+def test_the_site_decides_about_kinds_by_its_rules() -> None:
+    """As about names: a rule with the word of the kind."""
+    known = Categories({"S": "Screws", "N": "Nuts", "B": "Bought"}, [Rule("B", frozenset({"nut"}))])
+    assert proposed_category(standard("ISO 4032 M4"), "ISO 4032 M4", known).code == "B"
+    assert proposed_category(standard("ISO 4762 M4×16"), "", known).code == "S"
+
+
+def test_a_standard_of_no_known_kind_is_no_screw_for_certain() -> None:
+    assert not proposed_category(standard("NF E27-619 5"), "", shipped()).is_sure

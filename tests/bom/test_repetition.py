@@ -12,7 +12,7 @@ from silo.bom import extract
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
 from silo.bom.roots import choose_assembly
-from silo.bom.walk.arrays import array_count, draft_count
+from silo.bom.walk.kinds import array_count, draft_count
 
 ITEM = "11111111-2222-4333-8444-555555555555"
 
@@ -116,12 +116,13 @@ def test_a_left_out_source_is_left_out_of_what_shows_it(top: Doc) -> None:
     assert counts(top.assembly(bundle)) == {"ISO 4762 M4×30": 1}
 
 
-def test_a_file_that_shows_its_declared_part_twice_is_an_assembly() -> None:
-    """The only part of a file is that file; two of it are not."""
+@pytest.mark.parametrize("visible", [True, False])
+def test_a_file_that_shows_its_declared_part_again_is_an_assembly(visible: bool) -> None:
+    """The only part of a file is that file; two of it are not. A visible original counts like its links."""
     doc = Doc("/v/top.FCStd")
-    body = doc.body("Foot", SiloItemId=ITEM)
+    body = doc.body("Foot", SiloItemId=ITEM, Visibility=visible)
     doc.link("Again", body, ElementCount=2)
-    assert counts(choose_assembly(doc)) == {"Foot": 2}
+    assert counts(choose_assembly(doc)) == {"Foot": 2 + visible}
 
 
 def test_elements_of_an_array_are_left_out_one_by_one(top: Doc, bolt: Any) -> None:

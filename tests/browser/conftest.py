@@ -17,6 +17,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 from server_testing import Api
 from settled import come_late
+from web_visitor import link_of
 
 from silo_server.run import RunningServer, running_server
 
@@ -109,7 +110,7 @@ def login_path(api: Api, role: str) -> str:
     """A one-time link for a user with this role, who is made where there is none."""
     if role != "admin" and api.call("POST", "/api/users", {"username": role, "role": role}).status != 201:
         api.good("PUT", f"/api/users/{role}", {"role": role, "active": True})
-    return str(api.good("POST", f"/api/users/{role}/login-link")["path"])
+    return link_of(api, role)
 
 
 def _refused(text: str, faults: list[str]) -> None:

@@ -21,6 +21,7 @@ from settled import come_late, measured
 
 Visit = Callable[..., Page]
 
+REAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "assemblies" / "lmn3"
 AXE = "axe-core@4.10.3"
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 # Dark differs from light in colours alone.
@@ -30,6 +31,36 @@ RUN = """tags => axe.run(document, {
         : tags,
 })"""
 OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+# A control whose own words break within, or that is taller than its lines of text.
+TALL = """() => {
+    const found = [];
+    for (const control of document.querySelectorAll("button, .button, td a, th a, nav a, summary, label")) {
+        if (control.closest("thead")?.getBoundingClientRect().width <= 1) continue; // only for a reader
+        const walker = document.createTreeWalker(control, NodeFilter.SHOW_TEXT);
+        const lines = new Set();
+        for (let node = walker.nextNode(); node; node = walker.nextNode()) {
+            if (node.parentElement.closest(".hidden, [hidden], option, textarea, datalist")) continue;
+            for (const word of node.data.matchAll(/[^\\s-]+/g)) {
+                const range = document.createRange();
+                range.setStart(node, word.index);
+                range.setEnd(node, word.index + word[0].length);
+                const tops = new Set([...range.getClientRects()].map(one => Math.round(one.top)));
+                tops.forEach(top => lines.add(top));
+                const ours = !node.parentElement.closest("bdi");
+                if (ours && tops.size > 1) found.push("breaks: " + word[0] + " in " + control.outerHTML);
+            }
+        }
+        if (!lines.size || !control.matches("button, .button")) continue;
+        const style = getComputedStyle(control);
+        const sides = ["paddingTop", "paddingBottom", "borderTopWidth", "borderBottomWidth"];
+        const around = sides.reduce((sum, side) => sum + parseFloat(style[side]), 0);
+        const needed = around + lines.size * parseFloat(style.lineHeight);
+        if (control.getBoundingClientRect().height > needed + 2) found.push("tall: " + control.textContent);
+        const short = control.textContent.length <= 30;
+        if (innerWidth > 1400 && short && lines.size > 1) found.push("two lines: " + control.textContent);
+    }
+    return found.map(text => text.slice(0, 200));
+}"""
 HEADER = "getComputedStyle(document.querySelector('.top')).display"
 # Wide; a phone; a small one, or a zoomed page. Both phones have the same style sheet: one of them is for axe.
 WIDTHS, FOR_AXE = (1440, 390, 320), (1440, 320)
@@ -116,6 +147,26 @@ def test_no_page_has_a_finding(axe: str, numbers: dict[str, str], visit: Visit, 
     assert findings == []
 
 
+def test_no_control_is_taller_than_its_text(api: Api, visit: Visit) -> None:
+    """With the names of a real project: no word of ours breaks, no button is taller than its words."""
+    if not REAL.is_dir():
+        pytest.skip(f"the real assemblies are not at hand: {REAL}")
+    names = sorted({path.stem for path in REAL.rglob("*.FCStd")})[:60]
+    parent, *parts = [api.item(name=name, description=name) for name in names]
+    api.merge(parent, dict.fromkeys(parts, 2), document={"file": "assembly.FCStd", "folder": "lmn3"})
+    api.good("PUT", bom(parent, parts[0]), {"quantity": 0.5, "unit": "m", "notes": " ".join(names[:9])})
+    api.good("PUT", bom(parent, parts[1]), {"find_number": "10", "notes": names[5]})
+    api.merge(parent, dict.fromkeys([parts[0], *parts[3:]], 3))
+    page = visit("admin")
+    findings: list[str] = []
+    for path in ("", "?view=flat", "/bom", f"/bom?edit={parts[1]}", "/history", "/print"):
+        page.goto(f"/items/{parent}{path}")
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": 844})
+            findings += [f"{path} at {width}: {tall}" for tall in measured(page, TALL)]
+    assert not findings, "\n".join(findings)
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_answers_have_no_finding(
     axe: str, api: Api, numbers: dict[str, str], visit: Visit, scheme: str
@@ -164,6 +215,7 @@ def in_each_width(page: Page, axe: str, what: str) -> list[str]:
             findings += [f"{what} at {width}: {finding}" for finding in violations(page, axe)]
         if measured(page, OVERFLOW) > 0:
             findings.append(f"{what} at {width}: it is wider than the window")
+        findings += [f"{what} at {width}: {tall}" for tall in measured(page, TALL)]
     page.set_viewport_size({"width": WIDTHS[0], "height": 844})
     return findings
 

@@ -16,6 +16,7 @@ from settled import box_of, measured, picture_of
 pytest.importorskip("OCP.BRep", exc_type=ImportError)
 
 from silo.cli.main import main
+from silo.inertia.links import read_link_map
 
 ARM = Path(__file__).parents[2] / "examples" / "arm"
 DRAWN = ["--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--ignore-gpu-blocklist"]
@@ -84,18 +85,45 @@ def test_the_view_turns_and_hides_links(opened: Callable[..., Page]) -> None:
     page.mouse.move(x + 150, y + 20, steps=3)
     page.mouse.up()
     turned = seen(page, other_than=first)
-    page.get_by_label("upper_arm").uncheck()
+    page.locator("#side").get_by_label("upper_arm").uncheck()
     hidden = seen(page, other_than=turned)
     page.get_by_label("see through bodies").check()
     seen(page, other_than=hidden)
     assert [word for word in page.said if not word.startswith("file:") or not word.endswith("r.html")] == []
 
 
+def test_clicks_give_parts_to_links_and_save_the_map(opened: Callable[..., Page], tmp_path: Path) -> None:
+    """A new link, a part clicked into it, one chosen in the table, two links made one; the map reads back."""
+    page: Any = opened()
+    page.wait_for_selector("body[data-ready='35']")
+    page.get_by_role("button", name="New link").click()
+    page.locator(".draft input[type=text]").last.fill("to: “ol”")
+    page.locator(".draft input[type=text]").last.press("Tab")
+    canvas = page.locator("#view canvas")
+    canvas.click(position={"x": box_of(canvas)["width"] / 2, "y": box_of(canvas)["height"] * 0.8})
+    expect(page.locator("#picked")).to_contain_text("to: “ol”: base_link/")
+    clicked = page.locator("#picked").inner_text().partition("”: ")[2]
+    page.get_by_label("Link of Finger").select_option("to: “ol”")
+    page.get_by_label("Filter parts").fill("to: ol")
+    page.get_by_label("Filter parts").fill("to: “ol”")
+    expect(page.locator("#shown")).to_have_text("2 of 19 lines")
+    page.locator(".draft input[type=text]").nth(2).fill("upper_arm")
+    page.locator(".draft input[type=text]").nth(2).press("Tab")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save map.yaml").click()
+    download.value.save_as(tmp_path / "map.yaml")
+    made = {link.name: link.patterns for link in read_link_map(tmp_path / "map.yaml").links}
+    assert made["upper_arm"] == ("path:upper_arm", "path:forearm")
+    assert made["to: “ol”"] == (f"path:{clicked}", "path:gripper/finger left", "path:gripper/finger right")
+    assert sorted(made) == ["base_link", "gripper", "to: “ol”", "upper_arm"]
+    assert [word for word in page.said if not word.startswith(("file:", "blob:"))] == []
+
+
 def test_tables_sort_and_filter_and_names_are_text(opened: Callable[..., Page]) -> None:
-    """Numbers as numbers; without WebGL there is the picture; dark where wanted, never wider than a phone."""
+    """Numbers as numbers; without WebGL the tables are there; dark where wanted, never wider than a phone."""
     page: Any = opened(webgl=False)
-    expect(page.locator("#view img")).to_be_visible()
-    expect(page.locator("#picked")).to_contain_text("a picture instead")
+    expect(page.locator("#picked")).to_contain_text("shows no 3D (WebGL)")
+    assert page.locator("#view canvas").count() == 0
     rows = page.locator("#parts tbody tr")
     page.get_by_role("button", name="Total kg").click()
     values = [float(text) for text in rows.locator("td:nth-child(6)").all_inner_texts()]

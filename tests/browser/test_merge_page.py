@@ -115,6 +115,21 @@ def test_a_conflict_shows_both_and_either_is_one_click(api: Api, visit: Visit) -
     assert api.quantities(parent) == {child: 5}
 
 
+def test_cad_counts_pieces_whatever_the_line_counts(api: Api, visit: Visit) -> None:
+    """6 pieces in CAD beside 0.5 m in Silo: the page never says 6 m, nor makes it so."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 5})
+    api.good("PUT", bom(parent, child), {"quantity": 0.5, "unit": "m"})
+    api.merge(parent, {child: 6})
+    page = visit("editor")
+    page.goto(f"/items/{parent}/bom")
+    expect(page.locator(".banner.conflict li")).to_contain_text("CAD says 6 pieces, Silo says 0.5 m")
+    expect(page.locator(".remarks").first).to_contain_text("CAD says 6 pieces")
+    page.get_by_role("button", name=f"Take 6 pieces from CAD for {child}").click()
+    expect(page.locator(".banner.calm")).to_be_visible()
+    assert (api.lines(parent)[child]["quantity"], api.lines(parent)[child]["unit"]) == (6, None)
+
+
 def test_a_part_that_left_the_assembly_in_conflict(api: Api, visit: Visit) -> None:
     """A person's quantity on a part that CAD has no more: in words, with a button that removes it."""
     parent, child, other = api.items(3)

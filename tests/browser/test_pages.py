@@ -212,8 +212,9 @@ def test_files_and_exports_are_downloads(
     page = visit("viewer")
     page.goto(f"/items/{number}")
     with page.expect_download() as download:
-        page.get_by_role("link", name="plan.txt").click()
+        page.get_by_label("Table of revisions").get_by_role("link", name="plan.txt").click()
     assert Path(download.value.path()).read_bytes() == b"as sent"
+    page.get_by_text("Export", exact=True).click()
     with page.expect_download() as download:
         page.get_by_role("link", name="all levels as CSV", exact=True).click()
     assert download.value.suggested_filename.endswith("-bom-indented.csv")

@@ -113,6 +113,7 @@ def test_a_bom_that_changed_meanwhile_is_left_and_named(api: Api, visit: Visit) 
     used = next(name for name, line in api.lines(first).items() if line["unreferenced_since"] is None)
     api.merge(first, {used: 9})
     page.get_by_role("button", name="Remove", exact=True).click()
+    page.get_by_role("button", name="Remove all 2").click()
     said = page.get_by_role("alert")
     expect(said).to_contain_text(f"{first}: it was changed meanwhile, so nothing was done there")
     expect(said).to_contain_text("2 lines in 1 BOM removed")
@@ -131,3 +132,34 @@ def test_viewers_see_what_waits_and_change_nothing(api: Api, visit: Visit) -> No
 def page_time(api: Api, parent: str) -> str:
     """When the last sync was, as a page shows it."""
     return str(api.get(f"/api/items/{parent}")["last_sync"]["at"])[:16].replace("T", " ")
+
+
+@pytest.mark.parametrize("script", [True, False])
+def test_lines_of_many_boms_go_after_a_list_and_come_back(api: Api, visit: Visit, script: bool) -> None:
+    """Remove names each line first and does nothing before a yes; one Undo brings all of them back."""
+    boms = sorted([waits(api, "sure"), waits(api, "sure")], key=str.casefold)
+    before = [api.get(bom(one)) for one in boms]
+    page = visit("editor", java_script_enabled=script)
+
+    def ask() -> None:
+        page.goto("/waiting?folder=sure")
+        for one in boms:
+            page.get_by_label(f"Choose {one}").check()
+        page.get_by_role("button", name="Remove", exact=True).click()
+        expect(page.locator("h1")).to_have_text("Remove these 4 lines of 2 BOMs?")
+
+    ask()
+    gone = [line["child_part_number"] for lines in before for line in lines if line["unreferenced_since"]]
+    expect(page.locator("tbody th")).to_have_text(gone)
+    assert [api.get(bom(one)) for one in boms] == before
+    page.get_by_role("link", name="Keep them").click()
+    expect(row(page, boms[0])).to_have_count(1)
+    assert [api.get(bom(one)) for one in boms] == before
+    ask()
+    page.get_by_role("button", name="Remove all 4").click()
+    expect(page.locator(".notice")).to_contain_text("4 lines in 2 BOMs removed")
+    assert [len(api.lines(one)) for one in boms] == [1, 1]
+    assert "folder=sure" in page.url
+    page.locator(".notice").get_by_role("button", name="Undo").click()
+    expect(page.locator(".notice")).to_contain_text("Undone in 2 BOMs")
+    assert [api.get(bom(one)) for one in boms] == before

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import shutil
 from pathlib import Path
@@ -13,7 +14,7 @@ import jsonschema_rs
 import pytest
 
 from silo.bom.errors import Exit
-from silo.cli.main import build_parser
+from silo.cli.main import THEMES, build_parser, main
 from silo.cli.shapes import NAMES, schema_of
 from silo.files import documents_in
 
@@ -33,6 +34,8 @@ WITH_PATHS = {
     "where-used": "where-used part.FCStd @",
     "relink": "relink @ --from a --to b",
     "sync": "sync @",
+    "commit": "commit @",
+    "status": "status @",
     "register": "register @ --yes",
     "log": "log @",
     "restore": "restore @ --verify",
@@ -41,7 +44,8 @@ WITH_PATHS = {
     "mass": "mass @",
 }
 WITHOUT_PATHS = {
-    *("pull", "serve", "backup", "watch", "login", "doctor", "install-addon", "demo", "schema"),
+    *("pull", "serve", "backup", "summaries", "watch", "login", "doctor", "install-addon", "demo", "schema"),
+    *("search", "show", "whoami", "logout", "completion", "queue"),
 }
 
 
@@ -96,18 +100,19 @@ def test_an_option_that_another_one_makes_useless_is_refused(
 ) -> None:
     """A flat list was asked for, and --verify printed the tree."""
     done = run(command, "x.FCStd", *_words(command, option), *_words(command, other))
-    assert (done.code, done.out) == (Exit.BAD_INPUT, "")
-    assert f"{option} does nothing with {other}" in done.err
+    assert done.code == Exit.BAD_INPUT
+    assert f"{option} does nothing with {other}" in done.out + done.err
+    assert "--json" in (option, other) or done.out == ""
 
 
 def test_which_options_exclude_another() -> None:
     reading = ("--index", "--no-index", "--jobs", "--dask")
     assert {(command, other, option) for command, option, other in BESIDE} == {
-        *(("bom", "--verify", option) for option in ("--flat", "--resolve", *reading)),
-        *(("sync", "--via", option) for option in reading),
-        *(("register", "--undeclare", option) for option in ("--declare", "--category")),
+        *(("bom", "--verify", one) for one in ("--flat", "--resolve", "--csv", "--xlsx", "--why", *reading)),
+        *(("bom", "--why", one) for one in ("--flat", "--resolve", "--csv", "--xlsx", "--json", *reading)),
+        *(("register", "--undeclare", option) for option in ("--declare", "--category", "--not-a-part")),
+        *(("register", "--not-a-part", option) for option in ("--declare", "--category")),
         ("register", "--apply", "--category"),
-        *(("mass", "--via", option) for option in ("--mesh-unit", "--jobs", "--no-siblings", "--no-cache")),
         *(("restore", "--verify", option) for option in ("--replace", "--database", "--files")),
     }
 
@@ -116,7 +121,7 @@ def test_the_witness_is_for_one_file(run: Any, tmp_path: Path) -> None:
     """A folder ended in a stack trace."""
     done = run("bom", tmp_path, "--verify")
     assert (done.code, done.out) == (Exit.BAD_INPUT, "")
-    assert "name its file" in done.err
+    assert "name the file" in done.err
 
 
 def test_which_options_need_another() -> None:
@@ -131,6 +136,8 @@ def test_which_options_need_another() -> None:
             for command in weighing
             for option in ("--dry-run", "--item", "--server", "--token")
         ),
+        ("inertia", "--urdf", "--in-place"),
+        ("inertia", "--urdf", "--urdf-out"),
         ("mass", "--push", "--index"),
         ("mass", "--push", "--no-index"),
         ("bom", "--resolve", "--server"),
@@ -184,7 +191,7 @@ def test_an_assembly_without_a_number_cannot_be_compared(run: Any, silo: Any, ge
 @pytest.mark.parametrize("words", ["--plan - --json", "--apply plan.csv --category F01"])
 def test_register_refuses_what_contradicts_itself(run: Any, silo: Any, gearbox: Path, words: str) -> None:
     done = run("register", gearbox, *words.split())
-    assert (done.code, done.out) == (Exit.BAD_INPUT, "")
+    assert done.code == Exit.BAD_INPUT
 
 
 def test_sync_does_nothing_where_one_of_its_files_is_not_there(run: Any, silo: Any, gearbox: Path) -> None:
@@ -217,10 +224,10 @@ def test_diff_says_nothing_of_agreement_where_a_file_is_missing(run: Any, silo: 
 
 
 def test_every_command_that_prints_data_prints_json_by_a_schema() -> None:
-    """The demo alone prints a story for people."""
+    """The demo prints a story for people, completion a script."""
     with_json = {name for name, one in parsers().items() if "--json" in one._option_string_actions}
     assert with_json == set(NAMES)
-    assert set(parsers()) - with_json == {"demo"}
+    assert set(parsers()) - with_json == {"demo", "completion"}
     for name in NAMES:
         jsonschema_rs.validator_for(schema_of(name))
 
@@ -268,3 +275,95 @@ def test_a_count_is_a_number_above_zero(run: Any, words: str, count: str) -> Non
     done = run(*words.split(), count)
     assert done.code == Exit.BAD_INPUT
     assert f"argument {words.split()[-1]}" in done.err
+
+
+def test_silo_mod_alone_lists_every_command_by_theme(run: Any) -> None:
+    """Each once, with the words of its own help."""
+    assert main([]) == Exit.DONE
+    assert sorted(name for names in THEMES.values() for name in names) == sorted(parsers())
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [(["bm"], "bom"), (["sync", ".", "--recusive"], "--recursive"), (["completion", "bsh"], "bash")],
+)
+def test_a_wrong_word_is_answered_with_the_right_one(
+    words: list[str], meant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == Exit.BAD_INPUT
+    assert f"did you mean {meant}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [*WITH_PATHS])
+def test_with_json_an_error_is_an_object(run: Any, tmp_path: Path, command: str) -> None:
+    """On standard output, where a program reads; the sentence stays on standard error."""
+    if "--json" not in parsers()[command]._option_string_actions:
+        return
+    words = [str(tmp_path / "no.FCStd") if word == "@" else word for word in WITH_PATHS[command].split()]
+    ran = run(*words, "--json")
+    assert ran.code == Exit.BAD_INPUT
+    told = json.loads(ran.out)["error"]
+    assert told["code"]
+    assert told["message"] in ran.err
+
+
+@pytest.mark.parametrize("command", NAMES)
+@pytest.mark.parametrize("wrong", ["--no-such-option", "--assembly"])
+def test_with_json_a_wrong_option_is_an_object_too(run: Any, command: str, wrong: str) -> None:
+    """A program that reads standard output learns what was wrong with its words."""
+    ran = run(command, "x.FCStd", "--json", wrong)
+    assert ran.code == Exit.BAD_INPUT
+    told = json.loads(ran.out)["error"]
+    assert told["code"] == "bad_input"
+    assert told["message"] in ran.err
+    assert "usage: silo-mod" in ran.err
+
+
+def test_with_json_a_disk_that_says_no_is_an_object_too(run: Any, gearbox: Path, tmp_path: Path) -> None:
+    (tmp_path / "taken").mkdir()
+    ran = run(
+        "links",
+        Path(__file__).parents[2] / "examples" / "arm" / "arm.step",
+        "--json",
+        "--out",
+        tmp_path / "taken",
+    )
+    assert ran.code == Exit.BAD_INPUT
+    assert "taken" in json.loads(ran.out)["error"]["message"]
+
+
+# Every command that asks a server, with what it needs beside.
+WITH_SERVER = {
+    "bom": "bom @ --resolve",
+    "diff": "diff @",
+    "sync": "sync @",
+    "commit": "commit @",
+    "status": "status @",
+    "register": "register @ --yes",
+    "pull": "pull A01-0001",
+    "log": "log @",
+    "search": "search plate",
+    "show": "show A01-0001",
+    "whoami": "whoami",
+    "doctor": "doctor",
+}
+FAULTS = {"away": ("http://127.0.0.1:9", 3), "token": ("", 3), "address": ("ftp://x", 2)}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_of_the_server_has_one_exit_code_everywhere(
+    run: Any, silo: Any, gearbox: Path, monkeypatch: pytest.MonkeyPatch, fault: str
+) -> None:
+    """It does not answer, it refuses the token, or its address is none; no stack trace."""
+    assert run("register", gearbox, "--yes").code == Exit.DONE
+    url, code = FAULTS[fault]
+    if url:
+        monkeypatch.setenv("SILO_API_URL", url)
+    else:
+        monkeypatch.setenv("SILO_API_TOKEN", "silo_wrong")
+    ended = {}
+    for command, line in WITH_SERVER.items():
+        ran = run(*(str(gearbox) if word == "@" else word for word in line.split()))
+        ended[command] = ran.code
+        assert "Traceback" not in ran.err
+    assert ended == dict.fromkeys(WITH_SERVER, code)

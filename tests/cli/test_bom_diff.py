@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
-from fcstd_writer import Doc, XLink, locals_
+from fcstd_writer import Doc, XLink, locals_, part
 
 from silo.cli.demo import remove_from_assembly, set_element_count
 
@@ -47,8 +49,13 @@ def test_two_folders(run: Any, changed: tuple[Path, Path]) -> None:
     assert (same.code, "No BOM changed; assemblies compared: 2." in same.out) == (0, True)
 
 
-def test_markdown_for_a_pull_request(run: Any, changed: tuple[Path, Path]) -> None:
-    out = run("bom-diff", *changed, "--markdown").out
+def test_markdown_for_a_pull_request(run: Any, changed: tuple[Path, Path], tmp_path: Path) -> None:
+    """And JSON as printed, beside what a person sees."""
+    reports = [tmp_path / "diff.md", tmp_path / "diff.json"]
+    shown = run("bom-diff", *changed, *(word for path in reports for word in ("--report", path)))
+    assert shown.out == run("bom-diff", *changed).out
+    assert changes(json.loads(reports[1].read_text("utf-8"))) == WANTED
+    out = reports[0].read_text("utf-8")
     assert "### TopAssembly.FCStd" in out
     assert "| quantity changed | M8x20 Bolt | 12 → 16 | parts/M8x20Bolt.FCStd |" in out
 
@@ -155,3 +162,65 @@ def test_a_folder_that_uses_what_lies_beside_it(run: Any, tmp_path: Path) -> Non
     assert changes(ran.json()) == {"A.FCStd": {"Box": (1, None)}}
     assert not (tmp_path / "asm").exists()
     assert run("bom-diff", "--git", "HEAD", tmp_path / "nowhere").code == 2
+
+
+@pytest.fixture
+def beside(tmp_path: Path) -> Path:
+    """A repository whose assembly uses a library beside its folder, and a part of it that is not there."""
+    repository = tmp_path / "repo"
+    (repository / "cad").mkdir(parents=True)
+    (repository / "lib").mkdir()
+    part("part", "Box").save(repository / "lib" / "part.FCStd")
+    two = Doc(label="two").add("Part::Box", "Left", Label="Plate").add("Part::Box", "Right", Label="Plate")
+    two.save(repository / "cad" / "two.FCStd")
+    files = {"L1": "../lib/part.FCStd", "L2": "../lib/gone.FCStd"}
+    for names in (["L1", "L2"], ["L1", "L2", "L3", "L4"]):
+        top = Doc(label="top")
+        for name in names:
+            target = {"L3": "Left", "L4": "Right"}.get(name, "Box")
+            top.link(name, files.get(name, "two.FCStd"), target)
+        top.add("App::Part", "Top", Label="Top", Group=locals_(*names), Type="Assembly")
+        top.save(repository / "cad" / "top.FCStd")
+        if not (repository / ".git").exists():
+            git(repository, "init", "-q", "-b", "main")
+        git(repository, "add", "-A")
+        git(repository, "commit", "-q", "-m", "x")
+    return repository
+
+
+def git(repository: Path, *words: str) -> str:
+    who = ("-c", "user.name=x", "-c", "user.email=x@example.com")
+    done = subprocess.run(["git", *who, *words], cwd=repository, check=True, capture_output=True, text=True)
+    return done.stdout.strip()
+
+
+@pytest.mark.usefixtures("needs_git")
+@pytest.mark.parametrize("form", [(), ("--json",), ("--report", "diff.md")])
+def test_no_path_is_a_temporary_one(run: Any, beside: Path, form: tuple[str, ...], tmp_path: Path) -> None:
+    """Revisions are laid out somewhere; people know the paths of the repository."""
+    report = tmp_path / "diff.md"
+    form = tuple(str(report) if word == "diff.md" else word for word in form)
+    ran = run("bom-diff", "--git", "main~1..main", beside / "cad", *form)
+    out = report.read_text("utf-8") if report.exists() else ran.out
+    assert "../lib/gone.FCStd is missing" in out
+    assert "silo-bom-diff" not in out + ran.err
+
+
+@pytest.mark.usefixtures("needs_git")
+def test_objects_of_one_file_are_told_apart(run: Any, beside: Path) -> None:
+    """They have one label."""
+    out = run("bom-diff", "--git", "main~1..main", beside / "cad").out
+    assert out.count("two.FCStd#Left") == out.count("two.FCStd#Right") == 1
+
+
+@pytest.mark.usefixtures("needs_git")
+@pytest.mark.parametrize("lost", ["cad/top.FCStd", "lib/part.FCStd", "cad/two.FCStd"])
+def test_a_blob_that_is_not_there_is_a_finding(run: Any, beside: Path, lost: str) -> None:
+    """As in a partial clone. The rest is compared, and what was not read has not lost its assembly."""
+    blob = git(beside, "rev-parse", f"main:{lost}")
+    os.remove(beside / ".git" / "objects" / blob[:2] / blob[2:])
+    ran = run("bom-diff", "--git", "main~1..main", beside / "cad")
+    assert ran.code == 1
+    assert f"{os.path.relpath(lost, 'cad')} could not be read: this clone of the repository lacks" in ran.out
+    assert "removed" not in ran.out
+    assert ("two.FCStd#Left" in ran.out) is (lost != "cad/top.FCStd")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import shutil
@@ -11,7 +12,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import openpyxl
 import pytest
+from fcstd_writer import Doc, locals_
 from running_freecad import opened
 
 from silo.cli.demo import remove_from_assembly, set_element_count
@@ -78,6 +81,29 @@ def test_flat_multiplies_down_the_tree(run: Any, gearbox: Path) -> None:
     }
 
 
+@pytest.mark.parametrize("flat", [(), ("--flat",)])
+def test_the_bom_as_a_spreadsheet(run: Any, gearbox: Path, tmp_path: Path, flat: tuple[str, ...]) -> None:
+    """CSV and workbook hold the lines of --json; what a spreadsheet would run is text."""
+    (gearbox.parent / "parts" / "Cover.FCStd").unlink()
+    paths = tmp_path / "bom.csv", tmp_path / "bom.xlsx"
+    assert run("bom", gearbox, *flat, "--csv", paths[0], "--xlsx", paths[1]).code == 1
+    with paths[0].open(encoding="utf-8-sig", newline="") as file:
+        rows = list(csv.DictReader(file))
+    sheet = openpyxl.load_workbook(paths[1]).active
+    cells = [["" if cell is None else str(cell) for cell in row] for row in sheet.iter_rows(values_only=True)]
+    assert cells == [list(rows[0]), *(list(row.values()) for row in rows)]
+    told = run("bom", gearbox, *flat, "--json").json()
+    if not flat:
+        assert [row["level"] for row in rows if row["object"] == "Gear"] == ["2"]
+        told = [one for entry in told["entries"] for one in (entry, *entry["children"])]
+    assert [(row["object"], row["quantity"]) for row in rows] == [
+        (one["object"], str(one["quantity"])) for one in told
+    ]
+    assert [row["object"] for row in rows if row["missing"]] == ["Cover"]
+    assert run("bom", gearbox, *flat, "--csv", "-").out.splitlines()[0] == ",".join(rows[0])
+    assert run("bom", gearbox.parent, "--csv", "-").code == 2
+
+
 def test_the_consolidation_warning_has_the_words_of_the_spec(run: Any, gearbox: Path) -> None:
     """With the count of individual links; the array beside them does not count as one."""
     findings = run("bom", gearbox, "--json").json()["findings"]
@@ -86,6 +112,8 @@ def test_the_consolidation_warning_has_the_words_of_the_spec(run: Any, gearbox: 
         "[Silo BOM] M8x20 Bolt has 8 individual links. "
         "Consider using a link array (ElementCount) for cleaner assembly management."
     )
+    assert "individual links" not in run("bom", gearbox).out, "a hint is for who asks for it"
+    assert run("bom", gearbox, "--verbose").out.count("individual links") == 1
 
 
 def test_the_whole_story(run: Any, silo: Any, gearbox: Path) -> None:
@@ -268,7 +296,7 @@ def test_dry_run_sends_nothing(run: Any, silo: Any, gearbox: Path) -> None:
 def test_a_folder_is_synced_file_by_file_and_one_bad_file_does_not_stop_it(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path
 ) -> None:
-    """Parts are passed over and counted, the damaged file is reported, assemblies are merged."""
+    """Parts are passed over and counted, the damaged file is reported first, assemblies are merged."""
     run("register", gearbox, "--yes")
     (gearbox.parent / "parts" / "Broken.FCStd").write_bytes(b"no zip at all")
     report = tmp_path / "report.md"
@@ -283,7 +311,7 @@ def test_a_folder_is_synced_file_by_file_and_one_bad_file_does_not_stop_it(
     text = report.read_text(encoding="utf-8")
     assert "Broken.FCStd" in text
     assert "| added |" in text
-    assert text.index("TopAssembly.FCStd") < text.index("## Errors") < text.index("Broken.FCStd")
+    assert text.index("## Errors") < text.index("Broken.FCStd") < text.index("TopAssembly.FCStd")
 
 
 def test_labels_cannot_steer_the_terminal(run: Any, gearbox: Path) -> None:
@@ -447,3 +475,23 @@ def test_bom_and_diff_take_folders(run: Any, silo: Any, gearbox: Path) -> None:
     assert (ran.code, ran.json()["drift"]) == (1, True)
     (gearbox.parent / "broken.FCStd").write_bytes(b"no document")
     assert run("bom", gearbox.parent, "--json").code == 1
+
+
+def test_bom_says_why_a_line_counts_so_many(run: Any, gearbox: Path) -> None:
+    """Each chain of links and arrays; a name that means nothing is refused."""
+    ran = run("bom", gearbox, "--why", "M8x20 Bolt")
+    assert ran.code == 0
+    assert ran.out.startswith("12 × M8x20 Bolt in ")
+    assert "CoverBolts × 4" in ran.out
+    assert run("bom", gearbox, "--why", "M8x2O Bolt").code == 2
+
+
+def test_own_parts_are_lines_and_the_exit_code_says_so(run: Any, tmp_path: Path) -> None:
+    """Links to bodies of the same file are no empty BOM with exit code 0."""
+    doc = Doc("top").add("PartDesign::Body", "Wheel", Group=locals_())
+    doc.link("L", "", "Wheel", ElementCount=4).add("Assembly::AssemblyObject", "Top", Group=locals_("L"))
+    path = doc.save(tmp_path / "top.FCStd")
+    ran = run("bom", path)
+    assert ran.code == 1
+    assert "4 × Wheel  top.FCStd#Wheel  not an item yet" in ran.out
+    assert [one["quantity"] for one in run("bom", path, "--json").json()["own"]] == [4]

@@ -49,6 +49,27 @@ def test_declared_copies_are_one_item_and_can_be_taken_back(run: Any, silo: Any,
     assert not [key for key in document.Meta if "Motor" in key]
 
 
+def test_what_is_no_part_is_answered_once(run: Any, silo: Any, machine: Path) -> None:
+    """One press for all equal ones, kept in the file: no list has them again, and bom is content."""
+    assert run("bom", machine).code == 1
+    before = machine.read_bytes()
+    assert run("register", machine, "--not-a-part", "Moter").code == 2
+    assert machine.read_bytes() == before
+    done = run("register", machine, "--not-a-part", "Motor", "--json")
+    assert (done.code, done.json()) == (0, {"undeclared": ["Motor", "Motor001"]})
+    rows = run("register", machine, "--yes", "--json").json()["modelled"]
+    assert [row["objects"] for row in rows] == [["Jig"]]
+    assert run("bom", machine).code == 1
+    assert run("register", machine, "--yes", "--declare", "Jig").code == 0
+    assert "No part of any BOM: Jig" in run("register", machine, "--not-a-part", "Jig").out
+    found = run("bom", machine, "--json")
+    assert (found.code, found.json()["entries"], "own" in found.json()) == (0, [], False)
+    document = open_document(machine)
+    answered = [obj for obj in document.Objects if getattr(obj, "SiloBomExclude", False)]
+    assert [obj.Name for obj in answered] == ["Motor", "Motor001", "Jig"]
+    assert not any("SiloItemId" in obj.PropertiesList for obj in answered)
+
+
 def test_copies_that_are_different_parts_are_taken_apart(run: Any, silo: Any, machine: Path) -> None:
     """The person decides, not the shape."""
     done = run("register", machine, "--yes", "--declare", "Motor", "--apart", "--json").json()
@@ -57,18 +78,18 @@ def test_copies_that_are_different_parts_are_taken_apart(run: Any, silo: Any, ma
 
 
 def test_what_a2plus_imported_joins_the_item_of_its_file(run: Any, silo: Any, tmp_path: Path) -> None:
-    """It is that part, and no other."""
+    """It is that part, and no other: it counts with the links to it."""
     source = part("bearing", "Bearing").save(tmp_path / "bearing.FCStd")
     top = Doc(label="top").add(
         "Part::FeaturePython", "B1", sourceFile="./bearing.FCStd", a2p_Version="V0.4", Label="b_bearing"
     )
     top.link("Link", "bearing.FCStd", "Bearing").add("App::Part", "Top", Group=locals_("B1", "Link"))
     path = top.save(tmp_path / "top.FCStd")
-    assert run("register", path, "--yes").code == 0
-    done = run("register", path, "--yes", "--declare", "B1", "--json").json()
+    done = run("register", path, "--yes", "--json").json()
     (row,) = run("bom", path, "--flat", "--resolve", "--json").json()
-    assert (row["quantity"], row["part_number"]) == (2, done["registered"][0]["part_number"])
-    assert open_document(source).Meta["SiloUUID"] == done["registered"][0]["silo_uuid"]
+    registered = {one["silo_uuid"]: one["part_number"] for one in done["registered"]}
+    identity = open_document(source).Meta["SiloUUID"]
+    assert (row["quantity"], row["part_number"]) == (2, registered[identity])
 
 
 def test_a_name_that_means_nothing_says_what_there_is(run: Any, silo: Any, machine: Path) -> None:

@@ -14,9 +14,9 @@ from silo.cli.main import main
 
 FREECAD = """#!{python}
 import json, os
-with open(os.environ["SILO_ASK_OUT"], "w", encoding="utf-8") as out:
-    json.dump({{"data": {data!r}, "freecad": ["1", "1"], "python": [3, 13], "prefix": "/nowhere",
-               "missing": {missing!r}}}, out)
+with open(os.environ["SILO_OUT"], "w", encoding="utf-8") as out:
+    json.dump({{"data": {data!r}, "packages": {data!r} + "/packages", "freecad": [1, 1], "python": [3, 13],
+               "prefix": "/nowhere", "missing": {missing!r}, "constraints": ""}}, out)
 """
 
 
@@ -31,9 +31,9 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "home"
 
 
-def freecad(folder: Path, monkeypatch: pytest.MonkeyPatch, *missing: str) -> Path:
+def freecad(folder: Path, monkeypatch: pytest.MonkeyPatch, missing: dict[str, str] | None = None) -> Path:
     command, data = folder / "freecadcmd", folder / "FreeCAD"
-    command.write_text(FREECAD.format(python=sys.executable, data=str(data), missing=list(missing)))
+    command.write_text(FREECAD.format(python=sys.executable, data=str(data), missing=missing or {}))
     command.chmod(0o755)
     monkeypatch.setenv("SILO_FREECADCMD", str(command))
     return data
@@ -78,13 +78,23 @@ def test_the_add_on_and_its_packages(
     data = freecad(tmp_path, monkeypatch)
     found = seen(capsys)
     assert found["FreeCAD"] == f"{os.environ['SILO_FREECADCMD']}: 1.1, Python 3.13"
-    assert found["add-on"] == f"not in {data / 'Mod' / 'Silo'}: silo-mod install-addon puts it there"
-    (data / "Mod" / "Silo").mkdir(parents=True)
-    assert seen(capsys)["add-on"] == str(data / "Mod" / "Silo")
-    freecad(tmp_path, monkeypatch, "pydantic", "sseclient")
+    assert found["add-on"] == f"not in {data / 'Mod' / 'silo-mod'}: silo-mod install-addon puts it there"
+    (data / "Mod" / "silo-mod").mkdir(parents=True)
+    assert seen(capsys)["add-on"] == str(data / "Mod" / "silo-mod")
+    freecad(tmp_path, monkeypatch, {"pydantic": "ImportError: it is for another Python"})
     assert seen(capsys)["add-on"].endswith(
-        "without pydantic, sseclient: silo-mod install-addon installs them"
+        "without pydantic (ImportError: it is for another Python): silo-mod install-addon installs it"
     )
+
+
+def test_a_freecad_that_crashes_is_named_as_the_culprit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    freecad(tmp_path, monkeypatch)
+    Path(os.environ["SILO_FREECADCMD"]).write_text(
+        "#!/bin/sh\necho 'Illegal storage access' >&2\nkill -SEGV $$\n"
+    )
+    assert "it crashed (SIGSEGV). It said: Illegal storage access" in seen(capsys)["FreeCAD"]
 
 
 def test_a_freecad_that_does_not_start_is_a_trouble(
@@ -92,3 +102,15 @@ def test_a_freecad_that_does_not_start_is_a_trouble(
 ) -> None:
     monkeypatch.setenv("SILO_FREECADCMD", str(tmp_path / "nowhere"))
     assert "cannot be run" in seen(capsys)["FreeCAD"]
+
+
+def test_another_distribution_with_our_import_name_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """There is one of that name; its files and ours would lie in one folder."""
+    info = tmp_path / "silo-9.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: silo\nVersion: 9\n")
+    (info / "top_level.txt").write_text("silo\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert "silo also has a package named silo" in seen(capsys)["silo-mod"]

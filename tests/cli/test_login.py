@@ -4,10 +4,17 @@
 from __future__ import annotations
 
 import io
+import os
+import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from server_testing import Api, wait_until
+from web_visitor import enter
 
 from silo.api.config import config_path, load_config
 
@@ -25,6 +32,45 @@ def test_the_server_and_the_token_are_kept_for_this_user(
     assert silo.token not in ran.out
     assert config_path().stat().st_mode & 0o077 == 0
     assert run("doctor").code == 0
+
+
+@pytest.mark.usefixtures("needs_pty", "needs_signals")
+def test_at_a_terminal_the_browser_lets_the_program_in(silo: Any, tmp_path: Path, home: Path) -> None:
+    """The page is opened and shows the code of the terminal; nobody types a token."""
+    opened = tmp_path / "opened"
+    browser = tmp_path / "browser"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {opened}.new && mv {opened}.new {opened}\n')
+    browser.chmod(0o755)
+    env = {name: text for name, text in os.environ.items() if not name.startswith("SILO_API")}
+    master, terminal = os.openpty()
+    program = [sys.executable, "-m", "silo.cli.main", "login", silo.client.base_url]
+    with subprocess.Popen(
+        program,
+        stdin=terminal,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**env, "BROWSER": str(browser)},
+    ) as job:
+        try:
+            wait_until(opened.exists, "the browser")
+            page = opened.read_text().strip().removeprefix(silo.client.base_url)
+            with Api(silo.client.base_url, silo.token) as api:
+                visitor = enter(api, "admin")
+                shown = visitor.get(page).body.decode()
+                assert visitor.post(page).status == 303
+            out, err = job.communicate(timeout=60)
+        finally:
+            job.kill()
+    os.close(master)
+    os.close(terminal)
+    assert (job.returncode, "admin" in out) == (0, True), err
+    code = re.search(r"code ([0-9A-F]{4}-[0-9A-F]{4})", err)
+    assert code is not None
+    assert code[1] in shown
+    kept = load_config(config_path())["server"]["token"]
+    assert kept.startswith("silo_")
+    assert kept not in page + out + err
 
 
 @pytest.mark.parametrize("token", ["silo_wrong", ""])
@@ -62,3 +108,48 @@ def test_an_empty_option_is_an_error(run: Any, silo: Any, gearbox: Path, option:
     ran = run("diff", gearbox, option, "")
     assert ran.code == 2
     assert f"{option} is empty" in ran.err
+
+
+def test_logout_forgets_what_login_kept(run: Any, silo: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And says that nothing was there, or that the environment still has a token."""
+    assert run("login", silo.client.base_url, "--token", silo.token).code == 0
+    assert "SILO_API_TOKEN still" in run("logout").out
+    assert not config_path().exists()
+    for name in ("SILO_API_URL", "SILO_API_TOKEN"):
+        monkeypatch.delenv(name, raising=False)
+    assert "nothing is remembered" in run("logout").out
+    assert run("whoami").code == 2
+
+
+def test_logout_leaves_a_file_that_is_not_ours(run: Any, silo: Any) -> None:
+    path = config_path()
+    path.parent.mkdir(parents=True)
+    path.write_text("[other]\nkey = 1\n")
+    path.chmod(0o600)
+    assert run("logout").code == 2
+    assert path.exists()
+
+
+def test_search_show_and_whoami(run: Any, silo: Any, gearbox: Path) -> None:
+    run("register", gearbox, "--yes")
+    run("sync", gearbox, "--recursive")
+    (found,) = run("search", "base", "plate", "--json").json()
+    assert found["name"] == "Base Plate"
+    assert run("search", "no-such-words").code == 1
+    (top,) = run("search", "Top Assembly", "--json").json()
+    told = run("show", top["part_number"], "--json").json()
+    assert found["part_number"] in {line["part_number"] for line in told["bom"]}
+    assert told["page"].startswith(silo.client.base_url)
+    assert run("show", "A99-9999").code == 2
+    who = run("whoami", "--json").json()
+    assert (who["url"], who["username"]) == (silo.client.base_url, "admin")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
+def test_the_shell_completes_every_command(run: Any, shell: str, tmp_path: Path) -> None:
+    script = run("completion", shell).out
+    assert all(name in script for name in ("bom-diff", "install-addon", "--recursive", "whoami"))
+    program = shutil.which(shell)
+    if program is not None:
+        (tmp_path / "script").write_text(script)
+        subprocess.run([program, "-n", tmp_path / "script"], check=True)

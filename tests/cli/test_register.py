@@ -18,9 +18,9 @@ import pytest
 from fcstd_writer import Doc, locals_, part
 
 from silo.bom.model import BomEntry
-from silo.bom.naming import Proposal
+from silo.bom.resolve import Proposal
 from silo.cli.common import read_assembly
-from silo.cli.register_dialog import Dialog
+from silo.cli.register import Dialog
 from silo.fcstd import open_document
 from silo.registering.items import component_key
 from silo.registering.journal import Journal
@@ -91,7 +91,7 @@ def test_a_probable_duplicate_is_not_taken_by_enter() -> None:
     assert talk(twin, answers=[""], own=True)[0] == [("Bracket", "part", "M01", None)]
     rows, left = talk(candidate("A"), twin, candidate("B"), answers=["all", "n"])
     assert ([row[0] for row in rows], left) == (["A", "B"], ["Bracket"])
-    copies = [candidate(name, sha256="same", twins=("the other",)) for name in ("A", "B")]
+    copies = [candidate(name, sha256="same", twin="the other") for name in ("A", "B")]
     assert talk(*copies, answers=["all", "n"])[1] == ["B"]
 
 

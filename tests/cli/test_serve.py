@@ -84,25 +84,25 @@ def test_it_says_its_address_at_once_and_ends_cleanly(tmp_path: Path, how: signa
 def test_the_token_of_the_environment_is_taken_and_shown(tmp_path: Path) -> None:
     """Whatever it looks like; it is good after a restart, also one that makes a token of its own."""
     database = tmp_path / "silo.db"
-    with serving(database, token="our-own-token") as server:
+    with serving(database, token="our-own-token-of-some-length") as server:
         assert isinstance(server, Served)
-        assert server.token == "our… (the one you gave)"
-        assert "our-own-token" not in "".join(server.lines)
-        assert server.get("/api/items", token="our-own-token").status_code == 200
+        assert server.token == "our-own… (the one you gave)"
+        assert "our-own-token-of-some-length" not in "".join(server.lines)
+        assert server.get("/api/items", token="our-own-token-of-some-length").status_code == 200
         assert server.get("/api/items", token="another").status_code == 401
     with serving(database) as server:
         assert isinstance(server, Served)
-        assert server.token != "our-own-token"
+        assert server.token != "our-own-token-of-some-length"
         assert server.get("/api/items").status_code == 200
-        assert server.get("/api/items", token="our-own-token").status_code == 200
+        assert server.get("/api/items", token="our-own-token-of-some-length").status_code == 200
 
 
 def test_machines_get_one_line_of_json(tmp_path: Path) -> None:
-    """``--json``: address, token, login link, database."""
+    """``--json``: address, token, login link, database, what to mend."""
     with serving(tmp_path / "silo.db", "--json", lines=1) as told:
         assert isinstance(told, list)
         greeting = json.loads(told[0])
-    assert set(greeting) == {"url", "token", "login_url", "database", "public"}
+    assert set(greeting) == {"url", "token", "login_url", "database", "public", "warnings"}
     assert greeting["public"] is False
 
 

@@ -237,7 +237,7 @@ def test_the_pre_commit_hook_names_a_command_that_there_is(run: Any, gearbox: Pa
     git(gearbox.parent, "init", "-q")
     ran = run(*words, gearbox.parent)
     assert ran.code == 0, ran.err
-    assert "TopAssembly.FCStd (new assembly)" in ran.out
+    assert "TopAssembly.FCStd: Top Assembly (new assembly)" in ran.out
     git(gearbox.parent, "add", "-A")
     git(gearbox.parent, "commit", "-qm", "first")
     git(gearbox.parent, "rm", "-q", "parts/Cover.FCStd")

@@ -90,6 +90,9 @@ ROWS: list[tuple[tuple[str, str], dict[str, Any], bool]] = [
     (("PUT", "user"), {"active": True}, True),
     (("POST", "tokens"), {"name": NUL}, False),
     (("POST", "tokens"), {"name": ""}, False),
+    *((ITEM, {"category": "F01", "name": f"a{c}"}, False) for c in "\x01\x7f\x9b\ufdd0\uffff\U0010fffe"),
+    *((ITEM, {"part_number": f"a{c}b"}, False) for c in "\u200b\u202e\u2066\ufdef\U0001ffff"),
+    (ITEM, {"category": "F01", "name": "a\tb\nc\rd\u200b\u00a0\U0001f529"}, True),
 ]
 BODIES = {
     "line": "LineChangeBody",
@@ -153,6 +156,7 @@ def test_a_body_is_accepted_exactly_where_the_document_calls_it_valid(api: Api, 
         ("0", True),
         ("2026-02-08T22:15:00Z", True),
         ("2026-01-31T22:15:00.123456%2B01:00", True),
+        ("2020-12-30T00:00:00Z", True),
         ("2024-02-29T00:00:00-14:00", True),
         ("2025-02-29T00:00:00Z", False),
         ("0000-01-01T00:00:00Z", False),
@@ -173,14 +177,14 @@ def test_a_point_to_compare_is_what_the_document_says(
 
 
 def test_an_operation_that_refuses_what_has_the_right_form_says_why(api: Api, document: Any) -> None:
-    """The reason stands at the operation and at its 400; these four and no others."""
+    """The reason stands at the operation and at its 400; these five and no others."""
     told = {
         f"{method.upper()} {path}": operation
         for path, operations in document["paths"].items()
         for method, operation in operations.items()
         if REFUSED in operation
     }
-    assert sorted(name.rpartition("/")[2] for name in told) == ["file", "import", "merge", "resolve"]
+    assert sorted(name.rpartition("/")[2] for name in told) == ["file", "file", "import", "merge", "resolve"]
     for operation in told.values():
         assert operation[REFUSED] in operation["responses"]["400"]["description"]
 

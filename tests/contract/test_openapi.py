@@ -13,8 +13,7 @@ from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 from server_testing import Api
 
-from silo_server.app import create_app
-from silo_server.run import RunningServer
+from silo_server.run import RunningServer, create_app
 from silo_server.settings import Settings
 
 with warnings.catch_warnings():

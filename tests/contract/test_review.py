@@ -109,6 +109,37 @@ def test_a_kept_quantity_is_asked_again_only_when_cad_says_something_else(api: A
     assert [w["assembly_quantity"] for w in api.merge(parent, {a: 5})["warnings"]] == [5]
 
 
+def test_another_unit_is_an_override(api: Api) -> None:
+    """CAD counts pieces: "0.5 m" is a person's, CAD's 6 pieces become no 6 m, and either can be taken."""
+    parent, a, b = api.items(3)
+    api.merge(parent, {a: 6, b: 1})
+    line = api.good("PUT", bom(parent, a), {"quantity": 0.5, "unit": "m"})
+    assert (line["source"], line["override"], line["cad_quantity"]) == ("manual", True, 6)
+    # The unit alone counts as well: one box is not one piece.
+    boxed = api.good("PUT", bom(parent, b), {"unit": "box"})
+    assert (boxed["source"], boxed["override"], boxed["cad_quantity"]) == ("manual", True, 1)
+    messages = [warning["message"] for warning in api.merge(parent, {a: 6, b: 1})["warnings"]]
+    assert ["0.5 m" in messages[0], "1 box" in messages[1]] == [True, True]
+    assert api.merge(parent, {a: 6, b: 9})["diff"]["quantity_changed"] == []
+    assert [one["child_part_number"] for one in api.get(bom(parent, "review"))["conflicts"]] == [a, b]
+    decide(api, parent, **{a: "take_cad", b: "keep_silo"})
+    lines = api.lines(parent)
+    assert (lines[a]["quantity"], lines[a]["unit"], lines[a]["source"]) == (6, None, "assembly")
+    assert (lines[b]["quantity"], lines[b]["unit"], lines[b]["source"]) == (1, "box", "manual")
+    assert api.merge(parent, {a: 6, b: 9})["warnings"] == []
+
+
+@pytest.mark.parametrize("unit", [None, "pcs"])
+def test_pieces_again_end_the_override(api: Api, unit: str | None) -> None:
+    """What CAD said, in pieces, is CAD's line again; another name for pieces makes no override."""
+    parent, a = api.items(2)
+    api.merge(parent, {a: 6})
+    api.good("PUT", bom(parent, a), {"quantity": 6, "unit": "m"})
+    line = api.good("PUT", bom(parent, a), {"unit": unit})
+    assert (line["source"], line["override"], line["unit"]) == ("assembly", False, unit)
+    assert api.merge(parent, {a: 7})["diff"]["quantity_changed"]
+
+
 @pytest.mark.parametrize("renamed", [False, True])
 def test_undoing_keep_silo_asks_again(api: Api, renamed: bool) -> None:
     """The decision lives beside the line; undo takes it back too, whatever the part's number is by now."""

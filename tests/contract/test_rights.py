@@ -16,9 +16,8 @@ from server_testing import Answer, Api, Databases, bom
 from web_visitor import enter
 
 from silo.bom.errors import ConflictError
-from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
-from silo_server.run import Greeting, RunningServer, running_server
+from silo_server.run import Greeting, RunningServer, prepare, running_server
 from silo_server.services.access import accounts
 from silo_server.services.access.credentials import shown_prefix
 from silo_server.settings import Settings
@@ -120,7 +119,8 @@ def test_the_first_characters_of_a_short_secret_are_not_most_of_it(api: Api, ser
 
 def test_links_are_built_from_the_configured_address(api: Api, server: RunningServer) -> None:
     """Whatever the Host header says."""
-    made = api.good("POST", "/api/users/admin/login-link", headers={"Host": "evil.example"})
+    api.call("POST", "/api/users", {"username": "linked"})
+    made = api.good("POST", "/api/users/linked/login-link", headers={"Host": "evil.example"})
     assert made["url"] == f"{server.base_url}{made['path']}"
 
 

@@ -15,7 +15,7 @@ from fcstd_writer import Doc, Raw, Vector, XLink, container, locals_, part
 from silo.bom.document import DocumentLike, ObjectLike, document_property, own
 from silo.bom.errors import DocumentError
 from silo.fcstd import FcstdObject, Library, open_document
-from silo.fcstd.objects import PARENTS, ancestors
+from silo.fcstd.document import PARENTS, ancestors
 
 
 def read(folder: Path, **values: Any) -> FcstdObject:
@@ -180,7 +180,6 @@ def test_a_document_has_freecads_attributes(tmp_path: Path) -> None:
     assert document.Meta == {"SiloUUID": "u-1"}
     assert document.SiloUUID == document.getPropertyByName("SiloUUID") == "u-2"
     assert document.Uid == "3a4cb85d-6224-4a3f-bde2-ab5c5ce51855"
-    assert document.LastModifiedDate == "2026-11-21T05:43:38Z"
     assert document_property(document, "Nothing") is None
     with pytest.raises(AttributeError):
         _ = document.Nothing

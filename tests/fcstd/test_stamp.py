@@ -16,12 +16,10 @@ from hypothesis import strategies as st
 from other_disk import other_disk
 
 from silo.bom.errors import DocumentError
-from silo.bom.identity import identity_of
+from silo.bom.model import identity_of
 from silo.fcstd import check_stampable, open_document, stamp, unstamp
-from silo.fcstd.container import ContainerFile, FileState
-from silo.fcstd.edit import replace_file, replaced_entry
-from silo.fcstd.limits import Limits
-from silo.fcstd.stamp import _read_back
+from silo.fcstd.container import ContainerFile, FileState, Limits
+from silo.fcstd.stamp import _read_back, replace_file, replaced_entry
 from silo.platform import sync_folder
 
 

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from silo.bom.findings import FindingCode
-from silo.bom.identity import walk_entries
 from silo.bom.links import extract
+from silo.bom.model import walk_entries
 from silo.bom.report import flat_lines
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library

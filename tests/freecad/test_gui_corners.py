@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import importlib.util
 import shutil
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
-from freecad_cases.machines import REPOSITORY, WANTED
+from freecad_cases.machines import REPOSITORY, WANTED, wheel
 from gui_cases.window import Window, window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
@@ -104,7 +103,7 @@ def test_missing_packages_are_installed_by_one_button(version: str, tmp_path: Pa
         freecad.packages.mkdir(parents=True)
         wheels = tmp_path / "wheels"
         wheels.mkdir()
-        for name, version_ in (("requests", "2.99"), ("sseclient_py", "1.99"), ("pydantic", "2.99")):
+        for name, version_ in (("requests", "2.99"), ("pydantic", "2.99")):
             wheel(wheels, name, version_)
         # The roots of other Debian releases have no pip; this one serves every Python that is new enough.
         pip = importlib.util.find_spec("pip")
@@ -119,15 +118,15 @@ def test_missing_packages_are_installed_by_one_button(version: str, tmp_path: Pa
         said = freecad.run("bare.py", env=env)
     (line,) = said["report"]
     by_hand = (
-        "Silo needs the Python packages requests, pydantic, sseclient-py. Install them with silo-mod "
+        "Silo needs the Python packages requests, pydantic. Install them with silo-mod "
         f"install-addon, or with: python{freecad.freecad.python} -m pip install --target "
-        f'"{freecad.packages}" requests pydantic sseclient-py – then start FreeCAD again.'
+        f'"{freecad.packages}" requests pydantic – then start FreeCAD again.'
     )
     assert line.endswith(by_hand)
     # And that is where this FreeCAD looks for them.
     assert said["on_path"]
     assert said["buttons"] == ["Install What Silo Needs…"]
-    assert "requests, pydantic, sseclient-py" in said["before"][0]
+    assert "requests, pydantic" in said["before"][0]
     assert said["during"] == [True, False]
     assert "could not be installed: pip could not install" in said["failed"][0]
     assert said["failed"][0].endswith(by_hand)
@@ -135,20 +134,6 @@ def test_missing_packages_are_installed_by_one_button(version: str, tmp_path: Pa
     assert said["after"] == [f"The packages are in {freecad.packages}. Start FreeCAD again to use Silo."]
     assert not said["button"]
     assert (freecad.packages / "requests" / "__init__.py").is_file()
-
-
-def wheel(folder: Path, name: str, version: str) -> None:
-    """An empty package as pip takes it."""
-    info = f"{name}-{version}.dist-info"
-    files = {
-        f"{name}/__init__.py": "",
-        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n",
-        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
-    }
-    record = "".join(f"{path},,\n" for path in (*files, f"{info}/RECORD"))
-    with zipfile.ZipFile(folder / f"{name}-{version}-py3-none-any.whl", "w") as packed:
-        for path, text in {**files, f"{info}/RECORD": record}.items():
-            packed.writestr(path, text)
 
 
 BESIDE = """

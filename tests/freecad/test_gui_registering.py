@@ -19,12 +19,11 @@ from freecad_cases import machines
 from freecad_cases.machines import WANTED
 from gui_cases.window import Window
 
-from silo.bom.identity import walk_entries
 from silo.bom.links import extract
-from silo.bom.model import Extraction
+from silo.bom.model import Extraction, walk_entries
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.freecadcmd.run import run_freecad
+from silo.freecads import run_freecad
 
 RESAVE = Path(__file__).parent / "freecad_cases" / "resave.py"
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]

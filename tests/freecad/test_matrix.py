@@ -26,7 +26,7 @@ from silo.bom.model import Extraction
 from silo.bom.report import flat_lines
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.freecadcmd.run import run_freecad
+from silo.freecads import run_freecad
 
 pytestmark = pytest.mark.freecad
 

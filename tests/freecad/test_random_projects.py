@@ -26,7 +26,7 @@ from silo.bom.model import Extraction
 from silo.bom.report import flat_lines
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.freecadcmd.run import verify_in_freecad
+from silo.freecads import run_freecad
 
 pytestmark = pytest.mark.freecad
 
@@ -67,11 +67,10 @@ def build(freecad: FreeCAD, folder: Path, seeds: list[int]) -> dict[int, dict[st
     return dict(json.loads(line) for line in (folder / "truth.jsonl").read_text().splitlines())
 
 
-def judge(seed: int, shown: dict[str, int], file: Any, witnessed: Any) -> list[str]:
+def judge(seed: int, shown: dict[str, int], file: Any, live: Any, accounts: list[Any]) -> list[str]:
     """What is wrong with one project; a finding that blocks is an honest answer."""
-    if isinstance(file, SiloError) or isinstance(witnessed, SiloError):
-        return [] if str(file) == str(witnessed) else [f"seed {seed}: file {file}; live {witnessed}"]
-    live = witnessed.extraction
+    if isinstance(file, SiloError) or isinstance(live, SiloError):
+        return [] if str(file) == str(live) else [f"seed {seed}: file {file}; live {live}"]
     wrong = []
     if counted(file) != counted(live) or file.blocked != live.blocked:
         wrong.append(f"seed {seed}: the file gives {counted(file)}, live FreeCAD {counted(live)}")
@@ -80,7 +79,7 @@ def judge(seed: int, shown: dict[str, int], file: Any, witnessed: Any) -> list[s
     if not file.blocked and counted(file) != shown:
         wrong.append(f"seed {seed}: FreeCAD shows {shown}, the BOM has {counted(file)}")
     elif not file.blocked:
-        wrong += [f"seed {seed}: {one['sentence']}" for one in witnessed.accounts if not one["agrees"]]
+        wrong += [f"seed {seed}: {one['sentence']}" for one in accounts if not one["agrees"]]
     return wrong
 
 
@@ -95,11 +94,13 @@ def hunt(version: str, tmp_path: Path, first: int, projects: int) -> list[str]:
         truth = build(freecad, folder, seeds)
         tops = {seed: folder / str(seed) / "top.FCStd" for seed in seeds}
         env = freecad.profile(tmp_path / f"reader-{start}")
-        live = dict(verify_in_freecad([str(top) for top in tops.values()], command=freecad.command, env=env))
+        said: dict[str, Any] = {}
+        paths = [str(top) for top in tops.values()]
+        live = dict(run_freecad(paths, command=freecad.command, env=env, witness=said))
         for seed, top in tops.items():
-            file, witnessed = read(top), live[str(top)]
-            blocked += isinstance(witnessed, SiloError) or witnessed.extraction.blocked
-            wrong += judge(seed, truth[seed], file, witnessed)
+            file, seen = read(top), live[str(top)]
+            blocked += isinstance(seen, SiloError) or seen.blocked
+            wrong += judge(seed, truth[seed], file, seen, said.get(str(top), []))
     print(f"FreeCAD {version}: {projects} projects, {blocked} blocked, {len(wrong)} wrong", *wrong, sep="\n")
     return wrong
 

@@ -6,23 +6,21 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from freecad_cases import machines
 from freecad_cases.machines import REPOSITORY, WANTED, FreeCAD
 
-from silo.bom.errors import CancelledError, DocumentError, SiloError
-from silo.cli.main import main
-from silo.freecadcmd.mass import read_in_freecad
-from silo.inertia.geometry import Progress, ReadOptions, read
+from silo.bom.errors import InputError
+from silo.inertia.geometry import ReadOptions, cache, read
 from silo.inertia.model import Assembly, GeometryCode
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
 PLACES = REPOSITORY / "tests" / "inertia" / "geometry" / "freecad" / "freecad_shapes.py"
 MATERIALS = Path(__file__).with_name("shape_cases") / "materials.py"
+MEASURE = MATERIALS.with_name("measure.py")
 # Resolved, for FreeCAD names a file that a link leads to by its own place.
 PUBLIC = (REPOSITORY.parent / "shared").resolve() / "data" / "assemblies"
 
@@ -39,12 +37,17 @@ def _freecad(request: pytest.FixtureRequest) -> FreeCAD:
 
 
 @pytest.fixture(name="in_freecad")
-def _in_freecad(freecad: FreeCAD, tmp_path: Path) -> Callable[..., Assembly]:
-    """``in_freecad(path, **options)``: read by this FreeCAD, with a profile of its own."""
+def _in_freecad(freecad: FreeCAD, tmp_path: Path) -> Callable[[Path], Assembly]:
+    """``in_freecad(path)``: read by this FreeCAD, in a profile of its own; InputError if it fails."""
     env = freecad.profile(tmp_path / "profile")
 
-    def reading(path: Path, **options: Any) -> Assembly:
-        return read_in_freecad(path, ReadOptions(**options), command=freecad.command, env=env)
+    def reading(path: Path) -> Assembly:
+        out = tmp_path / "measured.npz"
+        job = {"SILO_MODS": str(REPOSITORY / "mods"), "SILO_TOP": str(path), "SILO_OUT": str(out)}
+        done = freecad.run(MEASURE, {**env, **job}, cwd=tmp_path, timeout_s=900)
+        if not out.exists():
+            raise InputError(done.stdout)
+        return cache.load(out)[0]
 
     return reading
 
@@ -84,13 +87,13 @@ def same(one: Assembly, two: Assembly) -> None:
         assert {p.code for p in live.problems} == {p.code for p in ours.problems}, key
 
 
-def test_every_way_of_placing(built: Callable[[Path], Path], in_freecad: Callable[..., Assembly]) -> None:
+def test_every_way_of_placing(built: Callable[[Path], Path], in_freecad: Callable[[Path], Assembly]) -> None:
     """Links, chains, arrays, groups, mirrors, scales, sub-objects, sub-assemblies, rigid and flexible."""
     path = built(PLACES) / "top.FCStd"
     same(in_freecad(path), read(path, options=ReadOptions(cache=False)))
 
 
-def test_shapes_and_materials(built: Callable[[Path], Path], in_freecad: Callable[..., Assembly]) -> None:
+def test_shapes_and_materials(built: Callable[[Path], Path], in_freecad: Callable[[Path], Assembly]) -> None:
     """Every kind of surface, a void, an inside-out solid, surfaces, curves; every way to state a material."""
     out = built(MATERIALS)
     told = json.loads((out / "told.json").read_text())
@@ -126,53 +129,13 @@ TOPS = {
 
 
 @pytest.mark.parametrize("top", TOPS)
-def test_public_assemblies(top: str, freecad: FreeCAD, in_freecad: Callable[..., Assembly]) -> None:
+def test_public_assemblies(top: str, freecad: FreeCAD, in_freecad: Callable[[Path], Assembly]) -> None:
     """Real parts: the same masses from FreeCAD's objects as from the files."""
     path = PUBLIC / top
     if not path.exists():
         pytest.skip(f"{path} is not there")
     if freecad.short not in TOPS[top]:
-        with pytest.raises(DocumentError, match="too old to load its assemblies"):
+        with pytest.raises(InputError, match="too old to load its assemblies"):
             in_freecad(path)
         return
     same(in_freecad(path), read(path))
-
-
-def test_the_command(
-    freecad: FreeCAD,
-    built: Callable[[Path], Path],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """``silo-mod mass --via freecad``: the mass that the materials and volumes give."""
-    path = built(MATERIALS) / "parts.FCStd"
-    monkeypatch.setenv("SILO_FREECADCMD", freecad.command)
-    for name, value in freecad.profile(tmp_path / "profile").items():
-        monkeypatch.setenv(name, value)
-    assert main(["mass", "--via", "freecad", "--json", str(path)]) == 0
-    (link,) = json.loads(capsys.readouterr().out)["links"]
-    parts = {part["name"]: part for part in link["parts"]}
-    assert parts["Linked"]["mass"] == pytest.approx(6000e-9 * 7900)
-    assert parts["Untouched"]["mass"] == 0
-
-
-def test_what_cannot_be_read_is_one_sentence(in_freecad: Callable[..., Assembly], tmp_path: Path) -> None:
-    """A truncated file, one that is not there, an object that is not there: told, no traceback."""
-    broken = tmp_path / "broken.FCStd"
-    broken.write_bytes(b"PK\x03\x04 not much of a zip")
-    for path in (broken, tmp_path / "none.FCStd"):
-        with pytest.raises(SiloError) as told:
-            in_freecad(path)
-        assert path.name in str(told.value)
-        assert "Traceback" not in str(told.value)
-
-
-def test_progress_and_cancelling(built: Callable[[Path], Path], in_freecad: Callable[..., Assembly]) -> None:
-    """Stages are reported while FreeCAD works; cancelling ends it."""
-    path = built(PLACES) / "top.FCStd"
-    heard: list[Progress] = []
-    in_freecad(path, progress=heard.append)
-    assert {progress.stage for progress in heard} & {"reading", "measuring", "measuring faces"}
-    with pytest.raises(CancelledError):
-        in_freecad(path, cancelled=lambda: True)

@@ -14,7 +14,7 @@ import pytest
 from silo.bom.errors import ConfigError, DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import to_plain
-from silo.freecadcmd.run import find_freecadcmd, run_freecad
+from silo.freecads import ask_inside, find_freecadcmd, freecad_for, run_freecad
 
 # A stand-in for freecadcmd: it gets the same arguments and answers in the same file. What it does with a file
 # stands in that file.
@@ -33,6 +33,9 @@ with open(job["lines"], "a") as out:
         tell({{"begun": top}})
         if what == "die":
             os.kill(os.getpid(), signal.SIGSEGV)
+        if what == "die as FreeCAD":  # it catches the signal, says where it was, and ends with 1
+            print("Program received signal SIGSEGV, Segmentation fault.\\n#0  one\\n#1  two\\n#2  three")
+            sys.exit(1)
         if what == "leave":
             sys.exit(7)
         if what == "hang":
@@ -111,11 +114,13 @@ def test_flatpak_starts_its_freecad_and_finds_the_job(
 
 def test_a_file_that_kills_freecad_does_not_stop_the_rest(tmp_path: Path, freecadcmd: str) -> None:
     """FreeCAD is started again for what is left; the deadly files have an error that says how it died."""
-    wanted = tops(tmp_path, "good", "die", "good", "leave", "good")
+    wanted = tops(tmp_path, "good", "die", "good", "leave", "die as FreeCAD")
     results = [found for _, found in run_freecad(wanted, command=freecadcmd)]
-    assert [isinstance(found, Extraction) for found in results] == [True, False, True, False, True]
-    assert str(results[1]) == f"{wanted[1]}: FreeCAD died while it read this file (signal SIGSEGV)"
-    assert str(results[3]) == f"{wanted[3]}: FreeCAD died while it read this file (exit code 7)"
+    assert [isinstance(found, Extraction) for found in results] == [True, False, True, False, False]
+    died = "FreeCAD died while it read this file: it"
+    assert str(results[1]) == f"{wanted[1]}: {died} crashed (SIGSEGV)"
+    assert str(results[3]) == f"{wanted[3]}: {died} ended with exit code 7"
+    assert str(results[4]) == f"{wanted[4]}: {died} crashed (SIGSEGV)"
 
 
 def test_a_file_that_freecad_hangs_on_is_given_up(tmp_path: Path, freecadcmd: str) -> None:
@@ -139,8 +144,20 @@ def test_errors_of_files_come_back_as_they_were(tmp_path: Path, freecadcmd: str)
 
 def test_a_freecad_that_does_not_start_is_reported_once(tmp_path: Path, freecadcmd: str) -> None:
     """Not one error per file, but one that says what FreeCAD said."""
-    with pytest.raises(ConfigError, match=r"did not work \(exit code 4\).*Cannot load library"):
+    with pytest.raises(ConfigError, match=r"did not work: it ended with exit code 4\..*Cannot load library"):
         list(run_freecad(tops(tmp_path, "never starts", "good"), command=freecadcmd))
+
+
+def test_a_freecad_that_crashes_at_its_start_says_so(tmp_path: Path) -> None:
+    """Whoever asks it something, such as doctor, reads of the crash and not of lines of a trace."""
+    command = tmp_path / "freecadcmd"
+    crash = "Cannot load library\\nProgram received signal SIGABRT, Aborted.\\n#0  one\\n#1  two\\n"
+    command.write_text(f"#!/bin/sh\nprintf '{crash}'\nexit 1\n")
+    command.chmod(0o755)
+    with pytest.raises(ConfigError, match=r"it crashed \(SIGABRT\)\. It said: Cannot load library$"):
+        ask_inside(str(command), "", {})
+    with pytest.raises(ConfigError, match=r"it crashed \(SIGABRT\)\. It said: Cannot load library$"):
+        list(run_freecad(tops(tmp_path, "good"), command=str(command)))
 
 
 def test_a_reader_that_stops_early_ends_freecad(tmp_path: Path, freecadcmd: str) -> None:
@@ -148,6 +165,26 @@ def test_a_reader_that_stops_early_ends_freecad(tmp_path: Path, freecadcmd: str)
     results = run_freecad(tops(tmp_path, "good", "hang"), command=freecadcmd)
     assert next(results)[1] == GOOD
     results.close()  # would wait for the hanging program's minute if it were not ended
+
+
+@pytest.mark.usefixtures("needs_modes")
+@pytest.mark.parametrize(
+    ("saved", "taken"), [((), "0.20"), ((0, 21), "1.0"), ((1, 1), "1.1"), ((1, 9), "1.1"), ((1, 0), "1.0")]
+)
+def test_a_freecad_that_can_open_the_file_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, saved: tuple[int, ...], taken: str
+) -> None:
+    """The first that is no older than the file, else the newest; one that crashes is passed over."""
+    monkeypatch.delenv("SILO_FREECADCMD", raising=False)
+    monkeypatch.setenv("PATH", os.pathsep.join((str(tmp_path), "/usr/bin", "/bin")))
+    answers = {"freecadcmd": "0.20", "FreeCADCmd": "", "freecadcmd-daily": "1.0", "freecad.cmd": "1.1"}
+    for name, version in answers.items():
+        path = tmp_path / name
+        told = f"[{version.replace('.', ', ')}]"
+        path.write_text(f"#!/bin/sh\n[ -n '{version}' ] || exit 1\nprintf '{told}' > \"$SILO_OUT\"\n")
+        path.chmod(0o755)
+    command, version = freecad_for(saved)
+    assert (version, answers[Path(command).name]) == (taken, taken)
 
 
 def test_the_freecad_of_the_environment_is_taken(freecadcmd: str) -> None:

@@ -20,7 +20,7 @@ from silo.inertia.calculator import Task, calculate
 from silo.inertia.links import FrameChoice, as_link_map, claim, link_map, matches, origin_frame, read_link_map
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Instance
-from silo.inertia.output.urdf import frame_doubts, root_link
+from silo.inertia.output.urdf import Urdf
 
 Fixture = Callable[..., Any]
 PART = box("p", 0.1, 0.1, 0.1)
@@ -115,8 +115,8 @@ def test_the_root_link_has_the_name_that_the_urdf_gives_it() -> None:
     for names, root in ((("torso", "arm"), "torso"), (("world", "base_link", "arm"), "base_link")):
         text = "".join(f'<link name="{name}"/>' for name in names)
         text += "".join(joint.format(b, a, b) for a, b in pairwise(names))
-        assert root_link(f'<robot name="r">{text}</robot>'.encode()) == root
-    assert root_link(b'<robot name="r"><link name="a"/><link name="b"/></robot>') == "base_link"
+        assert Urdf(f'<robot name="r">{text}</robot>'.encode()).root == root
+    assert Urdf(b'<robot name="r"><link name="a"/><link name="b"/></robot>').root == "base_link"
 
 
 def test_without_sub_assemblies_all_is_one_link(assemble: Fixture) -> None:
@@ -327,6 +327,14 @@ def test_an_origin_in_degrees_is_refused() -> None:
         link_map({"links": {"a": {"parts": ["x"], "origin": {"rpy": [0, 0, 90]}}}})
 
 
+def robot(parent: str, child: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> Urdf:
+    """Two links and the joint between them."""
+    joint = f'<parent link="{parent}"/><child link="{child}"/><origin xyz="{xyz}" rpy="{rpy}"/>'
+    return Urdf(
+        f'<robot><link name="{parent}"/><link name="{child}"/><joint>{joint}</joint></robot>'.encode()
+    )
+
+
 def far_frames(report: Any) -> list[str]:
     """The warnings about frames in another unit."""
     return [w.message for w in report.warnings if w.code == "frame_far"]
@@ -336,8 +344,11 @@ def test_a_urdf_in_millimetres_is_doubted(assemble: Fixture) -> None:
     """Joints at 120 m in an arm of half a metre; 0.12 m are fine, and so is a far assembly frame."""
     asm = assemble(("base/a", PART), ("arm/b", PART, placement((0, 0, 0.5))))
     for factor, doubted in ((1.0, False), (1000.0, True)):
-        frames = {"base": np.eye(4), "arm": placement((0, 0, 0.12 * factor))}
-        task = Task(load_materials(freecad=False), frame=FrameChoice.URDF, urdf_frames=frames)
+        task = Task(
+            load_materials(freecad=False),
+            frame=FrameChoice.URDF,
+            urdf=robot("base", "arm", f"0 0 {0.12 * factor}"),
+        )
         found = far_frames(calculate(asm, None, task))
         assert bool(found) == doubted
         assert not doubted or ("arm lies 119.5 m" in found[0] and "in mm?" in found[0])
@@ -347,21 +358,36 @@ def test_a_urdf_in_millimetres_is_doubted(assemble: Fixture) -> None:
     assert far_frames(calculate(asm, None, Task(load_materials(freecad=False), links=links)))
 
 
+def test_two_links_that_mean_one_word_keep_their_names(assemble: Any, compute: Any, codes: Any) -> None:
+    """Either may be the URDF's: both named like it would be one link, and the parts of the other lost."""
+    cube = box("a", 0.1, 0.1, 0.1)
+    alone = compute(assemble(("Arm link/a", cube)), "Name,Mass\na,1 kg\n", urdf=robot("base", "arm"))
+    assert list(alone.links) == ["arm"]
+    both = assemble(("Arm link/a", cube), ("ARM/a", cube))
+    report = compute(both, "Name,Mass\na,1 kg\n", urdf=robot("base", "arm"))
+    assert {name: link.props.mass for name, link in report.links.items()} == {"Arm link": 1.0, "ARM": 1.0}
+    assert codes(report).count("link_not_in_urdf") == 2
+
+
+def test_a_link_without_mass_need_not_be_in_the_urdf(assemble: Any, compute: Any, codes: Any) -> None:
+    """Nothing of it is lost; one with a mass is named."""
+    parts = assemble(("arm/a", box("a", 0.1, 0.1, 0.1)), ("marks/b", box("b", 0.1, 0.1, 0.1)))
+    for mass, told in (("0 kg*", 0), ("1 kg", 1)):
+        report = compute(parts, f"Name,Mass\na,1 kg\nb,{mass}\n", urdf=robot("base", "arm"))
+        assert codes(report).count("link_not_in_urdf") == told
+
+
 def test_a_urdf_in_degrees_is_doubted() -> None:
     """A joint turned by 90 rad; one by half a turn is none."""
-    joint = '<joint name="j"><origin rpy="0 0 {}"/><parent link="a"/><child link="b"/></joint>'
-    robot = "<robot name='r'><link name='a'/><link name='b'/>" + joint + "</robot>"
-    (found,) = frame_doubts(robot.format(90).encode(), "r.urdf")
+    (found,) = robot("a", "b", rpy="0 0 90").doubts
     assert "a → b" in found
     assert "rad" in found
-    assert frame_doubts(robot.format(3.1415927).encode()) == ()
+    assert robot("a", "b", rpy="0 0 3.1415927").doubts == ()
 
 
 def test_a_frame_that_only_turns_differs_as_well(assemble: Any, compute: Any, codes: Any) -> None:
     """At one origin, turned by a quarter: the tensor is another one."""
-    turned = np.eye(4)
-    turned[:2, :2] = [[0, -1], [1, 0]]
     asm = assemble(("l/a", box("a", 0.1, 0.2, 0.3)))
-    for frame, told in ((turned, True), (np.eye(4), False)):
-        report = compute(asm, "Name,Mass,Material\na,1 kg,\n", urdf_frames={"l": frame})
+    for rpy, told in (("0 0 1.5707963", True), ("0 0 0", False)):
+        report = compute(asm, "Name,Mass,Material\na,1 kg,\n", urdf=robot("root", "l", rpy=rpy))
         assert ("frame_differs" in codes(report)) is told

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from silo.inertia.names import Suggester, bare, could_be, plain
+from silo.inertia.matching import Suggester, bare, could_be, plain
 
 
 @pytest.mark.parametrize(

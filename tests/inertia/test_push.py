@@ -11,7 +11,8 @@ import pytest
 from bodies import box
 
 from silo.bom.errors import AuthError, NotFoundError, ServerFaultError, SiloError
-from silo.inertia.massrule import Options
+from silo.inertia.masses import Options
+from silo.inertia.model import Note
 from silo.inertia.output.push import describe, plan_push, push
 
 Fixture = Callable[..., Any]
@@ -76,6 +77,22 @@ def test_plan_holds_what_is_vouched_for(report: Any) -> None:
     ]
     assert plan.comment == "Mass properties from arm.step and bom.csv"
     assert describe(plan.items[1]) == "F01-0002  bolt: 0.008 kg, 1 cm³"
+
+
+@pytest.mark.parametrize("code", ["body_missing", "invalid_shape", "open_shell"])
+def test_a_doubt_about_the_whole_file_keeps_all_of_it_here(
+    code: str, assemble: Fixture, compute: Fixture
+) -> None:
+    """A body that no reader gave may be of any part: no part, sub-assembly or whole is sure."""
+    parts = (("l/s/a", box("plate", 0.1, 0.1, 0.01), None, "l/s/a"), ("l/b", box("bolt", 0.01, 0.01, 0.01)))
+    bom = HEAD + "F01-1,1,steel,,plate\nF01-2,1,,0.008 kg,bolt\nF01-3,1,,0.785 kg,s\n"
+    names = {"plate", "bolt", "s"}
+    assert {item.name for item in plan_push(compute(assemble(*parts), bom)).items} == names
+    doubted = assemble(*parts, problems=(Note(code, "something is missing"),))
+    plan = plan_push(compute(doubted, bom), top="F01-0")
+    assert plan.items == ()
+    reason = f"the whole file is in doubt ({code}), and so may be this part"
+    assert {s.name for s in plan.skipped if s.reason == reason} == names
 
 
 def test_push_keeps_other_properties_and_runs_once(report: Any) -> None:

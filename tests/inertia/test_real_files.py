@@ -15,8 +15,7 @@ from silo.inertia.calculator import read_geometry
 from silo.inertia.codes import Source
 from silo.inertia.geometry import ReadOptions
 from silo.inertia.model import Assembly, GeometryCode, leaf_products
-from silo.inertia.output.snippets import snippets
-from silo.inertia.output.values import writable
+from silo.inertia.output.text import snippets, writable
 
 Fixture = Callable[..., Any]
 FILES = (
@@ -142,7 +141,7 @@ def test_case_13_geometry_that_is_elsewhere(read: Callable[[str], Assembly], com
 
 def test_densities_of_the_file_are_used_when_asked(read: Callable[[str], Assembly], compute: Fixture) -> None:
     """dm1 states densities in lb/in³; so101_base names ABS with 1060 kg/m³."""
-    from silo.inertia.massrule import Options
+    from silo.inertia.masses import Options
 
     for name in ("dm1-id-214.stp", "so101_base.step"):
         assembly = read(name)

@@ -23,7 +23,7 @@ def cube(name: str, size: float = 0.01, **more: Any) -> Any:
 
 
 def _options(density: float, **more: Any) -> Any:
-    from silo.inertia.massrule import Options
+    from silo.inertia.masses import Options
 
     return Options(density, **more)
 
@@ -106,10 +106,10 @@ def test_without_a_bom(assemble: Fixture, compute: Fixture, codes: Fixture) -> N
 
 def test_reader_problems_reach_the_report(assemble: Fixture, compute: Fixture) -> None:
     """What the geometry reader noticed stands with link, part and code."""
-    from silo.inertia.model import GeometryCode, GeometryProblem
+    from silo.inertia.model import GeometryCode, Note
 
-    product = cube("x", problems=(GeometryProblem(GeometryCode.NEGATIVE_VOLUME, "was inside out"),))
-    asm = assemble(("l/x", product), problems=(GeometryProblem(GeometryCode.UNITS, "no unit stated"),))
+    product = cube("x", problems=(Note(GeometryCode.NEGATIVE_VOLUME, "was inside out"),))
+    asm = assemble(("l/x", product), problems=(Note(GeometryCode.UNITS, "no unit stated"),))
     report = compute(asm, HEAD + "1,1,,steel,,x\n")
     assert [(w.link_name, w.part_name, str(w.code)) for w in report.warnings] == [
         ("", "", "units"),

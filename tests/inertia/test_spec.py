@@ -115,3 +115,10 @@ def test_import_is_light() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_readers_load_without_the_kernel() -> None:
+    """FreeCAD has no OCP: the add-on imports the package of the readers there."""
+    code = "import sys; sys.modules['OCP'] = None; import silo.inertia.geometry.freecad.walk"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

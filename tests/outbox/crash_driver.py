@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """A program of its own: starts clients that commit, register and send, and kills each at a random moment.
 
-    crash_driver.py URL TOKEN FOLDER ROUNDS SEED
+    crash_driver.py URL TOKEN FOLDER ROUNDS SEED [damage]
 
 Two clients share one outbox at any time, as two FreeCADs do. Each is forked from this process, which has
 imported everything: most of a life is then spent in work that can be interrupted. At the end one more client,
@@ -23,7 +23,7 @@ from fcstd_writer import Doc
 from silo.api.client import SiloClient
 from silo.api.policy import Retries
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import propose
+from silo.bom.resolve import propose
 from silo.fcstd import stamp
 from silo.outbox.entry import Commit, State, new_key
 from silo.outbox.send import send_all
@@ -123,6 +123,24 @@ def born(url: str, token: str, folder: Path, seed: int) -> int:
     return pid
 
 
+def harm(folder: Path, chance: random.Random) -> None:
+    """Lose the database of the outbox between two lives, in any way."""
+    files = [*folder.glob("outbox.sqlite3*")]
+    match chance.randrange(4):
+        case 0:
+            for file in files:
+                file.unlink()
+        case 1:
+            for file in files:
+                file.write_bytes(b"")
+        case 2:
+            (folder / "outbox.sqlite3").write_bytes(b"no database " * 1000)
+        case _:
+            with (folder / "outbox.sqlite3").open("r+b") as file:
+                file.seek(4096)
+                file.write(chance.randbytes(8192))
+
+
 def main() -> None:
     url, token, folder = sys.argv[1], sys.argv[2], Path(sys.argv[3])
     rounds, seed = int(sys.argv[4]), int(sys.argv[5])
@@ -135,6 +153,8 @@ def main() -> None:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
             kills += 1
+        if "damage" in sys.argv and chance.random() < 0.5:
+            harm(folder, chance)
     last = Life(url, token, folder, chance)
     for path in sorted((folder / "new").glob("*.FCStd")):
         last.register(path)

@@ -6,13 +6,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from silo.api.address import canonical
-from silo.api.files import Origin
-from silo.api.revisions import other_name
+from silo.api.config import canonical
+from silo.api.files import Origin, other_name
 from silo.api.wire import Revision
 from silo.bom.errors import RejectedError, RouteMissingError, UnreachableError
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
@@ -283,7 +282,7 @@ def restored(vault: Vault, revision: int) -> None:
     stored = next(s for s in vault.silo.items.values() if s.item.part_number == vault.number)
     stored.revisions[:] = [one for one in stored.revisions if one.revision_number <= revision]
     stored.files = {number: file for number, file in stored.files.items() if number <= revision}
-    stored.uploads.clear()
+    vault.silo.answers.clear()
 
 
 def test_a_restored_server_gives_our_number_to_a_colleagues_file(vault: Vault) -> None:
@@ -295,6 +294,59 @@ def test_a_restored_server_gives_our_number_to_a_colleagues_file(vault: Vault) -
     vault.send()
     assert held(vault).newer["revision_number"] == 2
     assert vault.files() == [b"one", b"one less"]
+
+
+def test_a_server_that_was_set_back_gets_all_that_is_newer_by_one_press(vault: Vault) -> None:
+    """No colleague has committed anything: the newest revision there is an older one of ours."""
+    sent(vault, b"one", b"two", b"three")
+    restored(vault, 1)
+    mine(vault, b"four", b"three", bom=False)
+    mine(vault, b"five", b"four", bom=False)
+    vault.send()
+    assert [entry.state for entry in vault.waiting()] == [State.HELD] * 2
+    assert all(entry.reason.startswith("The server was set back: it has rev") for entry in vault.waiting())
+    vault.send()
+    assert len(vault.waiting()) == 2  # a person decides
+    vault.send(force=True)
+    assert (vault.waiting(), vault.files()) == ((), [b"one", b"four", b"five"])
+    assert not any("on top of" in r.comment for r in vault.silo.revisions(vault.number))
+
+
+def test_after_a_set_back_a_colleagues_commit_is_a_question_all_the_same(vault: Vault) -> None:
+    """Retry all does not send over it."""
+    sent(vault, b"one", b"two")
+    restored(vault, 1)
+    mine(vault, b"three", b"two", bom=False)
+    vault.send()
+    theirs(vault, b"one less", 1)
+    vault.send(force=True)
+    vault.send(force=True)
+    assert held(vault).newer["created_by"] == "alice"
+    assert vault.files() == [b"one", b"one less"]
+
+
+def test_a_bom_whose_revision_number_came_meanwhile_has_another_name(vault: Vault) -> None:
+    """A server answers 409 to a name that it knows with another content."""
+    merges: list[Any] = []
+    merge, answers = vault.silo.merge_bom, iter((UnreachableError("the answer was lost"), None))
+
+    def merge_bom(number: str, request: Any, **more: Any) -> Any:
+        merges.append(request)
+        answer = merge(number, request, **more)
+        if error := next(answers, None):
+            raise error
+        return answer
+
+    vault.silo.merge_bom = merge_bom  # type: ignore[method-assign]
+    vault.commit(vault.snapshot(vault.part("Bolt", 1)))
+    vault.send()
+    (waiting,) = vault.waiting()
+    vault.outbox.update(waiting.id, revision=7)  # as after a restore, when its file was sent once more
+    stored = next(s for s in vault.silo.items.values() if s.item.part_number == vault.number)
+    stored.revisions[-1] = stored.revisions[-1].model_copy(update={"revision_number": 7})
+    vault.send(force=True)
+    assert [one.document.revision for one in merges] == [1, 7]
+    assert merges[0].sync_id == waiting.key != merges[1].sync_id
 
 
 def test_our_own_upload_to_a_restored_server_is_no_colleagues(vault: Vault) -> None:
@@ -492,8 +544,7 @@ def test_a_server_without_revisions_gets_the_file_once(vault: Vault) -> None:
     silo.__class__ = Bare
     once(vault, "merge_bom", refuse)
     vault.send()
-    for stored in silo.items.values():
-        stored.uploads.clear()  # nor does it know a repeat
+    silo.answers.clear()  # nor does it know a repeat
     vault.outbox.retry(entry.id)
     vault.send()
     silo.__class__ = FakeSilo

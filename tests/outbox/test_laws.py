@@ -19,6 +19,7 @@ from silo.outbox.entry import Commit, Entry, State, new_key
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
+from vault import died
 
 
 class Killed(BaseException):
@@ -171,6 +172,7 @@ def test_each_commit_arrives_once_and_in_order(actions: list[Any], drawn: list[s
                 store.finish(key)
             except Killed:
                 event("killed")
+                died(store)
             if is_staged:
                 # stage() returned, so from here on the commit may not be lost.
                 expected[item] += [f"file {step}"] if with_file else []
@@ -183,10 +185,13 @@ def test_each_commit_arrives_once_and_in_order(actions: list[Any], drawn: list[s
                     break
                 sending(store, silo)
             except Killed:
+                died(store)
                 continue
         assert {item: arrived(silo, item) for item in expected} == expected
         left = {MergeRequest.model_validate_json(store.bom(e.id)[1]).sync_id for e in store.entries()}
         assert left == refused
         store.fate = Fate([])
         store.sweep()
-        assert {path.name for path in store.copies.iterdir()} == {e.copy for e in store.entries() if e.copy}
+        assert {path.name for path in store.copies.iterdir()} == {
+            name for e in store.entries() for name in (e.copy, f"{e.key}.json") if name
+        }

@@ -29,8 +29,7 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.outbox.entry import Commit, Entry, State
-from silo.outbox.report import Report, Sent
-from silo.outbox.send import send_all
+from silo.outbox.send import Report, Sent, send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
 
@@ -179,26 +178,6 @@ def test_nobody_else_can_read_it(outbox: Outbox, model: Path) -> None:
     for path in (*found, *copies):
         assert path.stat().st_mode & 0o077 == 0, path
     reader.close()
-
-
-def test_a_newer_outbox_is_not_touched(outbox: Outbox) -> None:
-    """Two versions of the add-on on one computer."""
-    outbox.entries()
-    db = sqlite3.connect(outbox.path)
-    db.execute("PRAGMA user_version = 99")
-    db.close()
-    with pytest.raises(InputError, match="another version of silo-mod"):
-        Outbox(outbox.path).entries()
-
-
-def test_what_is_no_outbox_is_reported(tmp_path: Path) -> None:
-    """Plain words, and the file stays as it is."""
-    path = tmp_path / "outbox.sqlite3"
-    path.write_bytes(b"no database at all, but long enough to be looked at" * 20)
-    before = path.read_bytes()
-    with pytest.raises(InputError, match="cannot be used"):
-        Outbox(path).entries()
-    assert path.read_bytes() == before
 
 
 def test_the_default_place_is_the_users_data_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -392,13 +371,19 @@ def test_pauses_grow_and_keep_the_order(outbox: Outbox, silo: FakeSilo, clock: C
     outbox.put(silo.base_url, OTHER, bom=bom(9))
     fail(silo, "merge_bom", ServerFaultError("500"), times=1)
     report = outbox.send(silo)
-    assert [e.next_attempt - clock.now for e in report.failed] == [10]
+
+    def left() -> float:
+        pause = outbox.pause(silo.base_url, TOP.casefold())
+        assert pause is not None
+        return pause.left(clock.now)
+
+    assert ([e.reason for e in report.failed], left()) == (["500"], 10)
     assert (log_of(silo, TOP), log_of(silo, OTHER), outbox.waiting()) == ([], ["9"], 2)
     clock.now += 9
     assert outbox.send(silo).sent == []
     fail(silo, "merge_bom", ServerFaultError("500"), times=1)
     clock.now += 1
-    assert [e.next_attempt - clock.now for e in outbox.send(silo).failed] == [20]
+    assert (len(outbox.send(silo).failed), left()) == (1, 20)
     assert len(outbox.send(silo, force=True).sent) == 2
     assert log_of(silo, TOP) == ["1", "2"]
 
@@ -407,13 +392,18 @@ def test_pauses_grow_and_keep_the_order(outbox: Outbox, silo: FakeSilo, clock: C
     "error", [ReadOnlyError("maintenance"), AuthError("who are you")], ids=["read-only", "wrong token"]
 )
 def test_what_concerns_all_ends_the_run(outbox: Outbox, silo: FakeSilo, error: SiloError) -> None:
-    """Nothing is rejected for it; the reason is on the entry and in the report."""
+    """It is no entry's fault: its reason is the server's pause, and nothing is asked before that ends."""
     outbox.put(silo.base_url, TOP, bom=bom(1))
     outbox.put(silo.base_url, OTHER, bom=bom(2))
     fail(silo, "merge_bom", error, times=99)
     report = outbox.send(silo)
     assert report.stopped_by is error
-    assert (outbox.waiting(), len(report.failed), report.held) == (2, 1, [])
+    assert (outbox.waiting(), report.failed, report.held) == (2, [], [])
+    assert [entry.reason for entry in outbox.entries()] == ["", ""]
+    assert report.pause is not None
+    assert (report.pause.reason, report.pause.code) == (str(error), error.code)
+    silo.before = lambda name: pytest.fail(f"{name} was asked in a pause")
+    assert outbox.send(silo).pause == report.pause
     silo.before = lambda name: None
     assert len(outbox.send(silo, force=True).sent) == 2
 
@@ -491,13 +481,17 @@ def test_many_senders_at_once_send_each_entry_once(outbox: Outbox, silo: FakeSil
     assert log_of(silo, TOP) == [str(n) for n in range(1, 21)]
 
 
-def test_files_without_a_row_are_swept_up(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
-    """A row is there before its files, so what has none is what a crash left: no clock is asked."""
+def test_a_copy_without_a_row_is_in_view(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
+    """It may be a commit that nobody has sent; what was cut off has no name of its own and is none."""
     entry = outbox.put("http://elsewhere", TOP, file=model)
-    for name in ("gone.FCStd", ".gone.FCStd.x1.part", f"{entry.key}.FCStd"):
+    for name in ("found.FCStd", ".cut.FCStd.x1.part", f"{entry.key}.FCStd", "ended.FCStd", "ended.gone"):
         (outbox.copies / name).write_bytes(b"x")
     outbox.send(silo)
-    assert {p.name for p in outbox.copies.iterdir()} == {entry.copy}
+    assert [(one.key, one.state) for one in outbox.entries()] == [
+        (entry.key, State.WAITING),
+        ("found", State.HELD),
+    ]
+    assert {p.name.split(".")[0] for p in outbox.copies.iterdir()} == {entry.key, "found"}
 
 
 # -- over HTTP ----------------------------------------------------------------------------------------------

@@ -6,10 +6,14 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import shutil
+import sqlite3
 import stat
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,16 +21,16 @@ from typing import Any
 import pytest
 from other_disk import other_disk
 
-from silo.api.revisions import standing
+from silo.api.files import standing
 from silo.api.wire import Revision
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
-from silo.durable import replacing, stamp_of
-from silo.outbox.database import OutboxError
-from silo.outbox.entry import Commit, State, new_key
+from silo.outbox.entry import Commit, Entry, State, new_key
 from silo.outbox.send import send_all
-from silo.outbox.store import Store, seen
+from silo.outbox.store import VERSION, OutboxError, Store, seen
+from silo.platform import replacing, stamp_of
 from silo.testing import FakeSilo
+from vault import died
 
 
 @pytest.fixture(name="store")
@@ -103,6 +107,7 @@ def test_killed_before_the_copy_was_made(store: Store, document: Path) -> None:
     held = store.hold(str(document), key)
     store.stage(commit(document, key, held))
     document.unlink()
+    died(store)
     after = Store(store.path)
     assert [entry.state for entry in after.entries()] == [State.KEEPING]
     send_all(after, FakeSilo())
@@ -114,6 +119,7 @@ def test_killed_before_the_copy_was_made(store: Store, document: Path) -> None:
 def test_killed_without_a_second_name(store: Store, document: Path) -> None:
     """What the document says by then may be another thing: a person is asked, and nothing is sent."""
     store.stage(commit(document))
+    died(store)
     after = Store(store.path)
     send_all(after, FakeSilo())
     (entry,) = after.entries()
@@ -140,13 +146,240 @@ def test_sweeping_leaves_a_copy_that_is_being_made(store: Store, document: Path)
     with replacing(store.copies / f"{made.key}.FCStd") as file:
         file.write(b"half")
         store.sweep()
-    (copy,) = store.copies.iterdir()
+    (copy,) = store.copies.glob("*.FCStd")
     copy.rename(store.copies / f".{made.key}.FCStd.killed.part")
     store.sweep()
     assert [*store.copies.iterdir()]
     (entry,) = store.entries()
     store.discard(entry.id)
     assert [*store.copies.iterdir()] == []
+
+
+def database(store: Store) -> list[Path]:
+    return [file for file in store.path.parent.glob(f"{store.path.name}*") if file.is_file()]
+
+
+def rewritten(store: Store, write: Callable[[Path], object]) -> None:
+    """The database as a whole file with another content."""
+    with closing(sqlite3.connect(store.path)) as db:
+        db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        db.execute("PRAGMA journal_mode = DELETE")
+    write(store.path)
+
+
+def foreign(path: Path) -> None:
+    path.unlink()
+    with closing(sqlite3.connect(path)) as db:
+        db.execute("CREATE TABLE entry (id INTEGER, photo BLOB)")
+        db.execute(f"PRAGMA user_version = {VERSION}")
+        db.execute("INSERT INTO entry VALUES (1, 'x')")
+        db.commit()
+
+
+def half_read(path: Path) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[:4096] + b"\xff" * (len(content) - 4096))
+
+
+def of_format(version: int, *, described: bool) -> Callable[[Store], None]:
+    """Make a database of another format, as another version of silo-mod wrote it."""
+
+    def make(store: Store) -> None:
+        with closing(sqlite3.connect(store.path)) as db:
+            if version < 8:
+                db.execute("DROP TABLE pause")
+                db.execute("ALTER TABLE entry ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0")
+            if version > VERSION:
+                db.execute("ALTER TABLE entry ADD COLUMN mood TEXT NOT NULL DEFAULT 'fine'")
+            elif version < 6:
+                db.execute("ALTER TABLE entry DROP COLUMN renamed")
+                db.execute("DROP TABLE known")
+            db.execute(f"PRAGMA user_version = {version}")
+            db.commit()
+        if not described:
+            for file in store.copies.glob("*.json"):
+                file.unlink()
+
+    return make
+
+
+DAMAGES: dict[str, Callable[[Store], object]] = {
+    "deleted": lambda store: [file.unlink() for file in database(store)],
+    "emptied": lambda store: [file.write_bytes(b"") for file in database(store)],
+    "moved away": lambda store: [file.rename(f"{file}.bad") for file in database(store)],
+    "a text": lambda store: rewritten(store, lambda path: path.write_text("not a database at all" * 999)),
+    "another program's": lambda store: rewritten(store, foreign),
+    "cut off": lambda store: rewritten(store, lambda path: os.truncate(path, 5000)),
+    "damaged pages": lambda store: rewritten(store, half_read),
+    "format 5": of_format(5, described=False),
+    "format 6": of_format(6, described=False),
+    "format 7": of_format(7, described=True),
+    "a newer format": of_format(VERSION + 1, described=True),
+}
+REMEDIES: dict[str, Callable[[Store], object]] = {
+    "nothing": lambda _store: None,
+    "moved away": lambda store: [file.rename(f"{file}.bad") for file in database(store)],
+    "deleted": lambda store: [file.unlink() for file in database(store)],
+}
+
+
+@pytest.mark.parametrize("running", [False, True], ids=["restarted", "while it runs"])
+@pytest.mark.parametrize("remedy", REMEDIES)
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_lost_database_costs_no_commit(
+    store: Store, document: Path, damage: str, remedy: str, *, running: bool
+) -> None:
+    """Whatever was promised is in Silo once or in view, whatever a person does to the file."""
+    silo = FakeSilo()
+    bolt = silo.create_item("kindred-rd", "F01", "Bolt")
+    made: dict[str, Commit] = {}
+    for number, name in enumerate(("Waiting", "Held", "Staged", "Second")):
+        item = silo.create_item("kindred-rd", "A01", name)
+        path = document.with_name(f"{name}.FCStd")
+        path.write_bytes(name.encode())
+        head = BomEntry(str(path), silo_uuid=item.id, is_assembly=True)
+        lines = (BomEntry("/v/Bolt.FCStd", silo_uuid=bolt.id, quantity=number + 1),)
+        one = Commit(
+            *(str(path), float(number), name, item.id),
+            file=path,
+            comment=f"why {name}",
+            extraction=Extraction(head, lines),
+        )
+        if name == "Staged":
+            one = replace(one, file=store.hold(str(path), one.key))
+        store.stage(one, silo.base_url)
+        if name != "Staged":
+            store.finish(one.key, path)
+        made[name] = one
+    held = store.by_key(made["Held"].key)
+    assert held is not None
+    store.update(held.id, state=State.HELD, reason="a person looks")
+    died(store)
+    before = {entry.key: entry for entry in store.entries()}
+    DAMAGES[damage](store)
+    REMEDIES[remedy](store)
+    after = store if running else Store(store.path)
+    if running and damage in ("another program's", "cut off", "damaged pages"):
+        with suppress(OutboxError):  # said once; the next call makes it anew
+            after.entries()
+    told = {entry.key: entry for entry in after.entries()}
+    lost_all = damage in ("format 5", "format 6") and remedy != "nothing"
+    if lost_all:  # those formats had no descriptions; the copies that were made are in view
+        assert {key: entry.state for key, entry in told.items()} == {
+            one.key: State.HELD for name, one in made.items() if name != "Staged"
+        }
+        assert all("Save a copy and commit it again" in entry.reason for entry in told.values())
+        return
+    assert told == before
+    after.retry(told[held.key].id)
+    assert send_all(after, silo).held == []
+    assert after.entries() == ()
+    for item in silo.search_items():
+        if item.name != "Bolt":
+            (revision,) = [one for one in silo.revisions(item.part_number) if one.file_name]
+            assert revision.comment == f"why {item.name}"
+            assert [line.quantity for line in silo.get_bom(item.part_number)] == [
+                list(made).index(item.name) + 1
+            ]
+    after.sweep()
+    assert [*after.copies.iterdir()] == []
+    # What was there is kept, and nothing comes back with it.
+    for file in database(after):
+        file.unlink()
+    assert Store(store.path).entries() == ()
+
+
+def test_a_description_that_is_lost_with_the_database_is_in_view(store: Store, document: Path) -> None:
+    """Two things are damaged at once: its copy is what can be saved, and a person is asked."""
+    for number, damage in enumerate((Path.unlink, lambda path: path.write_bytes(b"{half"))):
+        entry = store.add(commit(document))
+        for file in database(store):
+            file.unlink()
+        damage(store.copies / f"{entry.key}.json")
+        (found,) = [one for one in Store(store.path).entries() if one.key == entry.key]
+        assert (found.state, "Save a copy" in found.reason, found.file_left) == (State.HELD, True, True)
+        target = document.with_name(f"saved {number}.FCStd")
+        store.save_copy(found.id, target)
+        assert target.read_bytes() == b"first"
+        store.retry(found.id)  # without an item it cannot be sent, and stays in view
+        assert [one.key for one in send_all(store, FakeSilo(), force=True).held] == [entry.key]
+        store.discard(found.id)
+        assert [*store.copies.iterdir()] == []
+
+
+def test_what_ended_does_not_come_back(store: Store, document: Path) -> None:
+    """Killed after the mark that a commit has ended, before its row and its copy are gone."""
+    entry = store.add(commit(document))
+    store._described(entry.key).rename(store.copies / f"{entry.key}.gone")
+    after = Store(store.path)
+    after.sweep()
+    assert (after.entries(), [*after.copies.iterdir()]) == ((), [])
+
+
+def test_a_commit_that_ends_while_the_database_is_made_is_no_lost_one(
+    store: Store, document: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another program still has the old file open, and its answer has just arrived."""
+    entry = store.add(commit(document))
+    for file in database(store):
+        file.unlink()
+
+    def read(path: Path) -> dict[str, Any]:
+        path.rename(path.with_suffix(".gone"))
+        return {}
+
+    monkeypatch.setattr("silo.outbox.store.read_memory", read)
+    after = Store(store.path)
+    assert after.entries() == ()
+    after.sweep()
+    assert [*after.copies.iterdir()] == [], entry.key
+
+
+def test_a_commit_that_comes_while_another_program_sweeps_is_kept(
+    store: Store, document: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between its look at the rows and its removal of what has ended."""
+    store.add(commit(document))
+    other, made = Store(store.path), commit(document)
+    forget = Store.forget_aside
+
+    def late(self: Store) -> None:
+        if self is store:
+            other.add(made)
+        forget(self)
+
+    monkeypatch.setattr(Store, "forget_aside", late)
+    store.sweep()
+    entry = store.by_key(made.key)
+    assert entry is not None
+    assert (store.copies / entry.copy).read_bytes() == b"first"
+    assert store._described(made.key).exists()
+
+
+def test_a_description_is_its_row(store: Store, document: Path) -> None:
+    """After each change: else a rebuilt queue would send what has arrived, or to another server."""
+    entry = store.add(commit(document))
+
+    def described() -> Entry | None:
+        copy = store.path.with_name("copy")
+        shutil.rmtree(copy, ignore_errors=True)
+        shutil.copytree(store.copies, copy / "outbox-files")
+        return Store(copy / "outbox.sqlite3").by_key(entry.key)
+
+    def sent_without_bom() -> None:
+        now = store.entry(entry.id)
+        assert now is not None
+        store.arrived(now, "file", 4)
+
+    for change in (
+        lambda: None,
+        lambda: store.update(entry.id, server="http://there", base_revision=3, part_number="A01-0001"),
+        sent_without_bom,
+        lambda: store.update(entry.id, state=State.HELD, reason="why"),
+        lambda: store.retry(entry.id, server="http://elsewhere"),
+    ):
+        change()
+        assert described() == store.by_key(entry.key)
 
 
 class Moody(Store):
@@ -383,7 +616,8 @@ def test_a_second_name_that_is_written_to_in_place_is_no_commit(store: Store, do
     held = store.hold(str(document), made.key)
     store.stage(replace(made, file=held, stamp=stamp_of(document)))
     document.write_bytes(b"a colleague's, by cp")
-    again = Store(store.path)  # as after a restart of FreeCAD
+    died(store)
+    again = Store(store.path)
     assert again.finish(made.key) == ""
     (entry,) = again.entries()
     assert (entry.state, entry.sha256) == (State.HELD, "")

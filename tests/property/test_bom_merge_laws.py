@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom import BomEntry, apply_merge, diff_bom, plan_merge, resolve_part_numbers
-from silo.bom.diff import same_quantity
-from silo.bom.merge import summary
+from silo.bom.compare import same_quantity, summary
 from silo.bom.resolve import merge_lines
 
 NUMBERS = ("PRT-100", "ASM-200", "F01-0001", "F01-0002", "glue", "Ü-1")
@@ -50,6 +49,7 @@ def bom_lines(
     ):
         line: dict[str, Any] = {"child_part_number": number, "quantity": draw(told | st.none())}
         line["notes"] = draw(st.text(max_size=5))
+        line["unit"] = draw(st.sampled_from([None, None, "", "pcs", "m", "box"]))
         if rel_type is not None:
             line["rel_type"] = rel_type
         if source is not None:
@@ -61,8 +61,9 @@ def bom_lines(
 
 
 def belongs_to_people(line: dict[str, Any]) -> bool:
-    """The rule, written a second time: an assembly owns what is a component and says assembly or nothing."""
-    return line.get("rel_type") in ("alternate", "reference") or line.get("source") in ("manual", "erp")
+    """The rule, written a second time: an assembly owns pieces of a component, with its own name or none."""
+    by_hand = line.get("rel_type") in ("alternate", "reference") or line.get("source") in ("manual", "erp")
+    return by_hand or line.get("unit") in ("m", "box")
 
 
 def merge(wanted: Any, lines: list[dict[str, Any]], when: str = "now") -> list[dict[str, Any]]:

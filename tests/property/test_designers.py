@@ -27,11 +27,9 @@ from desk import Desk, Document, Documents, Office, Silo
 from silo.bom.errors import SiloError, UnreachableError
 from silo.outbox.entry import Entry, State
 from silo.outbox.store import Store
-from silo.workbench.commit.desk import Answer, Look
-from silo.workbench.commit.flow import CommitFlow
+from silo.workbench.commit.flow import Answer, Choice, CommitFlow, Look, Theirs, of_held
 from silo.workbench.commit.opened import Base, Opened
 from silo.workbench.commit.plan import Plan, Row
-from silo.workbench.commit.theirs import Choice, Theirs, of_held
 from silo.workbench.revisions.flow import RevisionFlow
 from silo.workbench.session.session import Session
 

@@ -26,16 +26,14 @@ from hypothesis.stateful import (
 from server_testing import Databases, merge_body
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
-from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
-from silo_server.errors import DuplicateError
-from silo_server.services.bom import edits, history
+from silo_server.run import prepare
+from silo_server.services.bom import history, review
 from silo_server.services.bom.lines import lines_of
-from silo_server.services.bom.merge import merge_bom, preview_merge
-from silo_server.services.bom.merge_json import read_merge_order
+from silo_server.services.bom.merge import merge_bom, preview_merge, read_merge_order
 from silo_server.services.bom.review import Action, Decision, open_conflicts, resolve
 from silo_server.services.items import NewItem, create_item, get_item
-from silo_server.settings import Settings
+from silo_server.settings import DuplicateError, Settings
 from silo_server.values import Actor, LineState, Role
 
 PARTS = ["P-1", "P-2", "P-3", "P-4", "P-5"]
@@ -125,9 +123,9 @@ class Silo(RuleBasedStateMachine):
         before = copy.deepcopy(self.model)
         if number in self.model:
             with pytest.raises(DuplicateError):
-                self.do(who, lambda tx: edits.add_line(tx, self.parent, number, new))
+                self.do(who, lambda tx: review.add_line(tx, self.parent, number, new))
             return
-        self.do(who, lambda tx: edits.add_line(tx, self.parent, number, new))
+        self.do(who, lambda tx: review.add_line(tx, self.parent, number, new))
         self.model[number] = new_line(amount, "manual")
         self.changed(before)
 
@@ -138,7 +136,7 @@ class Silo(RuleBasedStateMachine):
         expected = self.version - 1 if stale else self.version
 
         def change(tx: Any) -> Any:
-            return edits.change_line(tx, self.parent, number, {"quantity": amount}, expected)
+            return review.change_line(tx, self.parent, number, {"quantity": amount}, expected)
 
         if stale or number not in self.model:
             with pytest.raises(VersionConflictError if stale else NotFoundError):
@@ -161,9 +159,9 @@ class Silo(RuleBasedStateMachine):
         before = copy.deepcopy(self.model)
         if number not in self.model:
             with pytest.raises(NotFoundError):
-                self.do(who, lambda tx: edits.remove_line(tx, self.parent, number))
+                self.do(who, lambda tx: review.remove_line(tx, self.parent, number))
             return
-        self.do(who, lambda tx: edits.remove_line(tx, self.parent, number))
+        self.do(who, lambda tx: review.remove_line(tx, self.parent, number))
         del self.model[number]
         self.changed(before)
 

@@ -10,7 +10,7 @@ from fcstd_writer import part
 from silo.api.wire import Item
 from silo.bom.errors import RejectedError
 from silo.bom.model import BomEntry
-from silo.bom.naming import propose
+from silo.bom.resolve import propose
 from silo.registering.items import Registration
 from silo.registering.journal import Journal
 from silo.registering.modelled import Modelled

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
 from silo.bom.model import BomEntry
-from silo.bom.naming import Proposal
-from silo.registering.offer import Candidate, Offer, State
+from silo.bom.resolve import Proposal
+from silo.registering.offer import Candidate, Contents, Offer, State
 from silo.registering.table import read_table, write_table
 
 CATEGORIES = {"M01": "Machined part"}
@@ -127,3 +127,20 @@ def test_a_name_comes_back_as_it_was_written(name: str) -> None:
     one = candidate(name)
     (row,) = read_table(write_table(Offer((one,), CATEGORIES), lambda _: True, "/v"), "plan.csv")
     assert row.cells["name"] == name.strip()
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.sampled_from(["", "1", "2"])), max_size=8))
+def test_the_twin_of_a_file_is_the_first_other_file_with_its_content(files: list[tuple[str, str]]) -> None:
+    """Several candidates of one file are no twins; what has no content is like nothing."""
+    found = [
+        Candidate(
+            Proposal(BomEntry(path, object_name=str(n)), str(n), "part", "M01"), State.READY, sha256=sha
+        )
+        for n, (path, sha) in enumerate(files)
+    ]
+    contents = Contents()
+    for one in found:
+        contents.add(one)
+    for one in found:
+        others = [c for c in found if one.sha256 == c.sha256 != "" and c.entry.doc_path != one.entry.doc_path]
+        assert contents.twin(one) is (others[0] if others else None)

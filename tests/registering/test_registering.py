@@ -13,10 +13,10 @@ import pytest
 from silo.bom.errors import ServerFaultError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Categories
+from silo.bom.resolve import Categories
 from silo.registering.offer import Candidate, Offer, Seen, State, offer
 from silo.testing import FakeSilo
-from silo.workbench.register.rows import EditedRow
+from silo.workbench.register.flow import EditedRow
 from silo.workbench.session.jobs import Control
 
 CONTROL = Control(lambda _detail, _fraction: None)
@@ -159,7 +159,7 @@ def test_a_guessed_category_is_not_checked(tmp_path: Path) -> None:
 def test_two_files_of_one_content_are_reported_together(tmp_path: Path) -> None:
     """Nobody wants two numbers for one part by accident."""
     found = offered(FakeSilo(), tmp_path, part(tmp_path, "A", b"x"), part(tmp_path, "B", b"x"))
-    assert (found["A"].twins, found["B"].twins) == (("B",), ("A",))
+    assert (found["A"].twin, found["B"].twin) == ("B", "A")
 
 
 def test_a_copied_identity_is_offered_for_each_of_its_files(tmp_path: Path) -> None:

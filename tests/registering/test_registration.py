@@ -28,7 +28,7 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.bom.model import BomEntry
-from silo.bom.naming import propose
+from silo.bom.resolve import propose
 from silo.fcstd import Library, stamp
 from silo.registering.items import REGISTRATION_PROPERTY, component_key, register
 from silo.registering.journal import Journal
@@ -341,3 +341,13 @@ def test_a_turn_that_never_ends_is_reported(journal: Journal) -> None:
     impatient = Journal(journal.path, patience=0.05)
     with journal.turn(), pytest.raises(InputError, match="another registration"), impatient.turn():
         pass
+
+
+def test_a_slow_server_holds_nobody_up_at_another(tmp_path: Path) -> None:
+    """Each server has a turn of its own; two projects at one server take turns."""
+    journal, other = (Journal(tmp_path / "registrations", patience=0.0) for _ in range(2))
+    with journal.turn("http://slow"):
+        with other.turn("http://healthy"):
+            pass
+        with pytest.raises(InputError, match="another registration runs"), other.turn("http://slow"):
+            pass

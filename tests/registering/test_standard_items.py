@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Proposal, crowded_files
+from silo.bom.resolve import Proposal, crowded_files
 from silo.bom.walk.standard import standard_uuid
 from silo.bom_sync import resolve
 from silo.registering.items import register_standard

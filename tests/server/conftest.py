@@ -10,9 +10,8 @@ import pytest
 from server_testing import Api, Databases
 from web_visitor import Visitor, visitors_of
 
-from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
-from silo_server.run import RunningServer, running_server
+from silo_server.run import RunningServer, prepare, running_server
 from silo_server.settings import Settings
 
 TOKEN = "silo_pages"

@@ -19,16 +19,13 @@ from server_testing import Api, bom
 import silo_server
 from silo.bom.errors import BusyError, RejectedError
 from silo.bom.headers import Role
-from silo_server.db.bulk import insert_rows
-from silo_server.db.engine import Database
+from silo_server.db.engine import Database, Turnstile, insert_rows
 from silo_server.db.tables import bom_lines, items
-from silo_server.errors import TooLargeError
 from silo_server.run import running_server
-from silo_server.services.bom import imports, tree
+from silo_server.services.bom import transfer, tree
 from silo_server.services.bom.lines import state_columns
 from silo_server.services.items import NewItem, create_item, get_item
-from silo_server.settings import Settings
-from silo_server.turnstile import Turnstile
+from silo_server.settings import Settings, TooLargeError
 from silo_server.values import LineState
 
 PARENTS = 66_000  # more than PostgreSQL takes as parameters of one statement
@@ -136,18 +133,18 @@ def test_a_structure_that_would_fill_the_memory_is_not_read(url: str, tmp_path: 
 def test_a_file_that_breaks_off_shows_what_can_be_read_of_it() -> None:
     """A quote too many in one row: the person sees the header, and can say which column is which."""
     data = b'Part number,Quantity\nA,1\n"B" x,2\n'
-    assert imports.first_lines(data, ",") == [["Part number", "Quantity"], ["A", "1"]]
+    assert transfer.first_lines(data, ",") == [["Part number", "Quantity"], ["A", "1"]]
 
 
 def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
     """The header is looked for near the top; what stands at the end of such a file does not matter."""
     rows = b"a;b,c\td\n" * 5000
     with pytest.raises(RejectedError, match="found none"):
-        imports.read_csv(rows + b'"never closed', 20_000)
+        transfer.read_csv(rows + b'"never closed', 20_000)
     with pytest.raises(TooLargeError):
-        imports.read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
-    late = b"x\n" * (imports.HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
-    assert imports.read_csv(late, 20)[0][1]["part_number"] == "A"
+        transfer.read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
+    late = b"x\n" * (transfer.HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
+    assert transfer.read_csv(late, 20)[0][1]["part_number"] == "A"
 
 
 @pytest.mark.parametrize(
@@ -165,12 +162,12 @@ def test_two_columns_of_one_meaning_that_differ_are_refused(
     """Neither is taken in silence; a person's choice of columns is, and so is what says the same twice."""
     data = f"A title\n{header}\n{differ}\n".encode()
     with pytest.raises(RejectedError, match=r"both mean the .* in row 3 they say") as caught:
-        imports.read_csv(data, 20)
+        transfer.read_csv(data, 20)
     assert len(caught.value.problems) == 1
-    layout = imports.Layout(",", 1, {Role.PART_NUMBER: 0, Role.QUANTITY: 1})
-    assert imports.read_csv(data, 20, layout)[0][1]["part_number"] == "A"
+    layout = transfer.Layout(",", 1, {Role.PART_NUMBER: 0, Role.QUANTITY: 1})
+    assert transfer.read_csv(data, 20, layout)[0][1]["part_number"] == "A"
     for row in agree:
-        assert len(imports.read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1
+        assert len(transfer.read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1
 
 
 def test_guesses_that_come_at_once_are_all_counted(url: str, tmp_path: Path) -> None:
@@ -296,6 +293,28 @@ def test_every_answer_is_written_before_the_commit() -> None:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and (said := returned_late(node))
     }
     assert late == {}
+
+
+def test_every_cursor_of_the_database_is_closed_by_its_reader() -> None:
+    """Rows read in portions keep a cursor open on the server; a reader that stops early leaves no open cursor."""
+
+    def in_portions(node: ast.AST) -> bool:
+        return isinstance(node, ast.Call) and "yield_per" in {
+            key.value
+            for word in node.keywords
+            if word.arg == "execution_options" and isinstance(word.value, ast.Dict)
+            for key in word.value.keys
+            if isinstance(key, ast.Constant)
+        }
+
+    found = 0
+    for path in Path(silo_server.__file__).parent.rglob("*.py"):
+        nodes = list(ast.walk(ast.parse(path.read_text())))
+        closed = {item.context_expr for node in nodes if isinstance(node, ast.With) for item in node.items}
+        for node in filter(in_portions, nodes):
+            found += 1
+            assert node in closed, f"{path.name}: {ast.unparse(node)}"
+    assert found >= 5
 
 
 def test_an_export_is_whole_and_says_its_length(url: str, tmp_path: Path) -> None:

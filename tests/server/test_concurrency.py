@@ -60,8 +60,8 @@ def test_fifty_clients_on_one_bom(url: str, tmp_path: Path) -> None:
     """Every edit is there at the end, every quantity was somebody's, versions have no gap."""
     workers = 2 if url.startswith("postgres") else 1
     with (
-        ServerProcess(url, tmp_path, "silo_crowd", workers=workers) as server,
-        Api(server.base_url, "silo_crowd") as api,
+        ServerProcess(url, tmp_path, "silo_crowd_0123456789abcdef", workers=workers) as server,
+        Api(server.base_url, "silo_crowd_0123456789abcdef") as api,
     ):
         crowd = Crowd(api)
         crowd.parts = api.items(10)

@@ -3,25 +3,30 @@
 
 from __future__ import annotations
 
+import http.client
+import itertools
 import json
 import os
 import re
 import shutil
 import signal
+import ssl
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from server_testing import Api, reserved_port, wait_until
 
 from silo.cli.main import build_parser
-from silo_server.run import running_server
+from silo_server.run import RunningServer, running_server
 from silo_server.settings import _ENVIRONMENT, Settings
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 NIGHT = DEPLOY.parent / "examples" / "night"
+CONTAINER = (DEPLOY / "Containerfile").read_text("utf-8")
 TOKEN = "silo_deploy"
 OTHER = {"SILO_API_TOKEN", "SILO_DB_PASSWORD"}
 
@@ -46,6 +51,15 @@ def test_the_units_call_commands_that_there_are(unit: Path) -> None:
     assert args.command in ("serve", "backup", "sync")
 
 
+def test_the_image_copies_all_that_its_package_is_built_from() -> None:
+    """What pyproject.toml and setup.py read; examples and docs are not needed in an image."""
+    copied = set(re.findall(r"[\w.]+", " ".join(re.findall(r"^COPY (.*) /src/", CONTAINER, re.MULTILINE))))
+    setup = (DEPLOY.parent / "setup.py").read_text("utf-8")
+    read = set(re.findall(r'"([\w.]+\.(?:py|xml|md)|LICENSE)"', setup))
+    assert {"package.xml", "Init.py", "LICENSE"} <= read
+    assert read | {"pyproject.toml", "setup.py", "mods"} <= copied
+
+
 def test_the_container_of_the_night_job_runs_a_command_that_there_is() -> None:
     """Its words, and the files that it copies, are there."""
     text = (NIGHT / "Containerfile").read_text("utf-8")
@@ -67,8 +81,10 @@ def test_systemd_understands_the_units(unit: Path) -> None:
 @contextmanager
 def nginx(config: str, folder: Path) -> Iterator[None]:
     """A private nginx with this server block."""
+    # Its workers must reach the folder that the test's own user made.
+    user = "user root;" if os.geteuid() == 0 else ""
     (folder / "nginx.conf").write_text(
-        f"pid {folder}/pid; error_log {folder}/error.log; worker_processes 1; daemon off;\n"
+        f"{user} pid {folder}/pid; error_log {folder}/error.log; worker_processes 1; daemon off;\n"
         "events {}\n"
         f"http {{ access_log off; client_body_temp_path {folder}/body; proxy_temp_path {folder}/proxy;\n"
         f"fastcgi_temp_path {folder}/f; uwsgi_temp_path {folder}/u; scgi_temp_path {folder}/s;\n"
@@ -120,3 +136,77 @@ def test_nginx_passes_pages_and_events_on(tmp_path: Path, sub_path: str) -> None
                 with api.events() as events:
                     api.item("N2")
                     assert events.next("item.created").data["part_number"] == "N2"
+
+
+@pytest.mark.skipif(
+    not shutil.which("nginx") or not shutil.which("openssl"), reason="needs nginx and openssl"
+)
+def test_tls_the_public_address_events_and_a_large_upload(tmp_path: Path) -> None:
+    """The file as it is but for the port and its certificate: a login link, a stream, and 200 MiB."""
+    os.chmod(tmp_path, 0o755)
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    made = [
+        "openssl",
+        "req",
+        "-x509",
+        "-newkey",
+        "rsa:2048",
+        "-nodes",
+        "-days",
+        "2",
+        "-subj",
+        "/CN=localhost",
+    ]
+    made += ["-addext", "subjectAltName=DNS:localhost", "-keyout", str(key), "-out", str(certificate)]
+    subprocess.run(made, check=True, capture_output=True)
+    with reserved_port() as port:
+        public = f"https://localhost:{port}"
+        settings = Settings(
+            database_url=f"sqlite:///{tmp_path / 'x.db'}", public_url=public, secure_cookies=True
+        )
+        with running_server(settings.database_url, token=TOKEN, settings=settings) as server:
+            text = (DEPLOY / "nginx.conf").read_text("utf-8")
+            text = text.replace("listen 443 ssl", f"listen 127.0.0.1:{port} ssl")
+            text = re.sub(r"(ssl_certificate) .*;", rf"\1 {certificate};", text)
+            text = re.sub(r"(ssl_certificate_key) .*;", rf"\1 {key};", text)
+            text = text.replace("http://127.0.0.1:8080", server.base_url)
+            with nginx(text, tmp_path), ExitStack() as stack:
+                _try_all(f"localhost:{port}", ssl.create_default_context(cafile=certificate), server, stack)
+
+
+def _try_all(host: str, trust: ssl.SSLContext, server: RunningServer, stack: ExitStack) -> None:
+    public, token = f"https://{host}", {"Authorization": f"Bearer {TOKEN}"}
+
+    def call(
+        method: str, path: str, body: Any = None, headers: dict[str, str] | None = None
+    ) -> http.client.HTTPResponse:
+        connection = http.client.HTTPSConnection(host, context=trust, timeout=60)
+        stack.callback(connection.close)
+        connection.request(method, path, body, token if headers is None else headers)
+        return stack.enter_context(closing(connection.getresponse()))
+
+    def up() -> bool:
+        try:
+            return call("GET", "/health").status == 200
+        except OSError:
+            return False
+
+    wait_until(up, "nginx")
+    assert server.login_url.startswith(f"{public}/login/link/")
+    entered = call("POST", server.login_url.removeprefix(public), headers={"Origin": public})
+    cookie = entered.headers["set-cookie"]
+    assert (entered.status, "Secure" in cookie, "HttpOnly" in cookie) == (303, True, True)
+    events = call("GET", "/api/events")
+    body = b'{"part_number": "N", "name": "n"}'
+    assert call("POST", "/api/items", body, {**token, "Content-Type": "application/json"}).status == 201
+    while not (line := events.readline()).startswith(b"event: item.created"):
+        assert line, "the stream ended"
+    megabytes, block = 200, b"x" * 2**20
+    head = b'--b\r\nContent-Disposition: form-data; name="file"; filename="large.FCStd"\r\n\r\n'
+    parts = itertools.chain([head], itertools.repeat(block, megabytes), [b"\r\n--b--\r\n"])
+    length = len(head) + megabytes * len(block) + len(b"\r\n--b--\r\n")
+    form = {"Content-Type": "multipart/form-data; boundary=b", "Content-Length": str(length)}
+    assert call("POST", "/api/items/N/file", parts, {**token, **form}).status == 201
+    sent = call("GET", "/api/items/N/file")
+    size = sum(len(part) for part in iter(lambda: sent.read(2**20), b""))
+    assert size == megabytes * len(block)

@@ -10,10 +10,8 @@ import pytest
 from server_testing import Api
 from sqlalchemy.exc import DataError, IntegrityError, OperationalError
 
-from silo_server.app import create_app
-from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
-from silo_server.run import RunningServer, running_server
+from silo_server.run import RunningServer, create_app, prepare, running_server
 from silo_server.services.access.accounts import Role, list_users
 from silo_server.settings import Settings
 

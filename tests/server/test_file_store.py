@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import NotFoundError
-from silo_server.files import MAX_THUMBNAIL, PNG, FileStore, clean_name, read_thumbnail
+from silo_server.services.revisions import MAX_THUMBNAIL, PNG, FileStore, clean_name, read_thumbnail
 
 
 def fcstd(picture: bytes) -> bytes:

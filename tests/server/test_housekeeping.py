@@ -18,13 +18,12 @@ from large_boms import fcstd_with_picture, form_file
 from server_testing import Api, bom, wait_until
 from sqlalchemy import func, select, text
 
-from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
-from silo_server.db.tables import audit, bom_changes, bom_syncs, events, sessions
-from silo_server.files import FileStore
+from silo_server.db.tables import answers, audit, bom_changes, events, sessions
 from silo_server.operation.backup import back_up
 from silo_server.operation.housekeeping import keep_tidy, last_run, tidy
-from silo_server.run import running_server
+from silo_server.run import prepare, running_server
+from silo_server.services.revisions import FileStore
 from silo_server.services.search import rebuild_index
 from silo_server.settings import Settings
 
@@ -139,14 +138,14 @@ def test_the_log_and_the_answers_are_bounded_in_bytes(url: str, tmp_path: Path) 
     assert tidied(url, tmp_path) == {}
     removed = tidied(url, tmp_path, event_log_bytes=budget, sync_bytes=20_000)
     assert removed["events"] > 5
-    assert removed["sync answers"] > 5
+    assert removed["answers"] > 5
     with db.read() as tx:
         left = [len(data.encode()) for data in tx.conn.scalars(select(events.c.data))]
         assert budget - max(sizes) < sum(left) <= budget
-        newest = tx.conn.scalars(select(bom_syncs.c.sync_id).order_by(bom_syncs.c.at.desc())).first()
+        newest = tx.conn.scalars(select(answers.c.key).order_by(answers.c.at.desc())).first()
     assert newest == "s19"
     tidied(url, tmp_path, event_log_bytes=1, sync_bytes=1)
-    assert (count(db, events), count(db, bom_syncs)) == (1, 1)
+    assert (count(db, events), count(db, answers)) == (1, 1)
     db.close()
 
 
@@ -168,9 +167,9 @@ def test_what_is_kept_by_age(url: str, tmp_path: Path, retention: bool) -> None:
         assert (count(db, sessions), count(db, bom_changes)) == (0, 1 if retention else 3)
         assert (count(db, audit) == 0) == retention
         # An answer that refers to a change goes with it; the first one says all by itself.
-        assert count(db, bom_syncs) == (1 if retention else 3)
+        assert count(db, answers) == (1 if retention else 3)
         tidied(url, tmp_path, 91, **values)
-        assert count(db, bom_syncs) == 0
+        assert count(db, answers) == 0
         # The history that is left still folds to the state, and says that it does not go further back.
         change = api.get(bom(parent, "history"))[0]
         past = api.get(bom(parent, f"history/{change['id']}/bom"))
@@ -201,7 +200,7 @@ def test_an_answer_kept_as_a_reference_is_the_same_answer(url: str, tmp_path: Pa
         api.good("DELETE", bom(parent, children[10]))
         assert api.merge(parent, entries, sync_id="kept") == first
         with server.app.state.server.db.read() as tx:
-            row = tx.conn.execute(select(bom_syncs)).one()
+            row = tx.conn.execute(select(answers)).one()
         assert row.change_id is not None
         assert len(row.answer) < len(json.dumps(first)) / 1.4
 

@@ -11,12 +11,11 @@ from urllib.parse import urlsplit
 import pytest
 from server_testing import Api
 
+from silo_server import events as log
 from silo_server.db.engine import Database
-from silo_server.events.hub import RING_EVENTS
-from silo_server.json_values import dumps
+from silo_server.events import RING_EVENTS
 from silo_server.run import RunningServer, running_server
-from silo_server.services import events as log
-from silo_server.values import NewEvent
+from silo_server.values import NewEvent, dumps
 
 TOKEN = "silo_hub"
 

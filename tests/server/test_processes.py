@@ -16,7 +16,7 @@ from silo.cli.main import main
 from silo_server.run import is_loopback, running_server, serve
 from silo_server.settings import Settings
 
-TOKEN = "silo_several"
+TOKEN = "silo_several_0123456789abcdef"
 
 
 @pytest.mark.postgres
@@ -51,7 +51,7 @@ def test_the_poll_carries_events_where_nobody_tells(url: str, tmp_path: Path) ->
 
 
 def test_what_one_server_did_another_knows(url: str, tmp_path: Path) -> None:
-    """Tokens, sync answers, modes and files are in the database and the store, not in a process."""
+    """Tokens, answers, modes and files are in the database and the store, not in a process."""
     with (
         running_server(url, token=TOKEN, files_dir=tmp_path) as one,
         running_server(url, token=TOKEN, files_dir=tmp_path) as two,
@@ -185,8 +185,10 @@ def test_no_token_in_a_log(tmp_path: Path) -> None:
         os.close(write)
         try:
             with (
-                ServerProcess(f"sqlite:///{tmp_path / 'x.db'}", tmp_path, "silo_secret_token") as server,
-                Api(server.base_url, "silo_secret_token") as api,
+                ServerProcess(
+                    f"sqlite:///{tmp_path / 'x.db'}", tmp_path, "silo_secret_token_0123456789"
+                ) as server,
+                Api(server.base_url, "silo_secret_token_0123456789") as api,
             ):
                 api.get("/api/items")
                 api.bad(401, "POST", "/api/auth/login", {"username": "x", "password": "secret-password"})

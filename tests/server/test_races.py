@@ -15,14 +15,13 @@ from typing import Any
 import pytest
 from server_testing import Api, Databases, bom, merge_body, wait_until
 from sqlalchemy import func, select, text
+from web_visitor import link_of
 
 from silo.bom.errors import CycleError
-from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database, Tx
-from silo_server.run import RunningServer, running_server
-from silo_server.services.bom import edits, history
-from silo_server.services.bom.merge import merge_bom
-from silo_server.services.bom.merge_json import read_merge_order
+from silo_server.run import RunningServer, prepare, running_server
+from silo_server.services.bom import history, review
+from silo_server.services.bom.merge import merge_bom, read_merge_order
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
 from silo_server.values import LineState
@@ -99,7 +98,7 @@ def test_two_edges_of_a_ring_are_not_added_together(pg: Database) -> None:
     """TOP → SUB here and SUB → TOP there, at the same moment: one of them is refused."""
 
     def add(parent: str, child: str) -> Callable[[Tx], Any]:
-        return lambda tx: edits.add_line(tx, parent, child, LineState(1.0, "manual"))
+        return lambda tx: review.add_line(tx, parent, child, LineState(1.0, "manual"))
 
     raised = one_waits_for_the_other(pg, add("TOP", "SUB"), add("SUB", "TOP"))
     assert [type(error) for error in raised] == [CycleError]
@@ -185,7 +184,7 @@ def test_no_method_that_changes_goes_without_the_forms_secret(api: Api, method: 
     """A session's cookie alone changes nothing, whichever the method."""
     parent, child = api.items(2)
     api.good("POST", bom(parent), {"child_part_number": child})
-    link = api.good("POST", "/api/users/admin/login-link")["path"]
+    link = link_of(api, "admin")
     cookie = api.as_(None).call("POST", link).headers["set-cookie"].split(";")[0]
     path = {"DELETE": bom(parent, child), "PUT": bom(parent, child), "POST": "/api/items"}.get(
         method, f"/api/items/{parent}/properties"

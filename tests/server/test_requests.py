@@ -19,7 +19,7 @@ from silo.bom.errors import ConfigError
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
 
-TOKEN = "silo_requests"
+TOKEN = "silo_requests_0123456789abcdef"
 
 
 @pytest.fixture

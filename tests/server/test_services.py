@@ -17,11 +17,8 @@ from sqlalchemy import select, update
 
 from silo.bom.errors import AuthError, ConflictError, RejectedError
 from silo.bom.headers import plain_cell, safe_cell
-from silo_server.clock import stamp, utc_now, wire
-from silo_server.db.bulk import insert_rows, one_of, update_rows
-from silo_server.db.engine import Database
-from silo_server.db.tables import bom_syncs, items, users
-from silo_server.json_values import dumps
+from silo_server.db.engine import Database, insert_rows, one_of, update_rows
+from silo_server.db.tables import answers, items, users
 from silo_server.services.access.accounts import create_user
 from silo_server.services.access.credentials import (
     Token,
@@ -30,13 +27,14 @@ from silo_server.services.access.credentials import (
     secret_of_form,
 )
 from silo_server.services.access.logins import actor_by_session, create_login_link, use_login_link
-from silo_server.services.bom.edits import check_state, edited_state
-from silo_server.services.bom.exports import _item_numbers
 from silo_server.services.bom.lines import state_to_json, stored_state
-from silo_server.services.bom.merge_json import quantity_problem, read_merge_order
-from silo_server.services.bom.rollup import positive_number
+from silo_server.services.bom.merge import quantity_problem, read_merge_order
+from silo_server.services.bom.review import check_state, edited_state
+from silo_server.services.bom.transfer import _numbered
+from silo_server.services.bom.tree import positive_number
 from silo_server.services.items import NewItem, create_item
-from silo_server.values import SYSTEM, Actor, LineState, Role, from_row, to_wire
+from silo_server.settings import stamp, utc_now, wire
+from silo_server.values import SYSTEM, Actor, LineState, Role, dumps, from_row, to_wire
 
 text = st.text(max_size=20)
 states = st.builds(
@@ -157,7 +155,8 @@ def test_numbers_stay_numbers_in_cells() -> None:
 
 def test_item_numbers_follow_the_depth() -> None:
     """1, 1.1, 1.2, 1.2.1, 2, 2.1."""
-    assert list(_item_numbers([1, 2, 2, 3, 1, 2])) == ["1", "1.1", "1.2", "1.2.1", "2", "2.1"]
+    rows: Any = [SimpleNamespace(depth=depth) for depth in (1, 2, 2, 3, 1, 2)]
+    assert [number for _, number in _numbered(rows)] == ["1", "1.1", "1.2", "1.2.1", "2", "2.1"]
 
 
 @pytest.mark.parametrize(
@@ -202,12 +201,10 @@ def test_times_sort_as_they_read() -> None:
 def test_many_rows_go_in_and_change_in_one_statement_each(db: Database) -> None:
     """Both databases take thousands of rows, nulls and any text, and find them by a set."""
     with db.write() as tx:
-        create_item(tx, NewItem(part_number="X", name="x"))
-        item_id = tx.conn.scalar(select(items.c.id))
         rows = [
             {
-                "parent_id": item_id,
-                "sync_id": f"s{n}",
+                "subject": "merge 1",
+                "key": f"s{n}",
                 "request_hash": "h",
                 "answer": "Ünïcode '\" \\ {} , NULL \n" + str(n),
                 "version": n,
@@ -215,14 +212,14 @@ def test_many_rows_go_in_and_change_in_one_statement_each(db: Database) -> None:
             }
             for n in range(5000)
         ]
-        insert_rows(tx, bom_syncs, rows)
-        insert_rows(tx, bom_syncs, [])
+        insert_rows(tx, answers, rows)
+        insert_rows(tx, answers, [])
         wanted = [f"s{n}" for n in range(0, 5000, 2)] + ["none", "'; DROP TABLE items; --"]
-        query = select(bom_syncs.c.sync_id, bom_syncs.c.answer)
-        found = tx.conn.execute(query.where(one_of(tx, bom_syncs.c.sync_id, wanted))).all()
+        query = select(answers.c.key, answers.c.answer)
+        found = tx.conn.execute(query.where(one_of(tx, answers.c.key, wanted))).all()
         assert len(found) == 2500
         assert dict(found)["s42"] == rows[42]["answer"]
-        assert tx.conn.execute(query.where(one_of(tx, bom_syncs.c.sync_id, []))).all() == []
+        assert tx.conn.execute(query.where(one_of(tx, answers.c.key, []))).all() == []
 
 
 def test_a_bulk_update_changes_only_its_rows(db: Database) -> None:

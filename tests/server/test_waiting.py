@@ -21,11 +21,11 @@ from server_testing import Api, Databases, bom, wait_until
 from sqlalchemy import make_url
 
 from silo.bom.errors import RejectedError
-from silo_server.background import Probe, TokenUses
+from silo_server.background import Later, Probe
 from silo_server.db.engine import WRITERS_WAITING, Database
-from silo_server.files import FileStore
 from silo_server.run import running_server
 from silo_server.services.access import credentials
+from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
 
 TOKEN = "silo_waiting"
@@ -133,11 +133,11 @@ def test_a_server_that_stops_does_not_wait_for_a_write_that_hangs(tmp_path: Path
 
     db = Stuck(Settings(database_url=f"sqlite:///{tmp_path / 'x.db'}"))
     db.token_uses[1] = "2026"
-    uses = TokenUses(db)
+    uses = Later(db)
     uses.start()
     assert trying.wait(60)
     uses.stop()
-    assert any(thread.name == "silo-token-uses" for thread in threading.enumerate())
+    assert any(thread.name == "silo-later" for thread in threading.enumerate())
     free.set()
     db.close()
 

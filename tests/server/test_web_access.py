@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import re
 import zlib
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ from urllib.parse import unquote, urlencode
 import pytest
 from fastapi.routing import APIRoute
 from server_testing import Api
-from web_visitor import FORM, HTML, ROLES, Visitor, enter
+from web_visitor import FORM, HTML, ROLES, Visitor, enter, link_of
 
 from silo_server.run import running_server
 from silo_server.settings import Settings
@@ -28,6 +29,8 @@ TABLE = {
     ("POST", "/login"): PUBLIC,
     ("GET", "/login/link/{secret}"): PUBLIC,
     ("POST", "/login/link/{secret}"): PUBLIC,
+    ("GET", "/login/program"): VIEWER,
+    ("POST", "/login/program"): VIEWER,
     ("POST", "/logout"): VIEWER,
     ("GET", "/"): VIEWER,
     ("GET", "/items"): VIEWER,
@@ -35,6 +38,7 @@ TABLE = {
     ("GET", "/waiting"): VIEWER,
     ("GET", "/items/{part_number}/print"): VIEWER,
     ("POST", "/waiting/decide"): EDITOR,
+    ("POST", "/waiting/undo"): EDITOR,
     ("GET", "/items/new"): EDITOR,
     ("POST", "/items/new"): EDITOR,
     ("GET", "/items/{part_number}/edit"): EDITOR,
@@ -65,6 +69,9 @@ TABLE = {
     ("POST", "/users/{username}/login-link"): ADMIN,
     ("POST", "/mode"): ADMIN,
     ("GET", "/audit"): ADMIN,
+    ("GET", "/system"): ADMIN,
+    ("GET", "/items/{part_number}/changes"): VIEWER,
+    ("GET", "/documents/{uuid}"): VIEWER,
 }
 CHANGING = [path for (method, path), role in TABLE.items() if method == "POST" and role != PUBLIC]
 
@@ -121,6 +128,29 @@ def test_every_form_needs_its_secret(visitors: dict[str, Visitor], path: str, cs
     assert "load the page again" in answer.body.decode()
 
 
+def test_a_program_that_its_user_lets_in_has_a_token(visitors: dict[str, Visitor], api: Api) -> None:
+    """The page shows code and name; only the SHA-256 of the secret goes there. Twice sent is one token."""
+    secret = "silo_" + "5e" * 20
+    proof = hashlib.sha256(secret.encode()).hexdigest()
+    path = f"/login/program?name=FreeCAD%20on%20%3Cdesk%3E&proof={proof}"
+    page = visitors[EDITOR].get(path).body.decode()
+    assert f"{proof[:4]}-{proof[4:8]}".upper() in page
+    assert "FreeCAD on &lt;desk&gt;" in page
+    caller = api.as_(secret)
+    assert caller.call("GET", "/api/auth/me").status == 401
+    for _ in range(2):
+        answer = visitors[EDITOR].post(path)
+        assert (answer.status, answer.headers["location"].partition("?")[0]) == (303, "/account")
+    assert caller.call("GET", "/api/auth/me").json()["username"] == EDITOR
+    mine = [one for one in caller.call("GET", "/api/auth/tokens").json() if "desk" in one["name"]]
+    (token,) = mine
+    assert "write" in token["scopes"]
+    assert token["expires_at"]
+    assert proof not in str(token)
+    for wrong in ("", "silo_secret", proof.upper(), proof + "0"):
+        assert visitors[EDITOR].post(f"/login/program?name=x&proof={wrong}").status == 400
+
+
 def test_a_login_form_from_another_site_is_refused(api: Api) -> None:
     """Nobody is logged in under a stranger's name by a page elsewhere."""
     body = urlencode({"username": "admin", "password": "whatever it is"}).encode()
@@ -160,7 +190,7 @@ def test_the_way_back_after_a_login(api: Api) -> None:
 def test_a_used_link_leads_on_where_the_session_lives(api: Api) -> None:
     """Opening the same link twice in the browser that it let in is no error."""
     browser = api.as_(None)
-    path = api.good("POST", f"/api/users/{ADMIN}/login-link")["path"]
+    path = link_of(api, ADMIN)
     cookie = browser.call("POST", path).headers["set-cookie"].split(";")[0]
     again = browser.call("POST", path, body=b"next=/activity", headers={"Cookie": cookie, **FORM})
     assert (again.status, again.headers["location"]) == (303, "/activity")

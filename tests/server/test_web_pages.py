@@ -12,6 +12,7 @@ from html import unescape
 from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
+from uuid import uuid4
 
 import pytest
 from server_testing import Api, bom, form_body
@@ -73,9 +74,15 @@ def make_busy(api: Api) -> dict[str, str]:
     api.good("PUT", f"/api/items/{used}", {"properties": {HOSTILE: HOSTILE}, "comment": HOSTILE})
     body, headers = form_body({"file": ("<b>x</b>.txt", b"x"), "comment": HOSTILE})
     assert api.call("POST", f"/api/items/{used}/file", body=body, headers=headers).status == 201
+    sheet = str(uuid4())
+    item = api.get(f"/api/items/{used}")["id"]
+    about = {"path": f"a/{HOSTILE}", "items": json.dumps([{"item": item, "object": HOSTILE}])}
+    about["links"] = json.dumps([{"path": HOSTILE, "item": item}])
+    body, headers = form_body({"file": ("<b>x</b>.FCStd", b"x"), "comment": HOSTILE, **about})
+    assert api.call("POST", f"/api/documents/{sheet}/file", body=body, headers=headers).status == 201
     api.good("POST", "/api/auth/tokens", {"name": HOSTILE})
     api.good("POST", "/api/users", {"username": "odd", "display_name": HOSTILE})
-    return {"parent": parent, "used": used, "disputed": disputed}
+    return {"parent": parent, "used": used, "disputed": disputed, "sheet": sheet, "uuid": item}
 
 
 PAGES = (
@@ -85,6 +92,8 @@ PAGES = (
     "/items/{parent}",
     "/items/{parent}?view=flat",
     "/items/{used}",
+    "/documents/{sheet}",
+    "/documents/{uuid}",
     "/items/{used}/edit",
     "/items/new?category=%3Cscript%3E",
     "/items/{parent}?q=%3Cscript%3E&type=%22%3E%3Cb%3E&sort=%22%3E&flip=%22%3E",
@@ -98,6 +107,7 @@ PAGES = (
     "/users",
     "/audit",
     "/items/%3Cscript%3E",
+    "/documents/%3Cscript%3E",
     "/%3Cscript%3Ealert(1)%3C/script%3E",
     "/items/{parent}/compare?old=%3Cscript%3E",
 )
@@ -135,6 +145,24 @@ def test_every_page_on_both_databases(url: str, tmp_path: Path) -> None:
         assert api.quantities(numbers["parent"])[numbers["disputed"]] == 5
 
 
+def test_a_file_of_several_items_is_on_their_pages_and_has_one(
+    visitors: dict[str, Visitor], busy: dict[str, str]
+) -> None:
+    """The item names its files; the page of a file its items, what uses it, and each revision to download."""
+    viewer = visitors[VIEWER]
+    item = unescape(viewer.get(f"/items/{busy['used']}").body.decode())
+    assert f'<a href="/documents/{busy["uuid"]}">' in item
+    assert f'<a href="/documents/{busy["sheet"]}">' in item
+    sheet = unescape(viewer.get(f"/documents/{busy['sheet']}").body.decode())
+    assert f'<a href="/items/{busy["used"]}">' in sheet
+    assert f'<a href="/documents/{busy["uuid"]}">' in sheet
+    assert f"/api/documents/{busy['sheet']}/file/1" in sheet
+    used = viewer.get(f"/documents/{busy['uuid']}").body.decode()
+    assert f'<a href="/documents/{busy["sheet"]}">' in used.partition('id="used"')[2]
+    activity = viewer.get("/activity").body.decode()
+    assert f"/documents/{busy['sheet']}" in activity
+
+
 def test_static_files(api: Api) -> None:
     """Style and scripts need no login, are typed, and are asked for again only by their tag."""
     browser = api.as_(None)
@@ -166,12 +194,19 @@ def test_a_notice_is_shown_once_and_by_nobody_else(visitors: dict[str, Visitor],
     parent, child = api.items(2)
     visitor = visitors[EDITOR]
     done = visitor.post(f"/items/{parent}/bom/lines", child=child, quantity="2")
-    assert (done.status, done.headers["location"]) == (303, f"/items/{parent}/bom")
+    page, _, key = done.headers["location"].partition("?said=")
+    assert (done.status, page) == (303, f"/items/{parent}/bom")
     notice = done.headers["set-cookie"].split(";")[0]
     assert "HttpOnly" in done.headers["set-cookie"]
-    first = visitor.get(f"/items/{parent}/bom", Cookie=f"{visitor.cookie}; {notice}")
+    both = {"Cookie": f"{visitor.cookie}; {notice}"}
+    # Another tab, or a script there that fetches news, neither shows the notice nor takes it.
+    for elsewhere in ("/activity", f"/items/{child}/bom", page, f"{page}?said=0"):
+        other = visitor.get(elsewhere, **both)
+        assert "added.</bdi>" not in other.body.decode()
+        assert "set-cookie" not in other.headers
+    first = visitor.get(done.headers["location"], **both)
     assert f"✓ <bdi>{child} added.</bdi>" in first.body.decode()
-    assert 'silo_notice=""' in first.headers["set-cookie"]
+    assert f'silo_notice_{key}=""' in first.headers["set-cookie"]
     assert "Send money" not in visitor.get(f"/items/{parent}/bom?notice=Send+money").body.decode()
 
 

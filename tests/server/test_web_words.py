@@ -8,17 +8,17 @@ from dataclasses import replace
 
 import pytest
 
-from silo_server.services.events import LoggedEvent
+from silo_server.events import LoggedEvent
 from silo_server.values import LineState
 from silo_server.web.activity_page import entry_of
 from silo_server.web.line_form import changes
 from silo_server.web.render import (
+    arranged,
     bdi,
     closed,
     isolate,
     mass,
     money,
-    plural,
     quantity,
     segment,
     sentence,
@@ -47,11 +47,7 @@ def test_quantities_read_as_people_write_them(value: float | None, unit: str | N
 
 
 def test_small_words() -> None:
-    """Singular and plural, sizes, times with their machine form, part numbers in a path."""
-    assert (plural(1, "item is", "items are"), plural(0, "item is", "items are")) == (
-        "1 item is",
-        "0 items are",
-    )
+    """Sizes, times with their machine form, part numbers in a path."""
     assert (size(812), size(14_300), size(3_200_000), size(None)) == ("812 bytes", "14 kB", "3.2 MB", "")
     assert when("2026-02-08T22:15:00.123456Z") == (
         '<time datetime="2026-02-08T22:15:00.123456Z">2026-02-08 22:15</time>'
@@ -174,3 +170,21 @@ def test_a_merge_has_its_counts() -> None:
 def test_a_message_is_shown_as_a_sentence(message: str, shown: str) -> None:
     """With a capital, and one end."""
     assert sentence(message) == shown
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["m3×6", "m3×10", "m10×2", "", ""],
+        ["a01-0002", "a01-0010", "b1-1"],
+        ["608", "608 zz", "6000", "x"],
+        ["2026-02-08", "2026-02-09", "2026-11-01"],
+        ["v", "v0", "v1", "v" + "9" * 5000],
+    ],
+)
+def test_numbers_in_texts_sort_as_numbers(names: list[str]) -> None:
+    """As a person lists them; texts that are not there come last, both ways."""
+    keys = {"name": str}
+    assert arranged(names[::-1], "name", keys) == names
+    known = [name for name in names if name]
+    assert arranged(names, "-name", keys) == [*known[::-1], *names[len(known) :]]

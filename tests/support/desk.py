@@ -16,19 +16,17 @@ import pytest
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
-from silo.durable import stamp_of
-from silo.outbox.report import Sent
+from silo.outbox.send import Sent
+from silo.platform import stamp_of
 from silo.registering.items import Registration
 from silo.registering.offer import Candidate, Offer, Seen, State
 from silo.registering.orders import Order
 from silo.testing import FakeSilo
-from silo.workbench.commit.desk import Answer, Look
+from silo.workbench.commit.flow import Answer, Look
 from silo.workbench.commit.opened import Base
-from silo.workbench.commit.plan import Plan
-from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.preview.rows import Preview
-from silo.workbench.session.session import Session
-from silo.workbench.session.shown import Listener
+from silo.workbench.commit.plan import Plan, Snapshot
+from silo.workbench.preview.flow import Preview
+from silo.workbench.session.session import Listener, Session
 from silo.workbench.settings.preferences import DEFAULTS, Preferences
 from silo.workbench.settings.server import Known
 
@@ -91,6 +89,7 @@ class Document:
     changed: bool = True
     recomputed: bool = False
     closed: bool = False
+    several: bool = False
     parts: dict[Document, int] = field(default_factory=dict)
     OutList: list[Document] = field(default_factory=list)
 
@@ -244,7 +243,7 @@ class Desk:
                 for part, count in doc.parts.items()
             )
             extraction = Extraction(head, tuple(entries))
-        return Snapshot(doc.FileName, doc.Label, doc.identity or None, extraction)
+        return Snapshot(doc.FileName, doc.Label, doc.identity or None, extraction, several=doc.several)
 
     def accounts(self, extraction: Extraction) -> list[Any]:
         if self.refusal is not None:
@@ -298,9 +297,6 @@ class Desk:
 
     def identity(self, doc: Any) -> str | None:
         return str(doc.identity) or None
-
-    def is_registered(self, doc: Any) -> bool:
-        return bool(doc.identity)
 
     def ask(self, planned: Plan, note: str, comment: str, look: Look) -> Answer | None:
         self.asked.append(note)

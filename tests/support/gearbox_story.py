@@ -13,7 +13,7 @@ from pathlib import Path
 
 from silo.api.client import SiloClient
 from silo.batch import source_document
-from silo.bom.identity import walk_entries
+from silo.bom.model import walk_entries
 from silo.bom_sync import Outcome, Resolved, resolve, sync_tree
 from silo.cli.common import read_assembly
 from silo.cli.demo import remove_from_assembly, set_element_count

@@ -74,6 +74,7 @@ class Item:
     created_at: str
     revisions: list[dict[str, Any]] = field(default_factory=list)
     files: dict[int, bytes] = field(default_factory=dict)
+    attachments: list[tuple[str, bytes]] = field(default_factory=list)
     lines: list[dict[str, Any]] = field(default_factory=list)
 
 
@@ -321,6 +322,13 @@ def _upload(silo: RealSilo, _query: dict[str, str], body: Any, number: str) -> A
     return 201, silo.revise(item, comment, None, content)
 
 
+def _attach(silo: RealSilo, _query: dict[str, str], body: Any, number: str) -> Answer:
+    (part,) = body.iter_parts()
+    name = part.get_param("filename", header="content-disposition")
+    silo.one(number).attachments.append((str(name), part.get_payload(decode=True)))
+    return 201, {"id": str(uuid.uuid4()), "filename": name}
+
+
 def _download(silo: RealSilo, _query: dict[str, str], _body: Any, number: str, revision: str = "") -> Answer:
     files = silo.one(number).files
     content = files.get(int(revision)) if revision else files.get(max(files, default=0))
@@ -446,6 +454,7 @@ _ROUTES: tuple[tuple[str, str, Callable[..., Answer]], ...] = (
     (f"api/items/{_N}", "PUT", _update),
     (f"api/items/{_N}/revisions", "GET", _revisions),
     (f"api/items/{_N}/revisions/{_N}", "GET", _revision),
+    (f"api/items/{_N}/files", "POST", _attach),
     (f"api/items/{_N}/file", "POST", _upload),
     (f"api/items/{_N}/file", "GET", _download),
     (f"api/items/{_N}/file/{_N}", "GET", _download),

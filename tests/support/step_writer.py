@@ -63,9 +63,9 @@ class StepDocument:
     def write(self, path: Path, unit: str = "MM", external: bool = False) -> Path:
         """Write the file; ``external`` gives each part a file of its own."""
         self._tool.UpdateAssemblies()
+        writer = STEPCAFControl_Writer()  # the first one sets all options to their defaults
         Interface_Static.SetCVal_s("write.step.unit", unit)
         try:
-            writer = STEPCAFControl_Writer()
             writer.SetNameMode(True)
             mode = STEPControl_StepModelType.STEPControl_AsIs
             assert writer.Transfer(self._document, mode, "" if external else None)

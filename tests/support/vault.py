@@ -12,11 +12,10 @@ import pytest
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
 from silo.outbox.entry import Commit, Entry
-from silo.outbox.report import Report, Sent
-from silo.outbox.send import send_all
+from silo.outbox.send import Report, Sent, send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
-from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.commit.plan import Snapshot
 
 
 @dataclass
@@ -133,3 +132,10 @@ class Vault:
 @pytest.fixture
 def vault(tmp_path: Path) -> Vault:
     return Vault(tmp_path, FakeSilo())
+
+
+def died(store: Store) -> None:
+    """Do what the system does where a process ends: give its locks up."""
+    for key in [*store._coming]:
+        if lock := store._coming.pop(key):
+            lock.close()

@@ -27,10 +27,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from silo.bom.errors import InputError
 from silo.fcstd.library import Contents
-from silo.vault.answers import Known, Seen
-from silo.vault.index import Index
-from silo.vault.reading import Reading
-from silo.vault.session import Question, Session
+from silo.vault.index import Index, Seen, StoredAnswer
+from silo.vault.reading import Question, Reading, Session
 
 HOUR_NS = 3600 * 10**9
 NAMES = tuple(f"{folder}{name}.FCStd" for folder in ("", "sub/") for name in ("a", "b", "c", "d"))
@@ -297,7 +295,7 @@ def test_a_session_frees_what_it_made(vault: Path) -> None:
         gc.enable()
 
 
-def trail_of(known: Known) -> object:
+def trail_of(known: StoredAnswer) -> object:
     """Where the order of files does not matter."""
     return known.trail if known.is_of_one_file else json.loads(known.trail)
 

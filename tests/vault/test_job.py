@@ -28,9 +28,7 @@ from silo.testing import FakeSilo
 from silo.vault.index import Index
 from silo.vault.job import Job
 from silo.vault.plan import make_plan
-from silo.vault.pool import Pool, pool_of
-from silo.vault.reading import Reading
-from silo.vault.session import Question, work
+from silo.vault.reading import Pool, Question, Reading, pool_of, work
 
 
 def write(folder: Path, silo: FakeSilo | None, assemblies: dict[int, dict[int, int]], parts: int = 4) -> None:
@@ -312,6 +310,6 @@ def test_parts_in_the_file_of_an_assembly_are_its_bom_where_it_is_registered(
 def test_a_worker_starts_without_the_network() -> None:
     """Each worker imports what it needs anew; HTTP and TLS would be a tenth of it."""
     code = (
-        "import sys, silo.vault.session as _; print([n for n in ('http.client', 'ssl') if n in sys.modules])"
+        "import sys, silo.vault.reading as _; print([n for n in ('http.client', 'ssl') if n in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout == b"[]\n"

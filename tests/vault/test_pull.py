@@ -13,7 +13,7 @@ from fcstd_writer import Doc, locals_, part
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.api.revisions import download_revision
+from silo.api.files import download_revision
 from silo.api.wire import LinkedFile
 from silo.bom.errors import DocumentError, InputError, ServerFaultError
 from silo.bom.links import extract
@@ -25,9 +25,7 @@ from silo.outbox.entry import Commit
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
-from silo.vault.fetch import fetched
-from silo.vault.pull import Pulled, Rules, State, lay_out, place
-from silo.vault.revisions import RevisionBoms, words
+from silo.vault.pull import Pulled, RevisionBoms, Rules, State, fetched, lay_out, place, words
 
 
 def assembly(identity: str, *links: tuple[str, str, int]) -> Doc:
@@ -210,7 +208,7 @@ def test_what_is_not_in_silo_is_reported(project: Project, tmp_path: Path) -> No
     project.commit("Nut", "Bolt", "Arm")
     pulled = project.pull(tmp_path / "into")
     (lost,) = pulled.lost
-    assert (lost.position, lost.path) == ("Arm.FCStd", "parts/Plate.FCStd")
+    assert (lost.position, lost.path) == ("arm/Arm.FCStd", "parts/Plate.FCStd")
     assert "has no file in Silo" in lost.reason
     assert len(pulled.files) == 3
     with pytest.raises(InputError, match="no file with the revision 9"):
@@ -287,7 +285,7 @@ def test_the_bom_of_each_revision(project: Project) -> None:
     with RevisionBoms(project.silo, project.number("Arm"), str(project.arm)) as boms:
         assert words(boms.change(1, 2)) == "Box 4 → 6"
         assert words(boms.change(None, 1)).startswith("+ ")
-        assert words(boms.change(1, 2) * 9).endswith("Box 4 → 6, and 3 more")
+        assert words(boms.change(1, 2) * 9).endswith("Box 4 → 6 and 3 more")
     with RevisionBoms(project.silo, project.number("Plate"), "/nowhere/Plate.FCStd") as boms:
         assert boms.change(None, 1) == ()
 
@@ -512,7 +510,7 @@ def test_two_items_that_want_one_place(project: Project, tmp_path: Path) -> None
         ]
     pulled = project.pull(tmp_path / "into")
     (lost,) = pulled.lost
-    assert lost.path == "../lib/Nut.FCStd"
+    assert lost.path == "lib/Nut.FCStd"
     assert lost.reason == f"{project.number('Plate')} and {project.number('Nut')} want the same place"
 
 

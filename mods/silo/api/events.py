@@ -4,30 +4,206 @@
 ``EventListener`` keeps one stream open from a thread of its own: it begins again after every loss, with
 growing pauses and a little chance (many clients must not return in one moment), resumes where it stopped
 (``Last-Event-ID``), and says how it is doing. It only calls back; it knows no Qt and touches no document.
+
+Server-sent events: bytes in, typed events out. No network and no threads in here.
+
+A stream may be cut at any byte, may mix line ends, and must not hand over the half event that a dropped
+connection leaves.
+
+Both dialects come out as one: the spec's ``bom_merge`` and the real Silo's ``bom.merged`` are ``bom_merge``.
 """
 
 from __future__ import annotations
 
+import json
 import logging
+import math
 import random
+import re
 import socket
 import threading
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, closing, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Protocol, TypeVar
 
 import requests
+from pydantic import ValidationError
 
-from silo.api.failures import Where, translated
-from silo.api.policy import Backoff, told_wait
-from silo.api.replies import WebPageError, error_of
-from silo.api.sse import HEARTBEAT, RESET, STATE, ServerEvent, SseParser
+from silo.api.config import Pause
+from silo.api.policy import (
+    Backoff,
+    Scope,
+    WebPageError,
+    Where,
+    error_of,
+    judge,
+    pause_after,
+    told_wait,
+    translated,
+)
 from silo.api.transport import MAX_ERROR, Call, Transport, read_some
-from silo.api.wire import ServerState
-from silo.bom.errors import AuthError, RejectedError, RouteMissingError, ServerFaultError, SiloError
+from silo.api.wire import MergeEvent, ServerState
+from silo.bom.errors import (
+    AuthError,
+    ConfigError,
+    RejectedError,
+    RouteMissingError,
+    ServerFaultError,
+    SiloError,
+)
 from silo.bom.numbers import whole_number
+
+MERGE = "bom_merge"
+HEARTBEAT = "heartbeat"
+STATE = "server.state"
+RESET = "reset"
+
+_SAME = {"bom.merged": MERGE, "bom_merged": MERGE, "bom.merge": MERGE}
+_ID = re.compile(rb"^id: ?(.*)$", re.MULTILINE)
+_MARK = b"\xef\xbb\xbf"
+
+
+@dataclass(frozen=True)
+class ServerEvent:
+    """One event.
+
+    id
+        for ``Last-Event-ID``; None where the server gave none.
+    type
+        canonical: ``bom_merge``, ``item.created``, ``item.updated``, ``item.deleted``, ``revision.created``,
+        ``server.state``, ``heartbeat``, ``reset`` (what was seen before may be stale: read again), or the
+        server's own word.
+    data
+        the JSON as it came; the text where it is none.
+    merge
+        the typed content of a ``bom_merge``; None where that cannot be read (``data`` still has it).
+    name
+        the event as the server calls it: ``bom.merged`` and ``bom_merge`` are one ``type``.
+    """
+
+    id: str | None
+    type: str
+    data: Any = None
+    merge: MergeEvent | None = field(default=None, compare=False)
+    name: str = field(default="", compare=False)
+
+    @property
+    def item(self) -> str | None:
+        """The part number that the event is about, in either dialect."""
+        if self.merge is not None:
+            return self.merge.item
+        number = self.data.get("part_number", self.data.get("item")) if isinstance(self.data, dict) else None
+        return number if isinstance(number, str) else None
+
+    @property
+    def mode(self) -> str | None:
+        """The mode in a ``server.state`` event."""
+        mode = self.data.get("mode") if self.type == STATE and isinstance(self.data, dict) else None
+        return mode if isinstance(mode, str) else None
+
+
+class SseParser:
+    """A stream of bytes, fed in pieces of any size, as events.
+
+    Raises :class:`ServerFaultError` for a single event above ``max_bytes``: a stream without an end of line
+    must not fill the memory.
+    """
+
+    def __init__(self, max_bytes: int = 16 << 20) -> None:
+        self._max = max_bytes
+        self._start: bytes | None = b""
+        self._after_cr = False
+        self._buffer = bytearray()
+        self.last_event_id: str | None = None
+
+    def feed(self, chunk: bytes) -> list[ServerEvent]:
+        """The events that this piece completes."""
+        searched = max(0, len(self._buffer) - 1)
+        self._buffer += self._normal(self._without_mark(chunk))
+        events: list[ServerEvent] = []
+        while (end := self._buffer.find(b"\n\n", searched)) >= 0:
+            block = bytes(self._buffer[:end])
+            del self._buffer[: end + 2]
+            searched = 0
+            self.last_event_id = _marker(block) or self.last_event_id
+            event = read_block(block)
+            if event is not None:
+                events.append(event)
+        if len(self._buffer) > self._max:
+            raise ServerFaultError(
+                f"the event stream sent one event above {self._max / 1e6:.0f} MB, which is refused"
+            )
+        return events
+
+    def _without_mark(self, chunk: bytes) -> bytes:
+        # A byte order mark may lead the stream, and it may arrive in three pieces.
+        if self._start is None:
+            return chunk
+        self._start += chunk
+        if len(self._start) < len(_MARK) and _MARK.startswith(self._start):
+            return b""
+        chunk, self._start = self._start.removeprefix(_MARK), None
+        return chunk
+
+    def _normal(self, chunk: bytes) -> bytes:
+        # A CR ends its line at once; a LF right after it, be it in the next piece, belongs to it.
+        if not chunk:
+            return b""  # An empty piece says nothing of what follows the CR.
+        if self._after_cr:
+            chunk = chunk.removeprefix(b"\n")
+        self._after_cr = chunk.endswith(b"\r")
+        return chunk.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def parse(chunks: Iterable[bytes]) -> Iterator[ServerEvent]:
+    """The events of a stream; a half one at its end is dropped (the server sends it again)."""
+    parser = SseParser()
+    for chunk in chunks:
+        yield from parser.feed(chunk)
+
+
+def read_block(block: bytes) -> ServerEvent | None:
+    """The event of one block of lines; None for a comment or a block without data."""
+    name, lines = "", list[str]()
+    for line in block.decode("utf-8", "replace").split("\n"):
+        field_, _, value = line.partition(":")
+        if field_ == "data":
+            lines.append(value.removeprefix(" "))
+        elif field_ == "event":
+            name = value.removeprefix(" ")
+    if not lines:
+        return None
+    data, name = _json("\n".join(lines)), name or "message"
+    if name == "message" and isinstance(data, dict) and isinstance(data.get("type"), str):
+        name = data["type"]
+    kind = _SAME.get(name, name)
+    return ServerEvent(_marker(block), kind, data, _merge(data) if kind == MERGE else None, name)
+
+
+def _marker(block: bytes) -> str | None:
+    # A server may set the id without an event, to say where to resume.
+    found = _ID.findall(block)
+    return found[-1].decode("utf-8", "replace") or None if found and b"\0" not in found[-1] else None
+
+
+def _json(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return text
+
+
+def _merge(data: Any) -> MergeEvent | None:
+    if not isinstance(data, dict):
+        return None
+    try:
+        return MergeEvent.model_validate({**data, "type": MERGE})
+    except ValidationError:
+        return None
+
 
 log = logging.getLogger("silo.api")
 
@@ -125,7 +301,7 @@ class Connection(StrEnum):
     READ_ONLY = "read-only"  # events come in, the server takes no changes now
     DEGRADED = "degraded"  # events come in, a part of the server fails
     OFFLINE = "offline"  # no connection; it is tried again
-    REFUSED = "refused"  # the token is not accepted; not tried again
+    REFUSED = "refused"  # the token is not accepted; not tried again before a person acts
     UNSUPPORTED = "unsupported"  # the server has no events; tried again rarely, it may be updated
     STOPPED = "stopped"  # by stop()
 
@@ -182,6 +358,39 @@ class EventSource(Protocol):
     def ready(self) -> ServerState: ...
 
 
+def _kind(pause: Pause) -> Connection:
+    """How the connection is in a pause."""
+    return {AuthError.code: Connection.REFUSED, ConfigError.code: Connection.REFUSED}.get(
+        pause.code, Connection.OFFLINE
+    )
+
+
+class Pauses(Protocol):
+    """Where the pause of a server is kept."""
+
+    def clock(self) -> float: ...
+
+    def get(self) -> Pause | None: ...
+
+    def set(self, pause: Pause | None) -> None: ...
+
+
+class _OwnPauses:
+    """A listener's own, where nobody else asks the server."""
+
+    def __init__(self) -> None:
+        self._pause: Pause | None = None
+
+    def clock(self) -> float:
+        return time.time()
+
+    def get(self) -> Pause | None:
+        return self._pause
+
+    def set(self, pause: Pause | None) -> None:
+        self._pause = pause
+
+
 class EventListener:
     """Calls ``on_event`` for each event but heartbeats, ``on_state`` for each change of the connection.
 
@@ -191,6 +400,8 @@ class EventListener:
         where to begin; None means with what is new.
     wait
         ``wait(event, seconds)`` sleeps until the event is set; for tests.
+    pauses
+        where the pause of this server is kept; shared with whoever else asks it.
     around
         a context for all that the listener's thread does but waiting for the server's next event.
 
@@ -210,10 +421,11 @@ class EventListener:
         chance: Callable[[], float] = random.random,
         wait: Callable[[threading.Event, float], object] = threading.Event.wait,
         around: Callable[[], AbstractContextManager[object]] = nullcontext,
+        pauses: Pauses | None = None,
     ) -> None:
         self._api, self._on_event, self._on_state = api, on_event, on_state
         self._backoff, self._chance, self._wait = backoff or Backoff(), chance, wait
-        self._around = around
+        self._around, self._pauses = around, pauses or _OwnPauses()
         self._last_id = last_event_id
         self._stop, self._wake = threading.Event(), threading.Event()
         self._stream: EventStream | None = None
@@ -228,7 +440,7 @@ class EventListener:
         return self._last_id
 
     def start(self) -> None:
-        """Begin; also after :meth:`stop`, or after it gave up. Does nothing while it runs."""
+        """Begin; also after :meth:`stop`. Does nothing while it runs."""
         if self._thread is not None and self._thread.is_alive() and not self._stop.is_set():
             return
         # A thread that is still on its way out keeps the old flags, and can call nobody any more.
@@ -257,34 +469,53 @@ class EventListener:
         self.state = ConnectionState(Connection.STOPPED)
 
     def _run(self, stop: threading.Event, wake: threading.Event) -> None:
-        failures = 0
+        failures, waited = 0, None
         while not stop.is_set():
+            pause, now = self._pauses.get(), self._pauses.clock()
+            if pause is not None and pause != waited and pause.left(now):
+                waited = pause  # it was noted by whoever else asks this server
+                self._rest(stop, wake, _kind(pause), pause.reason, pause.left(now))
+                continue
             self._tell(stop, ConnectionState(Connection.CONNECTING))
             heard, kind, told = _Heard(), Connection.OFFLINE, None
             try:
                 self._listen(stop, heard)
                 reason = "the server ended the connection"
-            except AuthError as error:
-                return self._tell(stop, ConnectionState(Connection.REFUSED, str(error)))
             except RejectedError as error:
                 # The mark is another server's; without it there is a gap, which a reset says.
                 reason = str(error)
                 self._forget_mark(stop)
             except SiloError as error:
+                if stop.is_set():
+                    return
+                if judge(error).scope is Scope.ALL:
+                    now, before = self._pauses.clock(), self._pauses.get()
+                    known = before.failures if before is not None and not heard.anything else 0
+                    failures = 1 if heard.anything else max(failures, known) + 1
+                    waited = pause_after(error, failures, now, self._backoff, self._chance())
+                    self._pauses.set(waited)
+                    self._rest(stop, wake, _kind(waited), waited.reason, round(waited.until - now, 3))
+                    continue
                 reason, told = str(error), told_wait(error)
                 # A proxy answers with a page of its own while the server behind it starts.
                 if isinstance(error, RouteMissingError) and not isinstance(error, WebPageError):
                     kind, told = Connection.UNSUPPORTED, SELDOM
-            if stop.is_set():
-                return None
+                elif isinstance(error, AuthError):
+                    kind, told = Connection.REFUSED, SELDOM
             # Only what was really received counts as success: a server that greets and drops us is not up.
             failures = 1 if heard.anything else failures + 1
-            pause = self._backoff.pause(failures, self._chance(), told)
-            self._tell(stop, ConnectionState(kind, reason, pause))
-            self._wait(wake, pause)
-            if not stop.is_set():
-                wake.clear()
-        return None
+            self._rest(stop, wake, kind, reason, self._backoff.pause(failures, self._chance(), told))
+
+    def _rest(
+        self, stop: threading.Event, wake: threading.Event, kind: Connection, reason: str, seconds: float
+    ) -> None:
+        if stop.is_set():
+            return
+        endless = math.isinf(seconds)
+        self._tell(stop, ConnectionState(kind, reason, None if endless else seconds))
+        self._wait(wake, threading.TIMEOUT_MAX if endless else seconds)
+        if not stop.is_set():
+            wake.clear()
 
     def _listen(self, stop: threading.Event, heard: _Heard) -> None:
         with self._around():
@@ -297,8 +528,10 @@ class EventListener:
             with self._around():
                 self._tell(stop, ConnectionState(self._mode()))
             for event in stream:
-                heard.anything = True
                 with self._around():
+                    if not heard.anything:
+                        self._go_well()
+                    heard.anything = True
                     self._take(stop, event)
                 if stop.is_set():
                     return
@@ -307,6 +540,12 @@ class EventListener:
             with self._lock:
                 self._stream = None
             self._adopt(stop, stream.last_event_id)
+
+    def _go_well(self) -> None:
+        """The server answers: end the pause, unless it named the time or takes no changes."""
+        pause = self._pauses.get()
+        if pause is not None and not pause.told and self.state.kind is not Connection.READ_ONLY:
+            self._pauses.set(None)
 
     def _mode(self) -> Connection:
         try:
@@ -324,6 +563,7 @@ class EventListener:
             self._adopt(stop, event.id)
         if event.type == STATE and event.mode is not None:
             self._tell(stop, ConnectionState(_MODES.get(event.mode, Connection.ONLINE)))
+            self._go_well()
         if event.type != HEARTBEAT:
             self._call(stop, self._on_event, event)
 

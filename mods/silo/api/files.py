@@ -1,32 +1,265 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Files of items over HTTP: streamed both ways, checked by SHA-256, never in memory, never half-written."""
+"""Files of items over HTTP: streamed both ways, checked by SHA-256, never in memory, never half-written.
+
+What an item's revisions say about a file of ours: what it was made from, and whether it arrived already.
+
+An upload whose answer was lost is not sent again before this is known: it would make a second revision.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import secrets
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 from urllib.parse import urljoin
 
-from silo.api.caller import LISTS, Caller
-from silo.api.replies import error_of
-from silo.api.revisions import checksum_of
-from silo.api.transport import MAX_ERROR, Call, Cancel, Transport, as_json, stop_if
-from silo.api.wire import LinkedFile, Revision, Wire
+from silo.api.policy import error_of
+from silo.api.transport import LISTS, MAX_ERROR, Call, Caller, Cancel, Transport, as_json, stop_if
+from silo.api.wire import Document, HeldItem, LinkedFile, Revision, Wire
 from silo.bom.errors import (
     ConflictError,
     DocumentError,
+    NewerRevisionError,
+    NotFoundError,
     RejectedError,
     RouteMissingError,
     ServerFaultError,
 )
 from silo.bom.numbers import whole_number
-from silo.durable import replacing
+from silo.bom.resolve import with_allowed_characters
+from silo.files import bare_checksum, seen_as
+from silo.platform import no_device_name, remove_patiently, replacing, scratch_folder
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a file stands to its item's revisions.
+
+    base
+        the revision that it was made from; None where it is none of them.
+    newest
+        the newest revision with a file; None where there is none.
+    """
+
+    base: Revision | None
+    newest: Revision | None
+
+    @property
+    def newer(self) -> Revision | None:
+        """The revision that committing the file would undo; None where it would undo nothing."""
+        if self.newest is None or self.newest.revision_number <= self.base_number:
+            return None
+        return self.newest
+
+    @property
+    def base_number(self) -> int:
+        """The base's number; -1 where it is not known, so that any revision is newer."""
+        return self.base.revision_number if self.base is not None else -1
+
+    def check(self, part_number: str) -> None:
+        """Raise NewerRevisionError where committing the file would undo a newer revision."""
+        if (newest := self.newer) is None:
+            return
+        made = (
+            f"revision {self.base_number}" if self.base is not None else "a file that is no revision in Silo"
+        )
+        raise NewerRevisionError(
+            f"{newest.created_by or 'Somebody'} committed revision {newest.revision_number} of {part_number}"
+            f"{f' ({newest.comment})' if newest.comment else ''}, and this was made from {made}. "
+            "Sending it would undo that. Look at theirs; then send yours on top of it, or discard it and "
+            "take theirs",
+            newest.model_dump(mode="json", exclude={"properties", "links"}),
+        )
+
+
+def has_file(revision: Revision) -> bool:
+    """True for a revision with a file; the others only change properties."""
+    return bool(revision.file_checksum or revision.file_name or revision.file_key or revision.file_size)
+
+
+def standing(
+    revisions: Iterable[Revision], origin: str, known: int | None = None, seen: str = ""
+) -> Standing:
+    """How a file that was made from ``origin`` (a SHA-256) stands.
+
+    known
+        the number of that revision, for a server that keeps no checksums. Else the checksum decides: a server
+        that was restored from a backup gives the same numbers to other files.
+    seen
+        the newest revision that a person has seen and decided about: its number and its checksum.
+    """
+    files = sorted((r for r in revisions if has_file(r)), key=lambda r: r.revision_number)
+    mine = [
+        r
+        for r in files
+        if seen == seen_as(r.revision_number, r.file_checksum)
+        or (checksum_of(r) == origin if checksum_of(r) else r.revision_number == known)
+    ]
+    base = max(mine, key=lambda r: r.revision_number, default=None)
+    return Standing(base, files[-1] if files else None)
+
+
+def newest_number(revisions: Iterable[Revision]) -> int:
+    """The number of the newest revision; 0 where there is none."""
+    return max((revision.revision_number for revision in revisions), default=0)
+
+
+def is_newest(sha256: str, revisions: Iterable[Revision]) -> bool:
+    """True where the newest revision is this very file. An older one does not count: a person may go back."""
+    newest = max(revisions, key=lambda revision: revision.revision_number, default=None)
+    return newest is not None and checksum_of(newest) == sha256
+
+
+def other_name(path: str, revisions: Iterable[Revision]) -> str:
+    """The name of the item's newest file, where this one is called otherwise; "" where it is not.
+
+    "Save As" copies the identity along.
+    """
+    named = [revision for revision in revisions if revision.file_name]
+    if not named:
+        return ""
+    newest = max(named, key=lambda revision: revision.revision_number)
+    known = os.path.basename(str(newest.file_name))
+    one, other = (no_device_name(os.path.basename(name)).casefold() for name in (known, path))
+    return known if one != other else ""
+
+
+REPACKED = (".kc",)
+"""Files that a server packs anew: what comes down differs from what went up."""
+
+
+def is_there(revisions: Iterable[Revision], file_name: str, sha256: str, number: int | None) -> bool:
+    """True where a file that became revision ``number`` is among these. The checksum decides where it is that
+    of the file as it was sent; a revision without a file decides nothing."""
+    by_number = Path(file_name).suffix.lower() in REPACKED
+    known = list(revisions)
+    files = [r for r in known if has_file(r)] or known  # some servers say nothing of files
+    return any(
+        checksum_of(r) == sha256 or (r.revision_number == number and (by_number or not checksum_of(r)))
+        for r in files
+    )
+
+
+def download_revision(
+    client: SiloClient,
+    part_number: str,
+    path: Path,
+    revision: int,
+    checksum: str,
+    *,
+    cancelled: Cancel | None = None,
+) -> str:
+    """Fetch a revision's file to ``path``; gives its SHA-256.
+
+    Raises ServerFaultError where it is not the file that was committed (``checksum``; "" where the server
+    names none): it was damaged in the store or on the way.
+    """
+    found = client.download_file(part_number, path, revision, cancelled=cancelled)
+    if checksum and found != checksum:
+        remove_patiently(path)
+        raise ServerFaultError(
+            f"the file of {part_number}, revision {revision}, is not the one that was committed: its SHA-256 "
+            f"is {found[:12]}…, wanted {checksum[:12]}…. Nothing was written; the server's administrator can "
+            "check its files"
+        )
+    return found
+
+
+class MayHaveArrivedError(ConflictError):
+    """Nothing shows whether one of these revisions is the file. ``newest``: the last of them."""
+
+    def __init__(self, part_number: str, sent: SentFile, revisions: Sequence[int]) -> None:
+        numbers = ", ".join(map(str, revisions))
+        super().__init__(
+            f"{part_number}: {sent.file_name} may have arrived already, as revision {numbers}; this server "
+            "keeps no checksum to compare. Look at it in Silo: Retry sends the file, Discard does not"
+        )
+        self.newest = max(revisions)
+
+
+@dataclass(frozen=True)
+class SentFile:
+    """The file that was sent. ``base``: the newest revision that the item had before the first try."""
+
+    file_name: str
+    sha256: str
+    size: int
+    base: int
+
+
+def find_arrived(
+    client: SiloClient,
+    part_number: str,
+    sent: SentFile,
+    known: Sequence[Revision],
+    *,
+    cancelled: Cancel | None = None,
+) -> Revision | None:
+    """The revision that holds the file already; None where there is none, so that it may be sent.
+
+    By the server's checksum; where it keeps none, by size, then by reading the revision's file. Raises
+    :class:`MayHaveArrivedError` where even that says nothing: a person looks before it is sent a second time.
+    """
+    doubtful: list[Revision] = []
+    for revision in sorted(known, key=lambda one: one.revision_number):
+        if revision.revision_number <= sent.base:
+            continue
+        if checksum := checksum_of(revision):
+            if checksum == sent.sha256:
+                return revision
+            continue
+        same = _same_content(client, part_number, revision, sent, cancelled)
+        if same:
+            return revision
+        if same is None:
+            doubtful.append(revision)
+    if doubtful:
+        raise MayHaveArrivedError(part_number, sent, [revision.revision_number for revision in doubtful])
+    return None
+
+
+def checksum_of(revision: Revision) -> str:
+    """The SHA-256 of a revision's file in lower-case hex; "" where the server names none."""
+    return bare_checksum(revision.file_checksum)
+
+
+def _same_content(
+    client: SiloClient, part_number: str, revision: Revision, sent: SentFile, cancelled: Cancel | None
+) -> bool | None:
+    """None: nothing shows it."""
+    repacked = Path(sent.file_name).suffix.lower() in REPACKED
+    if revision.file_size is not None and revision.file_size != sent.size and not repacked:
+        return False
+    with scratch_folder("silo-") as folder:
+        try:
+            stored = client.download_file(
+                part_number, Path(folder) / "file", revision.revision_number, cancelled=cancelled
+            )
+        except NotFoundError:
+            # A revision without a file is a change of properties; one that names a file cannot be read.
+            return None if revision.file_key or revision.file_size else False
+    if stored == sent.sha256:
+        return True
+    return None if repacked else False
+
+
+class DocumentId(str):
+    """The UUID of a document, wherever the part number of an item may stand: its file, its revisions."""
+
+    __slots__ = ()
+
+
+def _path_of(of: str) -> tuple[str, str]:
+    return ("documents" if isinstance(of, DocumentId) else "items", of)
+
 
 MAX_DOWNLOAD = 4 << 30
 _PAGE = 1000  # revisions in one answer
@@ -37,15 +270,45 @@ Progress = Callable[[int, int], object]
 
 
 class Origin(Wire):
-    """What a client says of a file that it sends: the fields of :class:`Revision` of these names."""
+    """What a client says of a file that it sends: the fields of :class:`Revision` of these names, and the
+    items in it."""
 
     base_revision: int | None = None
     file_path: str = ""
     links: list[LinkedFile] | None = None
+    items: list[HeldItem] | None = None
+
+
+class UuidsBody(Wire):
+    """``POST /api/items/by-uuid`` and ``documents/by-uuid``: many identities in one question."""
+
+    uuids: list[str]
 
 
 class FileCalls(Caller):
-    """Revisions of items, and their files."""
+    """Revisions of items and documents, and their files; a document is named by its :class:`DocumentId`."""
+
+    def get_documents(self, uuids: Iterable[str], /) -> dict[str, Document]:
+        """The documents with these UUIDs, in lower case, as they are now; unknown ones are left out.
+
+        Raises RouteMissingError where the server knows no documents.
+        """
+        found: dict[str, Document] = {}
+        wanted = sorted({uuid.lower() for uuid in uuids if uuid})
+        for at in range(0, len(wanted), _PAGE):
+            asked = UuidsBody(uuids=wanted[at : at + _PAGE])
+            reply = self._ask("the files", "documents", "by-uuid", body=asked)
+            found |= {one.id: one for one in reply.models(Document, "documents", *LISTS)}
+        return found
+
+    def get_document(self, uuid: str, /) -> Document:
+        """One document, with what it links to and what links to it."""
+        return self._get(f"the document {uuid}", "documents", uuid).model(Document)
+
+    def documents_of(self, part_number: str, /) -> list[Document]:
+        """The documents that hold an item, its own first."""
+        reply = self._get(f"the files of {part_number}", "items", part_number, "documents")
+        return reply.models(Document, "documents", *LISTS)
 
     def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
         """The revisions of an item, newest first; those above the number ``after``.
@@ -56,7 +319,7 @@ class FileCalls(Caller):
         params: dict[str, int] = {"limit": newest or _PAGE, **({"after": after} if after else {})}
         while True:
             subject = f"the revisions of {part_number}"
-            reply = self._get(subject, "items", part_number, "revisions", params=params)
+            reply = self._get(subject, *_path_of(part_number), "revisions", params=params)
             page = reply.models(Revision, "revisions", *LISTS)
             lowest = found[-1].revision_number if found else None
             fresh = [r for r in page if r.revision_number > after]
@@ -69,7 +332,7 @@ class FileCalls(Caller):
     def get_revision(self, part_number: str, number: int, /) -> Revision:
         """One revision, with the files that its file links to."""
         subject = f"revision {number} of {part_number}"
-        return self._get(subject, "items", part_number, "revisions", str(number)).model(Revision)
+        return self._get(subject, *_path_of(part_number), "revisions", str(number)).model(Revision)
 
     def upload_file(
         self,
@@ -101,11 +364,13 @@ class FileCalls(Caller):
             headers = {"Content-Type": form.content_type, "Accept": "application/json"}
             if idempotency_key:
                 headers["Idempotency-Key"] = idempotency_key
-            url = self._address.api("items", part_number, "file")
+            url = self._address.api(*_path_of(part_number), "file")
             call = Call("POST", url, subject, body=form.rewound, headers=headers, cancelled=cancelled)
             try:
                 revision, sent = self._transport.send(call).model(Revision), form.sha256
             except (RouteMissingError, RejectedError) as error:
+                if isinstance(part_number, DocumentId):
+                    raise
                 if isinstance(error, RejectedError) and error.status != 415:
                     raise
                 about = {"comment": comment, **({"properties": dict(properties)} if properties else {})}
@@ -117,6 +382,18 @@ class FileCalls(Caller):
                 f"(revision {revision.revision_number}); look at that revision, then send the file again"
             )
         return revision
+
+    def attach_file(
+        self, part_number: str, path: Path | str, file_name: str, *, cancelled: Cancel | None = None
+    ) -> None:
+        """Send a file as an attachment of an item, which has no revisions; for a Silo without documents."""
+        with closing(FileForm(Path(path), {}, file_name, None, cancelled)) as form:
+            headers = {"Content-Type": form.content_type, "Accept": "application/json"}
+            url = self._address.api("items", part_number, "files")
+            subject = f"{file_name} beside {part_number}"
+            self._transport.send(
+                Call("POST", url, subject, body=form.rewound, headers=headers, cancelled=cancelled)
+            )
 
     def download_file(
         self,
@@ -132,7 +409,7 @@ class FileCalls(Caller):
         ``path`` appears whole or not at all; what was there before is replaced only then. The bytes may
         differ from those uploaded: a server re-packs some formats.
         """
-        segments = ("items", part_number, "file") + ((str(revision),) if revision is not None else ())
+        segments = (*_path_of(part_number), "file", *(() if revision is None else (str(revision),)))
         call = Call(
             "GET",
             self._address.api(*segments),
@@ -157,7 +434,7 @@ def _upload_fields(
 
     A server that does not know the last two ignores them.
     """
-    fields = {"comment": comment}
+    fields = {"comment": with_allowed_characters(comment)}
     if properties:
         fields["properties"] = as_json(properties).decode()
     if sha256:
@@ -167,9 +444,11 @@ def _upload_fields(
     if origin.base_revision is not None:
         fields["base_revision"] = str(origin.base_revision)
     if origin.file_path:
-        fields["path"] = origin.file_path
+        fields["path"] = with_allowed_characters(origin.file_path)
     if origin.links is not None:
-        fields["links"] = as_json([link.model_dump() for link in origin.links]).decode()
+        fields["links"] = as_json([link.model_dump(exclude_defaults=True) for link in origin.links]).decode()
+    if origin.items:
+        fields["items"] = as_json([one.model_dump(exclude_defaults=True) for one in origin.items]).decode()
     return fields
 
 

@@ -5,7 +5,7 @@ Three questions about an error have their answer here and nowhere else:
 
 * :func:`may_repeat`: may this very request be sent again at once?
 * :func:`judge`: whom does the error concern, and who can mend it?
-* :class:`Backoff`: how long is the pause before the next attempt?
+* :class:`Backoff`: how long is the pause before the next attempt? A :class:`Pause` is that of one server.
 
 =========================================  =============  ==================================================
 error                                      concerns       then
@@ -15,38 +15,473 @@ no answer, 5xx, a proxy's web page         one or all (1) retry
 401, an unusable configuration             all            a person: token, settings
 cancelled                                  all            retry when a person wants it
 403, a request that the server lacks       one kind (2)   a person (403); retry (a newer server may have it)
-404, 409, 412, other 4xx, bad input        one            a person
+404                                        one            retry (the server may be another one for a while)
+409, 412, other 4xx, bad input             one            a person
 =========================================  =============  ==================================================
 
 1. ``alive`` finds out: where the server answers a plain question, only this entry has trouble.
 2. A run that sends one kind of request stops. A queue continues: rights may differ between items.
+
+The one place where foreign errors become ours: requests, urllib3, ssl, sockets, JSON, pydantic.
+
+``translated`` wraps the code that may raise them. A test holds the table complete: each exception class that
+these libraries define has a line here, so a new one does not slip through as itself.
+
+What came back: a status and bytes, read as data or as one of our errors. No network in here.
+
+Error bodies are read in every form that is seen: ``{"error": code, "message": text}``, ``{"error": text}``, a
+bare string, FastAPI's ``detail``, and the HTML page of a proxy in between.
 """
 
 from __future__ import annotations
 
+import html
+import http.client
+import json
+import math
 import random
+import re
+import socket
+import ssl
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from email.utils import parsedate_to_datetime
 from enum import StrEnum
+from typing import Any, TypeVar
 
-from silo.api.replies import WebPageError
+import pydantic
+import requests
+import urllib3.exceptions as u3
+from pydantic import BaseModel, TypeAdapter
+from requests import exceptions as rq
+
+from silo.api.config import LONGEST_TOLD, Pause
 from silo.bom.errors import (
     AuthError,
     BusyError,
     CancelledError,
     ConfigError,
+    ConflictError,
+    CycleError,
     ForbiddenError,
+    InputError,
+    MissingRevisionError,
+    NewerRevisionError,
+    NotFoundError,
     NotSentError,
     ReadOnlyError,
+    RejectedError,
+    RemoteError,
     RouteMissingError,
     ServerFaultError,
     SiloError,
     UnreachableError,
+    VersionConflictError,
+    duration,
+)
+from silo.bom.numbers import whole_number
+
+FOREIGN: tuple[type[Exception], ...] = (
+    rq.RequestException,
+    u3.HTTPError,
+    http.client.HTTPException,
+    pydantic.ValidationError,
+    pydantic.PydanticUserError,
+    RecursionError,
+    ValueError,
+    OSError,
 )
 
-LONGEST_TOLD = 3600.0
-"""Seconds: a server that names a longer pause is asked again after this one."""
+
+@dataclass(frozen=True)
+class Where:
+    """What a message needs: whom we asked, for what, and how long we were ready to wait (seconds)."""
+
+    host: str
+    subject: str = ""
+    connect: float = 0.0
+    read: float = 0.0
+
+    @property
+    def asked(self) -> str:
+        """``host`` or ``host (the BOM of ASM-001)``."""
+        return f"{self.host} ({self.subject})" if self.subject else self.host
+
+
+_Kind = tuple[type[SiloError], str]
+
+_REFUSED: _Kind = (
+    NotSentError,
+    "nothing answers at {host}: is the Silo server running, and is the address right? "
+    "`silo-mod serve` starts one on this computer",
+)
+_UNKNOWN_NAME: _Kind = (
+    NotSentError,
+    "the name in {host} is not known here: check the address, the network or the VPN",
+)
+_SLOW_CONNECT: _Kind = (
+    NotSentError,
+    "{host} could not be reached within {connect:g} s: check the network or the VPN",
+)
+_SLOW_ANSWER: _Kind = (
+    UnreachableError,
+    "{asked} was silent for {read:g} s; try again, or allow a longer time",
+)
+_BROKEN: _Kind = (
+    UnreachableError,
+    "{asked} closed the connection before the answer was complete; try again",
+)
+_TLS: _Kind = (
+    NotSentError,
+    "no secure connection to {host}: its certificate is not trusted here, or it speaks no https. "
+    "For an own certificate authority give its file in SILO_SSL_VERIFY",
+)
+_PROXY: _Kind = (NotSentError, "the proxy on the way to {host} does not let us through; check its settings")
+_ADDRESS: _Kind = (
+    ConfigError,
+    "{host}: this server address cannot be used; write it like https://silo.example.com",
+)
+# The library's own text quotes the header's value, which may be the token.
+_HEADER: _Kind = (ConfigError, "{host}: the token or a header holds characters that HTTP does not allow")
+_LOOP: _Kind = (ServerFaultError, "{asked} redirects in a circle; check the server address")
+_GARBLED: _Kind = (
+    ServerFaultError,
+    "{asked} answered something that cannot be understood; is this the address of a Silo server?",
+)
+_OURS: _Kind = (InputError, "{asked}: what was to be sent cannot be put into a request")
+
+_REQUESTS: tuple[tuple[_Kind, str], ...] = (
+    (_BROKEN, "RequestException ConnectionError ChunkedEncodingError RetryError"),
+    (_SLOW_CONNECT, "ConnectTimeout"),
+    (_SLOW_ANSWER, "ReadTimeout Timeout"),
+    (_TLS, "SSLError"),
+    (_PROXY, "ProxyError InvalidProxyURL"),
+    (_GARBLED, "ContentDecodingError StreamConsumedError InvalidJSONError JSONDecodeError HTTPError"),
+    (_LOOP, "TooManyRedirects"),
+    (_ADDRESS, "URLRequired MissingSchema InvalidSchema InvalidURL"),
+    (_HEADER, "InvalidHeader"),
+    (_OURS, "UnrewindableBodyError"),
+)
+_URLLIB3: tuple[tuple[_Kind, str], ...] = (
+    (
+        _BROKEN,
+        "HTTPError PoolError RequestError MaxRetryError ProtocolError IncompleteRead "
+        "InvalidChunkLength EmptyPoolError ClosedPoolError ResponseError FullPoolError",
+    ),
+    (_LOOP, "HostChangedError"),
+    (_TLS, "SSLError"),
+    (_PROXY, "ProxyError ProxySchemeUnknown ProxySchemeUnsupported"),
+    (_GARBLED, "DecodeError ResponseNotChunked BodyNotHttplibCompatible InvalidHeader HeaderParsingError"),
+    (_SLOW_ANSWER, "TimeoutError TimeoutStateError ReadTimeoutError"),
+    (_SLOW_CONNECT, "ConnectTimeoutError"),
+    (_REFUSED, "NewConnectionError"),
+    (_ADDRESS, "LocationValueError LocationParseError URLSchemeUnknown"),
+    (_OURS, "UnrewindableBodyError"),
+    (_UNKNOWN_NAME, "NameResolutionError"),
+)
+# The most specific class wins, by the order in the class's own ancestry (its MRO).
+TABLE: dict[type, _Kind] = {
+    getattr(library, name): kind
+    for library, rows in ((rq, _REQUESTS), (u3, _URLLIB3))
+    for kind, names in rows
+    for name in names.split()
+    if hasattr(library, name)  # some are of urllib3 2 alone
+}
+TABLE |= {
+    http.client.HTTPException: _BROKEN,
+    pydantic.ValidationError: _GARBLED,
+    pydantic.PydanticUserError: _GARBLED,
+    UnicodeError: _GARBLED,
+    RecursionError: _GARBLED,
+    ValueError: _GARBLED,
+    ssl.SSLError: _TLS,
+    socket.gaierror: _UNKNOWN_NAME,
+    ConnectionRefusedError: _REFUSED,
+    TimeoutError: _SLOW_ANSWER,
+    OSError: _BROKEN,
+}
+
+# Wrappers whose reason says more than they do.
+_WRAPPERS = (rq.ConnectionError, rq.ChunkedEncodingError, u3.MaxRetryError, u3.ProtocolError)
+
+
+def translate(error: Exception, where: Where) -> SiloError:
+    """Our error for a foreign one, in plain words; never quotes a header."""
+    told = _innermost(error)
+    kind, text = next((TABLE[one] for one in type(told).__mro__ if one in TABLE), _GARBLED)
+    return kind(text.format(host=where.host, asked=where.asked, connect=where.connect, read=where.read))
+
+
+@contextmanager
+def translated(where: Where) -> Iterator[None]:
+    """Within, foreign errors leave as ours; ours pass."""
+    try:
+        yield
+    except SiloError:
+        raise
+    except FOREIGN as error:
+        if isinstance(error, requests.RequestException):
+            # They carry the whole request, the token in its headers included; nobody needs that further up.
+            error.request = error.response = None
+        raise translate(error, where) from error
+
+
+def _innermost(error: Exception) -> Exception:
+    """Follow the wrappers down: "max retries exceeded" is only the outside of "connection refused"."""
+    for _ in range(8):
+        inner = getattr(error, "reason", None) or next(iter(error.args), None)
+        if type(error) not in _WRAPPERS or not isinstance(inner, Exception):
+            return error
+        error = inner
+    return error
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+_MAX_TEXT = 400
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]+")
+_TITLE = re.compile(r"<title[^>]*>(.{1,200}?)</title>", re.IGNORECASE | re.DOTALL)
+# What routers, not handlers, say to a path they do not know: Go's net/http and chi; Starlette and FastAPI.
+_ROUTER_SAYS = {"404 page not found", "Not Found", "Method Not Allowed"}
+# Codes of a 503 that says "I am not well", not "I take no changes".
+_AWAY = {"unavailable", "busy", "degraded", "overloaded"}
+_READ_ONLY = re.compile(r"read.?only", re.IGNORECASE)
+_LATER = (408, 429, 502, 503, 504)
+
+
+class WebPageError(RouteMissingError):
+    """404 with a web page: a proxy's, or that of a server which is no Silo at all."""
+
+
+@dataclass(frozen=True)
+class Reply:
+    """One answer of a server. ``headers`` is read without regard to case."""
+
+    status: int
+    content: bytes
+    where: Where
+    headers: Mapping[str, str] = field(default_factory=dict)
+    secret: str | None = field(default=None, repr=False)
+
+    @property
+    def ok(self) -> bool:
+        return 200 <= self.status < 300
+
+    @property
+    def is_html(self) -> bool:
+        """True for a web page, which no route of the API answers."""
+        kind = self.headers.get("Content-Type", "").lower()
+        return "html" in kind or self.content[:200].lstrip()[:1] == b"<"
+
+    @property
+    def total(self) -> int:
+        """How many things there are on all pages; 0 where the server does not say."""
+        return whole_number(self.headers.get("X-Total-Count", "")) or 0
+
+    def data(self) -> Any:
+        """The JSON of a good answer; raises :class:`ServerFaultError` where it is none."""
+        if self.is_html:
+            raise ServerFaultError(
+                f"{self.where.asked} answered with a web page instead of data{_titled(self)}; "
+                "check that the address is that of a Silo server"
+            )
+        with translated(self.where):
+            return json.loads(self.content)
+
+    def mapping(self, accept: Sequence[int] = ()) -> dict[str, Any]:
+        """The answer as a plain object; a bad status that is not in ``accept`` raises by :func:`error_of`."""
+        if not self.ok and (self.status not in accept or self.is_html):
+            raise error_of(self)
+        data = self.data()
+        if not isinstance(data, dict):
+            raise ServerFaultError(f"{self.where.asked} answered no object where one was wanted")
+        return data
+
+    def version(self) -> str | None:
+        """The version that the answer bears: its ETag, else ``version`` in its body."""
+        tag = self.headers.get("ETag", "").removeprefix("W/").strip('"')
+        data = self.data() if not tag else None
+        return tag or (str(data["version"]) if isinstance(data, dict) and "version" in data else None)
+
+    def model(self, kind: type[Model]) -> Model:
+        """The answer as one of the wire models."""
+        data = self.data()
+        with translated(self.where):
+            return kind.model_validate(data)
+
+    def is_null(self, *keys: str) -> bool:
+        """True where null stands for the list, by itself or under one of ``keys``."""
+        return _under(self.data(), keys) is None
+
+    def models(self, kind: type[Model], *keys: str) -> list[Model]:
+        """The answer as a list of models: a bare list, or an object that holds it under one of ``keys``."""
+        found = _under(self.data(), keys)
+        if found is None:
+            found = []  # Go's empty list
+        if not isinstance(found, list):
+            raise ServerFaultError(
+                f"{self.where.asked} answered no list where one was wanted ({', '.join(keys)})"
+            )
+        with translated(self.where):
+            return TypeAdapter(list[kind]).validate_python(found)  # type: ignore[valid-type]
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """What an error body says, whatever its form: machine code, text for people, and the list of problems."""
+
+    code: str = ""
+    text: str = ""
+    problems: tuple[str, ...] = ()
+    path: tuple[str, ...] = ()
+    revision: dict[str, Any] | None = None
+
+
+def complaint(reply: Reply) -> Complaint:
+    """Read an error body; never fails, whatever the bytes are."""
+    if reply.is_html:
+        return Complaint(text=_clean(_titled(reply).strip(" ()"), reply.secret))
+    try:
+        body = json.loads(reply.content)
+    except (ValueError, RecursionError):
+        return Complaint(text=_clean(reply.content[: 8 * _MAX_TEXT].decode("utf-8", "replace"), reply.secret))
+    if not isinstance(body, dict):
+        return Complaint(text=_clean(body, reply.secret))
+    error, message, detail = (body.get(key) for key in ("error", "message", "detail"))
+    if isinstance(error, dict):  # {"error": {"code": …, "message": …}}
+        message, error = message or error.get("message"), error.get("code")
+    problems = _texts(body.get("problems"), reply) or _texts(detail, reply)
+    text = message or (detail if isinstance(detail, str) else "") or error or ""
+    return Complaint(
+        code=error if isinstance(error, str) and " " not in error else "",
+        text=_clean(text, reply.secret),
+        problems=problems,
+        path=_texts(body.get("path"), reply),
+        revision=newer if isinstance(newer := body.get("revision"), dict) else None,
+    )
+
+
+def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
+    """The error that a bad status stands for; 503 on ``writing`` is a read-only server, else no server."""
+    said = complaint(reply)
+    told = f": {said.text}" if said.text else ""
+    asked, host, status = reply.where.asked, reply.where.host, reply.status
+    if status == 401 and not reply.secret:
+        return AuthError(
+            f"{host} wants a token, and none was given. `silo-mod login URL` asks for one and keeps it; "
+            "SILO_API_TOKEN or the settings name one too"
+        )
+    if status == 401:
+        return AuthError(
+            f"{host} does not accept the token{told}. Give a valid one (SILO_API_TOKEN, or the settings; "
+            "`silo-mod doctor` shows which one is used)"
+        )
+    if status == 403:
+        return ForbiddenError(f"{asked}: this token may not do that{told}. Ask for the editor role")
+    if status == 404 and reply.is_html:
+        return WebPageError(
+            f"{asked}: not found, says a web page{told}; is this the address of a Silo server?"
+        )
+    if status in (405, 501) or (status == 404 and _router_speaks(said)):
+        return RouteMissingError(f"{asked}: this server does not know the request ({status}){told}")
+    if status in (404, 410):
+        return NotFoundError(f"{asked}: not found{told}")
+    if status == 409:
+        if said.code == NewerRevisionError.code and said.revision is not None:
+            return NewerRevisionError(f"{asked}{told}", said.revision)
+        if said.code == MissingRevisionError.code:
+            return MissingRevisionError(f"{asked}{told}")
+        cycle = len(said.path) > 1
+        return (
+            CycleError(said.path)
+            if cycle
+            else ConflictError(f"{asked}: in conflict with what is there{told}")
+        )
+    if status == 412:
+        return VersionConflictError(
+            f"{asked}: somebody changed it meanwhile{told}. Read it again, then repeat"
+        )
+    later = retry_after(reply) if status in _LATER else None
+    if status == 503 and writing and not reply.is_html and _read_only(said, later):
+        closed = ReadOnlyError(f"{host} takes no changes now{told}. Nothing is lost; it can be sent later")
+        closed.named = _names_read_only(said)
+        return _put_off(closed, later)
+    if status == 429 or (status == 503 and later is not None):
+        when = f"in {duration(later)}" if later is not None else "later"
+        return _put_off(BusyError(f"{host} is busy ({status}){told}. Try again {when}"), later)
+    if status in _LATER:
+        gone = UnreachableError(f"{host} cannot answer now ({status}){told}. Try again later")
+        gone.refused = status == 503
+        return _put_off(gone, later)
+    if 400 <= status < 500:
+        what = "; ".join(said.problems[:10]) or said.text or "no reason given"
+        rejected = RejectedError(f"{asked}: not accepted ({status}): {what}", said.problems)
+        rejected.status = status
+        return rejected
+    return ServerFaultError(f"{asked}: the server failed ({status}){told}")
+
+
+def retry_after(reply: Reply) -> float | None:
+    """The pause that the answer asks for, in seconds; None where it names none that can be read."""
+    text = reply.headers.get("Retry-After", "").strip()
+    if (seconds := whole_number(text, 300)) is not None:
+        return float(seconds)
+    try:
+        return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
+    except (ValueError, TypeError, OverflowError):
+        return None
+
+
+def _put_off(error: RemoteError, seconds: float | None) -> RemoteError:
+    error.retry_after = seconds
+    return error
+
+
+def _read_only(said: Complaint, later: float | None) -> bool:
+    # A server that names a time is busy, unless it says itself that it is read-only.
+    return _names_read_only(said) or (later is None and said.code not in _AWAY)
+
+
+def _names_read_only(said: Complaint) -> bool:
+    return _READ_ONLY.search(f"{said.code} {said.text}") is not None
+
+
+def _router_speaks(said: Complaint) -> bool:
+    named = said.code == RouteMissingError.code or said.text.startswith("Not Found: ")
+    return named or (not said.code and said.text in _ROUTER_SAYS)
+
+
+def _under(data: Any, keys: Sequence[str]) -> Any:
+    return next((data[key] for key in keys if key in data), data) if isinstance(data, dict) else data
+
+
+def _titled(reply: Reply) -> str:
+    found = _TITLE.search(reply.content[:20_000].decode("utf-8", "replace"))
+    return f" ({_clean(html.unescape(found[1]), reply.secret)})" if found else ""
+
+
+def _texts(value: Any, reply: Reply) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        return ()
+    return tuple(_clean(_problem(entry), reply.secret) for entry in value[:1000])
+
+
+def _problem(entry: Any) -> Any:
+    if isinstance(entry, dict) and "msg" in entry:  # pydantic's form, as FastAPI sends it
+        place = ".".join(str(part) for part in entry.get("loc", ()) if part != "body")
+        return f"{place}: {entry['msg']}" if place else entry["msg"]
+    return entry
+
+
+def _clean(value: Any, secret: str | None) -> str:
+    # A server's text is shown to people: one line, bounded, no terminal codes, and never our own token.
+    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
+    if secret:
+        text = text.replace(secret, "[token]")
+    text = " ".join(_CONTROL.sub(" ", text).split())
+    return text if len(text) <= _MAX_TEXT else text[: _MAX_TEXT - 1] + "…"
 
 
 class Scope(StrEnum):
@@ -93,6 +528,8 @@ def judge(error: SiloError, alive: Callable[[], object] | None = None) -> Verdic
         return Verdict(_scope(error, alive), Then.RETRY, wait)
     if isinstance(error, RouteMissingError):
         return Verdict(Scope.KIND, Then.RETRY)
+    if isinstance(error, NotFoundError):
+        return Verdict(Scope.ENTRY, Then.RETRY, wait)
     return Verdict(Scope.ENTRY, Then.PERSON)
 
 
@@ -104,6 +541,16 @@ def _scope(error: SiloError, alive: Callable[[], object] | None) -> Scope:
     except SiloError:
         return Scope.ALL
     return Scope.ENTRY
+
+
+def is_certain(error: SiloError) -> bool:
+    """True where the server certainly did not do what was asked, and only that: the rest may be sent."""
+    if isinstance(error, ReadOnlyError):
+        return not error.named
+    if isinstance(error, UnreachableError):
+        return error.refused
+    lost = isinstance(error, ServerFaultError | WebPageError)
+    return not lost and judge(error, lambda: None).scope is not Scope.ALL
 
 
 def ends_run(error: SiloError, api: object = None) -> bool:
@@ -153,12 +600,23 @@ class Backoff:
         return max(full * (1.0 - chance / 2.0), told or 0.0)
 
 
+def pause_after(error: SiloError, failures: int, now: float, backoff: Backoff, chance: float) -> Pause:
+    """The pause after an error, which is the so-manieth in a row."""
+    wait = told_wait(error)
+    refused = isinstance(error, AuthError | ConfigError) and not isinstance(error, ForbiddenError)
+    if isinstance(error, UnreachableError):  # whoever is back in the network wants to see it soon
+        backoff = replace(backoff, longest=max(backoff.first, min(backoff.longest, 60.0)))
+    until = math.inf if refused else now + backoff.pause(failures, chance, wait)
+    return Pause(until, str(error), error.code, failures, wait is not None)
+
+
 @dataclass(frozen=True)
 class Retries:
     """How often one request is tried in all, the first pause and the longest one (seconds).
 
     ``busy_tries``: the same for a server that puts us off (429, 503 with Retry-After); None: ``tries``.
-    ``chance`` gives numbers in [0, 1) that spread many clients out; ``sleep`` waits.
+    ``chance`` gives numbers in [0, 1) that spread many clients out; ``sleep`` waits; ``tell`` gets the
+    seconds of each pause and its error before.
     """
 
     tries: int = 3
@@ -167,6 +625,7 @@ class Retries:
     chance: Callable[[], float] = random.random
     sleep: Callable[[float], object] = time.sleep
     busy_tries: int | None = None
+    tell: Callable[[float, SiloError], object] = lambda _seconds, _error: None
 
     def pause(self, attempt: int, error: SiloError, *, harmless: bool) -> float | None:
         """Seconds to wait after failed attempt ``attempt`` (from 1); None: give up and report the error."""

@@ -103,7 +103,22 @@ Quantity = Annotated[
 ]
 
 
-class Item(Record):
+class ItemTexts(Wire):
+    """The columns of an item that people write and nothing is computed from.
+
+    A new column is a field here, and a column of the server's table with its migration. Requests, answers,
+    the form, the page, the search and the schema follow. ``long``: several lines; ``options``: the choices.
+    """
+
+    sourcing_type: Annotated[
+        str | None, Field(title="Sourcing", json_schema_extra={"options": ["manufactured", "purchased"]})
+    ] = None
+    long_description: Annotated[
+        str | None, Field(title="Long description", json_schema_extra={"long": True})
+    ] = None
+
+
+class Item(ItemTexts, Record):
     """An item of the PLM. ``id`` is its stable UUID; the part number may be renamed."""
 
     id: str = Field(validation_alias=AliasChoices("id", "uuid"))
@@ -114,8 +129,6 @@ class Item(Record):
     current_revision: int = 0
     created_at: Time = None
     updated_at: Time = None
-    sourcing_type: str | None = None
-    long_description: str | None = None
     thumbnail_key: str | None = None
     category: str | None = None
     bom_version: int | None = None
@@ -181,7 +194,7 @@ class MergeEntry(Wire):
 
 
 class LeftOutPart(Wire):
-    """Something that the assembly holds and the request does not (:class:`silo.bom.left_out.LeftOut`)."""
+    """Something that the assembly holds and the request does not (:class:`silo.bom.report.LeftOut`)."""
 
     reason: str
     name: str = ""
@@ -310,11 +323,22 @@ class LinkedFile(Wire):
     item, sha256
         the UUID of its item and the hash of its content when the linking file was committed; "" where that
         was not known.
+    document
+        the UUID of its document, for a file that is no single item's.
     """
 
     path: str = Field(min_length=1, max_length=1000)
     item: str = Field(default="", max_length=64)
     sha256: str = Field(default="", pattern="^([0-9a-f]{64})?$")
+    document: str = Field(default="", max_length=64)
+
+
+class HeldItem(Wire):
+    """An item in a file: its UUID, and the name of the object that it is; "" for the file as a whole."""
+
+    item: str = Field(max_length=64)
+    object: str = Field(default="", max_length=200)
+    part_number: str = ""
 
 
 class Revision(Record):
@@ -346,6 +370,24 @@ class Revision(Record):
     links: list[LinkedFile] = Field(default_factory=list)
 
 
+class Document(Revision):
+    """A file of a project as it is now: its UUID, with the fields of its newest revision.
+
+    part_number
+        of the item whose revisions are those of the file; "" for a file of several items, or of none.
+    holds
+        the items in it.
+    linked, used_by
+        the documents that it links to, and those that link to it; only if one document is asked for.
+    """
+
+    id: str
+    part_number: str = ""
+    holds: list[HeldItem] = Field(default_factory=list)
+    linked: list[Document] = Field(default_factory=list)
+    used_by: list[Document] = Field(default_factory=list)
+
+
 class WhereUsedLine(Record):
     """A parent that has the item on its BOM."""
 
@@ -373,6 +415,8 @@ class ServerState(Record):
 
     takes_item_ids
         a new item gets the UUID that the client proposes.
+    browser_login
+        the page ``/login/program`` lets a program in.
     """
 
     mode: str = "normal"
@@ -380,3 +424,9 @@ class ServerState(Record):
     version: str = ""
     sse_clients: int | None = None
     takes_item_ids: bool = False
+    browser_login: bool = False
+
+
+def login_code(proof: str) -> str:
+    """Return what a program and the page that lets it in both show, so that a person can compare."""
+    return f"{proof[:4]}-{proof[4:8]}".upper()

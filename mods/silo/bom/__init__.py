@@ -10,19 +10,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from silo.bom.diff import diff_bom
+    from silo.bom.compare import MergePlan, apply_merge, diff_bom, plan_merge
     from silo.bom.findings import Finding, FindingCode, Place, Severity
     from silo.bom.links import extract, extract_bom_links
-    from silo.bom.merge import MergePlan, apply_merge, plan_merge
     from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
     from silo.bom.resolve import resolve_part_numbers
     from silo.bom.roots import choose_assembly
 
 _HOME = {
-    "diff": ("diff_bom",),
+    "compare": ("MergePlan", "apply_merge", "diff_bom", "plan_merge"),
     "findings": ("Finding", "FindingCode", "Place", "Severity"),
     "links": ("extract", "extract_bom_links"),
-    "merge": ("MergePlan", "apply_merge", "plan_merge"),
     "model": ("BomChange", "BomDiff", "BomEntry", "Extraction", "QuantityChange"),
     "resolve": ("resolve_part_numbers",),
     "roots": ("choose_assembly",),

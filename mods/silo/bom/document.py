@@ -54,6 +54,15 @@ class ObjectLike(Protocol):
     def isDerivedFrom(self, type_name: str, /) -> bool: ...
 
 
+def saved_by(program: str | None) -> tuple[int, ...]:
+    """The version of the FreeCAD that saved a file, such as (1, 0), by its ``ProgramVersion``; () for none.
+
+    The numbers of realthunder's branch are dates (2022.111), and say nothing about FreeCAD's.
+    """
+    found = re.match(r"(\d{1,3})\.(\d+)", program or "")
+    return tuple(map(int, found.groups())) if found else ()
+
+
 def derived(obj: Any, type_name: str) -> bool:
     """True where ``obj`` says it is of (a type derived from) ``type_name``."""
     try:
@@ -79,6 +88,11 @@ def property_names(obj: object) -> frozenset[str] | tuple[str, ...] | None:
     """The names of the object's own properties, to be used as a key; None where it does not say."""
     names: Sequence[str] | frozenset[str] | None = getattr(obj, "PropertiesList", None)
     return names if names is None or isinstance(names, tuple | frozenset) else tuple(names)
+
+
+def first_of(linked: Any) -> Any:
+    """The object of a ``LinkedObject``, which is a tuple (object, sub-name) where there is a sub-name."""
+    return linked[0] if isinstance(linked, tuple) else linked
 
 
 def same_document(a: object, b: object) -> bool:

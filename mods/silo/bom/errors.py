@@ -6,6 +6,7 @@
     SiloError
     ├── InputError              ours to mend: a file, an argument, a configuration
     │   ├── DocumentError       a FreeCAD document cannot be read or written
+    │   ├── SeveralAssembliesError  a document holds several, and none was named
     │   └── ConfigError         the configuration is missing or contradicts itself
     ├── RemoteError             the server's, or the way to it
     │   ├── UnreachableError    no answer (no network, refused, timed out)
@@ -31,7 +32,7 @@ A message says what was wanted, what was got, where, and what to do.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
 from typing import Any, ClassVar
 
@@ -57,6 +58,34 @@ def did_you_mean(given: str, known: Iterable[str]) -> str:
     """The end of a sentence about an unknown name: the known ones that look like it; "" where none does."""
     near = difflib.get_close_matches(given, list(known), 2, 0.7)
     return f"; did you mean {' or '.join(near)}?" if near else ""
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """Return "1 item" or "2 items"; ``many`` if the plural is not ``one`` with an s."""
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+# As ``FreeCAD.Qt.translate``: (context, text) -> the text in the user's language.
+Translate = Callable[[str, str], str]
+
+
+def english(_context: str, text: str) -> str:
+    """Return the text as it stands."""
+    return text
+
+
+def duration(seconds: float) -> str:
+    """Return a span of time as people say it: 40 s, 10 min, 26 hours, 27000 days."""
+    for size, unit in ((86400.0, "days"), (3600.0, "hours"), (60.0, "min")):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"
+
+
+def listed(names: Sequence[str], most: int = 5) -> str:
+    """Return the first ``most`` names, and how many more there are: a, b and 3 more."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 class SiloError(Exception):
@@ -88,6 +117,16 @@ class DocumentError(InputError):
         self.reason = reason
 
 
+class SeveralAssembliesError(InputError):
+    """A file holds several assemblies, and nobody said which is meant; ``names``: those of FreeCAD."""
+
+    code = "several_assemblies"
+
+    def __init__(self, message: str, path: str = "", names: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.path, self.names = path, tuple(names)
+
+
 class ConfigError(InputError):
     """The configuration is missing or contradicts itself."""
 
@@ -104,7 +143,9 @@ class RemoteError(SiloError):
 
 
 class UnreachableError(RemoteError):
-    """No answer: no network, connection refused, timed out."""
+    """No answer: no network, connection refused, timed out. ``refused``: a 503, so nothing was processed."""
+
+    refused: bool = False
 
     status_hint = 504
     code = "unreachable"
@@ -163,7 +204,12 @@ class RejectedError(RemoteError):
 
 
 class ReadOnlyError(RemoteError):
-    """503: the server takes no changes now; the same request may succeed later."""
+    """503: the server takes no changes now; the same request may succeed later.
+
+    ``named``: it says so itself; else only what answered may be out of order, as the store of files.
+    """
+
+    named: bool = True
 
     status_hint = 503
     code = "read_only"

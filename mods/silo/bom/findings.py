@@ -58,6 +58,8 @@ class FindingCode(StrEnum):
     LOST_ASSEMBLY = "lost_assembly"
     RESPELT = "respelt"
     EMPTY_BOM = "empty_bom"
+    NO_ROLE = "no_role"
+    TWO_ROLES = "two_roles"
     CONSOLIDATION = "consolidation"
     # identity
     COPIED_IDENTITY = "copied_identity"
@@ -66,6 +68,166 @@ class FindingCode(StrEnum):
     # against the server
     UNREFERENCED = "unreferenced"
     CONFLICT = "conflict"
+
+    @property
+    def meaning(self) -> str:
+        """What several of them have in common, in words, as in "15 × ..."."""
+        return _TABLE[self][0]
+
+    @property
+    def remedy(self) -> str:
+        """What a person does about it, for the reference; in Markdown."""
+        return _TABLE[self][1]
+
+
+# What it is, and what a person does about it.
+_TABLE = {
+    FindingCode.MISSING_FILE: (
+        "a file that an assembly links to is not there",
+        "put the file back, or `silo-mod relink` where it has moved; `--allow-missing` syncs the rest",
+    ),
+    FindingCode.MISSING_OBJECT: (
+        "a file lacks the object that an assembly links to",
+        "open the assembly and set the link anew; the part was deleted or replaced in its file",
+    ),
+    FindingCode.UNREADABLE_FILE: (
+        "a file that an assembly links to cannot be read",
+        "open the file in FreeCAD and save it, or take an older state from a backup or from Silo",
+    ),
+    FindingCode.LFS_POINTER: (
+        "a Git LFS pointer, not the file itself; `git lfs pull` fetches it",
+        "`git lfs pull`",
+    ),
+    FindingCode.OUTSIDE_ROOT: (
+        "a link leads out of the project's folder",
+        "move the file into the project and link to it there",
+    ),
+    FindingCode.BROKEN_LINK: ("a link is broken", "open the assembly and set the link anew, or delete it"),
+    FindingCode.CYCLE: (
+        "an assembly contains itself",
+        "delete one of the links of the ring that the message names",
+    ),
+    FindingCode.TOO_DEEP: (
+        "an assembly is nested too deep",
+        "look for a link that leads back into the assembly; else flatten a level",
+    ),
+    FindingCode.TWO_ROLES: (
+        "an object has two roles in the count; please report this",
+        "report it, with the file if you may",
+    ),
+    FindingCode.NO_ROLE: (
+        "an object has no role in the count; please report this",
+        "report it, with the file if you may",
+    ),
+    FindingCode.UNSET_LINK: ("a link leads nowhere", "give the link a target, or delete it"),
+    FindingCode.IN_DOCUMENT_LINK: (
+        "a link leads to an object of its own file",
+        "nothing; it says how the link was counted",
+    ),
+    FindingCode.SUB_ELEMENT_LINK: (
+        "a link leads to a part of an object",
+        "nothing, if it is a reference; else link to the whole part",
+    ),
+    FindingCode.NO_COMPONENT: (
+        "a link leads to what is no component",
+        "nothing; it says what was not counted",
+    ),
+    FindingCode.SUPPRESSED: (
+        "suppressed, so not counted",
+        "nothing, if it is meant; else end the suppression",
+    ),
+    FindingCode.EXCLUDED: (
+        "excluded by hand, so not counted",
+        "nothing, if it is meant; else set `SiloBomExclude` to false",
+    ),
+    FindingCode.MIRRORED: (
+        "a mirrored part, counted as the part itself",
+        "make the mirrored part a part of its own if it is bought or made differently",
+    ),
+    FindingCode.VARIANT: (
+        "a variant, counted as the part itself",
+        "save the variant as a part of its own if it needs a number",
+    ),
+    FindingCode.DRAFT_ARRAY: ("a Draft array", "nothing; a link array would be clearer"),
+    FindingCode.ARRAY_SIZE: ("the size of an array is not known", "recompute the array in FreeCAD and save"),
+    FindingCode.CONSUMED: (
+        "used up by another object, so not counted",
+        "nothing, if it is no piece to buy; else take it out of the cut or fusion",
+    ),
+    FindingCode.NO_HARDWARE: (
+        "standard parts are left out",
+        "leave out `--no-hardware`, or change the setting, to count them",
+    ),
+    FindingCode.SAME_ARTICLE: (
+        "several designations are one standard part",
+        "use one standard for it in the project",
+    ),
+    FindingCode.LOCAL_GEOMETRY: (
+        "modelled in the assembly's file, so not counted",
+        "`silo-mod register TOP.FCStd --declare OBJECT` what is a part; set `SiloBomExclude` on the rest",
+    ),
+    FindingCode.FOREIGN_COMPONENT: (
+        "a component of another program",
+        "import the part again from an FCStd file",
+    ),
+    FindingCode.NO_CONTAINER: (
+        "components lie in no assembly",
+        "put the components into an assembly, or leave it: they are counted",
+    ),
+    FindingCode.BESIDE_ASSEMBLY: (
+        "components lie beside the assembly, so they are not counted",
+        "move into the assembly what belongs to it",
+    ),
+    FindingCode.COUNTED_BESIDE: (
+        "components lie beside the assembly, and are counted",
+        "move them into the assembly",
+    ),
+    FindingCode.UNKNOWN_LINK_TYPE: ("an unknown kind of link", "check the quantity; report the type"),
+    FindingCode.NEWER_FREECAD: (
+        "saved by a FreeCAD newer than the newest that was tried",
+        "check the quantities with `silo-mod bom --verify`",
+    ),
+    FindingCode.STALE_ASSEMBLY_LINK: (
+        "a link to an assembly shows an old state of it",
+        "recompute the assembly in FreeCAD and save",
+    ),
+    FindingCode.LOST_ASSEMBLY: (
+        "FreeCAD 0.20 lost the assembly of a newer one",
+        "use FreeCAD 1.0 or newer for this file, and do not save it in 0.20",
+    ),
+    FindingCode.RESPELT: (
+        "a path is recorded in other letters than the file's",
+        "name the file in the letters of the link, or `silo-mod relink`: other systems do not find it",
+    ),
+    FindingCode.EMPTY_BOM: (
+        "an assembly without components",
+        "nothing, if it is empty; else look at what the other findings leave out",
+    ),
+    FindingCode.CONSOLIDATION: (
+        "many single links to one part; an array would be clearer",
+        "nothing; the count is right. An array is easier to change",
+    ),
+    FindingCode.COPIED_IDENTITY: (
+        "several files carry one Silo identity",
+        "say in the register dialog whether it is the same part or a new part",
+    ),
+    FindingCode.SHARED_IDENTITY: (
+        "several components of a file carry one Silo identity",
+        "remove the identity of the copy, then register it",
+    ),
+    FindingCode.UNREGISTERED: (
+        "a component without a part number",
+        "`silo-mod register`, or *Register Parts…* in FreeCAD",
+    ),
+    FindingCode.UNREFERENCED: (
+        "a line that no component uses any more",
+        "on the BOM page: *Remove* it, or *Keep as intentional*",
+    ),
+    FindingCode.CONFLICT: (
+        "a manual line that is a component as well",
+        "on the BOM page: take the quantity of CAD, or keep that of Silo",
+    ),
+}
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -63,11 +63,11 @@ _ALIASES: dict[Role, str] = {
         einzelgewicht; stückgewicht; masse unitaire; poids; poids unitaire; masa; masa unitaria; peso;
         peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重; gew;
         einzelgew; nettogewicht; pds; 単重; 単体質量; 単体重量; 净重; 单件重量; 질량; 무게;
-        wt; unit wt; nx mass""",
+        wt; unit wt; nx mass; sw mass; pro mp mass; mp mass""",
     Role.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass; extended weight;
         gesamtmasse; gesamtgewicht; masse totale; poids total; masa total; peso total; massa totale;
         peso totale; 总重量; 総質量; 総重量; 合計質量; 总质量; 总重; 總重; 合计重量;
-        小计重量; 質量計; 重量計; total wt; ext wt""",
+        小计重量; 質量計; 重量計; total wt; ext wt; posgewicht; pos gewicht; positionsgewicht""",
     Role.MASS_UNIT: """mass unit; mass units; weight unit; weight units; unit of mass; unit of weight;
         mass uom; weight uom; gewichtseinheit; masseneinheit; unité de masse; unidad de masa""",
     Role.QUANTITY: """quantity; qty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité; qté; nb;

@@ -8,7 +8,7 @@ The rules of this module:
 * an assembly inside itself is cut where it closes the ring, and reported as a cycle;
 * whatever is not counted has a finding.
 
-What one assembly holds is read by :mod:`silo.bom.walk.contents`, each once; this module puts the levels
+What one assembly holds is read by :mod:`silo.bom.walk.roles`, each once; this module puts the levels
 together. It walks live FreeCAD objects, objects read from FCStd files and the tests' fakes alike.
 """
 
@@ -19,18 +19,18 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from silo.bom.document import NAMELESS, label_of, object_name
+from silo.bom.document import NAMELESS, label_of, object_name, own
+from silo.bom.errors import SeveralAssembliesError
 from silo.bom.findings import Finding, FindingCode, Place
-from silo.bom.identity import identity_findings, identity_of, walk_entries
-from silo.bom.model import BomEntry, Extraction
-from silo.bom.roots import Whole, as_it_is, beside, loose_hardware
-from silo.bom.walk.contents import Reader
-from silo.bom.walk.counts import Count, Key, Lost
+from silo.bom.model import BomEntry, Extraction, identity_findings, identity_of, sole_identity, walk_entries
+from silo.bom.roots import Whole, as_it_is, beside, choose_assembly, fates, loose_hardware
 from silo.bom.walk.kinds import is_container, is_named_assembly
 from silo.bom.walk.notes import Notes
 from silo.bom.walk.rings import Rings
+from silo.bom.walk.roles import Reader
 from silo.bom.walk.standard import same_articles, standard_uuid
 from silo.bom.walk.targets import Inspect, resolve_target
+from silo.bom.walk.tree import Count, Key, Lost
 
 # Real assemblies are some ten levels deep; deeper is an attack or a loop that no other guard saw.
 MAX_LEVELS = 64
@@ -45,6 +45,45 @@ def extract_bom_links(assembly_obj: Any, level: int = 1) -> list[BomEntry]:
     :func:`extract`.
     """
     return list(extract(assembly_obj, level=level).entries)
+
+
+def file_bom(
+    document: Any, hint: Any = None, walk: Callable[[Any], Extraction] | None = None
+) -> tuple[str | None, Extraction | None]:
+    """Return the item whose revisions are those of a file, and the BOM of its assembly; None for each that
+    there is not.
+
+    hint
+        the container to take if the document holds several assemblies.
+    walk
+        reads a container, :func:`extract` unless given.
+
+    Raises SeveralAssembliesError.
+    """
+    try:
+        container = choose_assembly(document)
+    except SeveralAssembliesError:
+        if hint is None:
+            raise
+        container = hint
+    found = (walk or extract)(container)
+    is_assembly = container.isDerivedFrom("Assembly::AssemblyObject") or own(container, "Type") == "Assembly"
+    whole = sole_identity(document)
+    if not (found.entries or found.blocked or is_assembly):
+        return whole, None
+    head = found.assembly
+    item = head.silo_uuid or whole
+    return item, replace(found, assembly=replace(head, silo_uuid=item))
+
+
+def file_item(document: Any, hint: Any = None) -> str | None:
+    """Return the item that a file belongs to, as :func:`file_bom`; mostly without a look for the assembly."""
+    if found := sole_identity(document):
+        return found
+    try:
+        return identity_of(choose_assembly(document))
+    except SeveralAssembliesError:
+        return identity_of(hint) if hint is not None else None
 
 
 def extract(
@@ -83,12 +122,14 @@ def extract(
         entries = walker.tree(top, level)
     head = walker.entry_for(top)
     holds = head.is_assembly or (below and bool(entries)) or walker.holds(top)
-    head = replace(head, level=level - 1, is_assembly=holds)
-    if entries or walker.notes.any_blocking():
+    mine = walker.own_lines(top, level) if target.obj is not None else ()
+    head = replace(head, level=level - 1, is_assembly=holds, own=mine)
+    if entries or mine or walker.notes.any_blocking():
         walker.notes.container(top)
     else:
-        walker.notes.empty(head, walker.modelled_in(top))
-    walker.notes.beside(beside(top, walker.silent), empty=not entries)
+        walker.notes.empty(head)
+    if target.obj is not None:
+        walker.look_beside(top, empty=not entries)
     for one, other in same_articles_of(walk_entries(entries)):
         walker.notes.same_article(one, other)
     findings = walker.notes.findings()
@@ -178,10 +219,6 @@ class _Walker:
             shown.append(obj)
         return (path, f"{NAMELESS}{place + 1}" if place else "")
 
-    def modelled_in(self, top: Any) -> int:
-        """How many objects are modelled in an assembly's own file."""
-        return len(self._reader.contents(top).local)
-
     def entry_for(self, obj: Any) -> BomEntry:
         """What an object says of itself, wherever it is used."""
         path, name = key = self.component(obj)
@@ -249,16 +286,17 @@ class _Walker:
         for count in contents.counts:
             name = self.component(count.target)
             if self._rings.closes(entry, key, name):
-                self.notes.cycle(count.shown, self._rings.example(name))
+                self.notes.cycle(count.shown.obj, self._rings.example(name))
             else:
                 lines.setdefault(name, []).append(count)
         entries = []
         for name, counts in lines.items():
             inner = entry if self._rings.same_ring(key, name) else name
-            children = self._below(counts[0].target, level + 1, depth + 1, inner)
-            entries.append(self._entry(counts, level, children))
-        if contents.holds_components or is_named_assembly(container) or depth == 1:
-            self.notes.local_geometry(container, contents.local)
+            target = counts[0].target
+            children = self._below(target, level + 1, depth + 1, inner)
+            goes_on = self._goes_below and self._is_container(name, target)
+            mine = self.own_lines(target, level + 1) if goes_on else ()
+            entries.append(self._entry(counts, level, children, own=mine))
         self._memo[(key, level, entry)] = tuple(entries)
         return self._memo[(key, level, entry)]
 
@@ -270,7 +308,29 @@ class _Walker:
             return ()
         return self._assembly(target, level, depth, entry)
 
-    def _entry(self, counts: list[Count], level: int, children: tuple[BomEntry, ...]) -> BomEntry:
+    def look_beside(self, top: Any, *, empty: bool) -> None:
+        """Report what lies beside the top, and objects without a role: nobody knows what those are."""
+        roles = fates(top, self._reader.contents(top), self.silent)
+        for name, role in roles.items():
+            if role is None:
+                self.notes.without_role(top.Document.getObject(name))
+        self.notes.beside(beside(top, roles), empty=empty)
+
+    def own_lines(self, container: Any, level: int) -> tuple[BomEntry, ...]:
+        """What an assembly shows of its own file and is no item yet."""
+        contents = self._reader.contents(container)
+        if not contents.is_assembly(container):
+            return ()
+        lines: dict[Key, list[Count]] = {}
+        for count in contents.own:
+            lines.setdefault(count.key, []).append(count)
+        found = [self._entry(counts, level, (), silo_uuid=None) for counts in lines.values()]
+        self.notes.own_parts(container, found)
+        return tuple(found)
+
+    def _entry(
+        self, counts: list[Count], level: int, children: tuple[BomEntry, ...], **more: Any
+    ) -> BomEntry:
         target = counts[0].target
         entry = self.entry_for(target)
         links = [count for count in counts if count.link]
@@ -282,7 +342,8 @@ class _Walker:
             "consolidation_warning": len(links) > 1,
             "individual_links": sum([not link.array for link in links]),
             "link_objects": len(links),
-            "instances": tuple([object_name(count.shown) for count in counts]),
+            "instances": tuple([object_name(count.shown.obj) for count in counts]),
+            **more,
         }
         return BomEntry(**(vars(entry) | found))  # dataclasses.replace() takes twice as long
 

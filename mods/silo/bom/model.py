@@ -3,6 +3,18 @@
 
 All are frozen. Equality is that of the spec's fields and the component's key; where a value was found
 (labels, places) and what follows from the component itself takes no part in it.
+
+Where a component's Silo identity is written, and what it means to find one twice.
+
+Read in this order (the real Silo writes ``SiloItemId`` on objects, the spec ``SiloUUID`` on documents):
+
+1. the object's own ``SiloItemId``, then its own ``SiloUUID``;
+2. ``Meta["SiloUUID/<object Name>"]`` of its document: one file may give several parts, and FreeCAD 0.20 has
+   no document properties but keeps ``Meta``;
+3. the document's ``SiloUUID`` property;
+4. ``Meta["SiloUUID"]`` of its document.
+
+Part numbers are never parsed, and never taken from labels.
 """
 
 from __future__ import annotations
@@ -11,6 +23,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
+from silo.bom.document import document_property, object_name, own
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.walk.standard import STANDARD_PARTS, standard_uuid
 
@@ -76,6 +89,8 @@ class BomEntry:
         keys of the other components that have the same part number and were added to this line.
     unregistered
         direct children without a part number, which ``children`` no longer has once they are resolved.
+    own
+        what an assembly shows of its own file and is no item yet: never sent, until a person declares it.
     """
 
     doc_path: str
@@ -97,9 +112,10 @@ class BomEntry:
     standard: str | None = None
     also: tuple[tuple[str, str], ...] = field(default=Frozen(), compare=False, repr=False)
     unregistered: tuple[BomEntry, ...] = field(default=Frozen(), compare=False, repr=False)
+    own: tuple[BomEntry, ...] = field(default=Frozen(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        _freeze(self, "children", "instances", "also", "unregistered")
+        _freeze(self, "children", "instances", "also", "unregistered", "own")
 
     @property
     def key(self) -> tuple[str, str]:
@@ -169,14 +185,26 @@ class BomChange(Row):
 
 @dataclass(frozen=True, eq=False)
 class QuantityChange(Row):
-    """A line that both sides have, with different quantities (changed, or a conflict with a manual line)."""
+    """A line that both sides have, with different quantities (changed, or a conflict with a manual line).
+
+    unit
+        that of the server's quantity if it does not count pieces, as CAD does; else no key of the mapping.
+    """
 
     part_number: str
     local_quantity: float
     remote_quantity: float | None
+    unit: str = ""
+
+    def _names(self) -> tuple[str, ...]:
+        return ("part_number", "local_quantity", "remote_quantity", *(("unit",) if self.unit else ()))
 
     def __hash__(self) -> int:
         return hash((self.part_number, self.local_quantity, self.remote_quantity))
+
+    def on_server(self, written: str) -> str:
+        """Return the server's quantity, as the caller writes numbers, with its unit."""
+        return f"{written} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -226,6 +254,7 @@ class BomDiff:
             found.append(Finding(FindingCode.UNREFERENCED, Severity.WARNING, message, places))
         for change in self.conflicts:
             kept = "no quantity" if change.remote_quantity is None else f"{change.remote_quantity:g}"
+            kept = change.on_server(kept)
             message = (
                 f"{change.part_number}: the assembly has {change.local_quantity:g}, a line kept by hand in "
                 f"the Silo BOM has {kept}. It stays as it is until somebody decides."
@@ -237,3 +266,108 @@ class BomDiff:
 def rows_as_dicts(rows: Iterable[Row]) -> list[dict[str, Any]]:
     """Plain dicts, for JSON."""
     return [dict(row) for row in rows]
+
+
+META_KEY = "SiloUUID"
+
+
+def meta_key(obj_name: str = "") -> str:
+    """The key in ``Meta`` for the whole document, or for one of its objects."""
+    return f"{META_KEY}/{obj_name}" if obj_name else META_KEY
+
+
+def _text(value: object) -> str | None:
+    return value.strip() or None if isinstance(value, str) else None
+
+
+def identity_of(obj: object) -> str | None:
+    """The Silo UUID of a component (the real part or assembly, not a link to it); None while unregistered."""
+    return own_identity(obj) or document_identity(getattr(obj, "Document", None))
+
+
+def own_identity(obj: object) -> str | None:
+    """The identity that is written for this very object, not for its document."""
+    for name in ("SiloItemId", "SiloUUID"):
+        if found := _text(own(obj, name)):
+            return found
+    name = object_name(obj)
+    return _text(_meta(getattr(obj, "Document", None)).get(meta_key(name))) if name else None
+
+
+def document_identity(doc: object) -> str | None:
+    """The identity that is written for a whole document."""
+    if doc is None:
+        return None
+    return _text(document_property(doc, "SiloUUID")) or _text(_meta(doc).get(META_KEY))
+
+
+def held_items(doc: object) -> tuple[tuple[str, str], ...]:
+    """Return what a document says of the items in it: (identity, object), in document order.
+
+    The object is "" for the identity of the file as a whole, which comes first.
+    """
+    whole = document_identity(doc)
+    own = [(own_identity(obj), object_name(obj)) for obj in getattr(doc, "Objects", None) or ()]
+    return (*([(whole, "")] if whole else ()), *((found, name) for found, name in own if found))
+
+
+def sole_identity(doc: object) -> str | None:
+    """Return the item that a file without an assembly belongs to; None for several or none."""
+    if whole := document_identity(doc):
+        return whole
+    found = {identity for identity, _ in held_items(doc)}
+    return found.pop() if len(found) == 1 else None
+
+
+def _meta(doc: object) -> Mapping[str, str]:
+    meta = getattr(doc, "Meta", None)
+    return meta if isinstance(meta, Mapping) else {}
+
+
+def walk_entries(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:
+    """Every distinct component below, each once, parents before children.
+
+    What lies below is looked at for each distinct value of a component: where a walk was cut (a ring, too
+    deep), one component may have fewer children in one place than in another.
+    """
+    yielded: set[tuple[str, str]] = set()
+    seen: dict[int, BomEntry] = {}  # nested assemblies share their values; kept, so that ids stay theirs
+    stack = list(reversed(tuple(entries)))
+    while stack:
+        entry = stack.pop()
+        if id(entry) in seen:
+            continue
+        seen[id(entry)] = entry
+        if entry.key not in yielded:
+            yielded.add(entry.key)
+            yield entry
+        stack.extend(reversed(entry.children))
+
+
+def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
+    """One UUID in two files ("copied identity"), or on two parts of one file ("shared identity")."""
+    users: dict[str, dict[tuple[str, str], BomEntry]] = {}
+    for entry in sorted(walk_entries(entries), key=lambda entry: entry.key):
+        if entry.silo_uuid:
+            users.setdefault(entry.silo_uuid.lower(), {})[entry.key] = entry
+    findings = []
+    for uuid, components in users.items():
+        if len(components) < 2:
+            continue
+        where = tuple(Place(path, obj) for path, obj in components)
+        files = list(dict.fromkeys(path for path, _ in components))
+        if len(files) > 1:
+            code = FindingCode.COPIED_IDENTITY
+            message = (
+                f"{len(files)} files carry the same Silo identity {uuid}: {', '.join(files)}. "
+                "Is it the same part, or is one of them a new part that needs its own number?"
+            )
+        else:
+            code = FindingCode.SHARED_IDENTITY
+            names = ", ".join(entry.label for entry in components.values())
+            message = (
+                f"{len(components)} components of {files[0]} share the Silo identity {uuid}: {names}. "
+                "They will count as one item; register them apart if they are different parts."
+            )
+        findings.append(Finding(code, Severity.WARNING, message, where))
+    return tuple(findings)

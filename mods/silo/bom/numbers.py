@@ -98,9 +98,9 @@ class Reading(NamedTuple):
 _SPACES = re.compile(r"(?<=\d)[\s'’_\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 _SHAPE = re.compile(r"(?P<sign>[+\-−]?)(?P<body>[0-9][0-9.,]*|[.,][0-9]+)(?:[eE](?P<exp>[+\-−]?[0-9]{1,3}))?")
 _FRACTION = re.compile(r"(?P<sign>[+\-−]?)(?P<whole>[0-9]*)\s?(?P<part>[¼-¾⅐-⅞])")
-_COUNT_WORD = re.compile(
-    r"(?P<number>.*?[0-9¼-¾⅐-⅞.,])\s*(?:x|×|pcs?|pieces?|ea|each|stk|st|stück|pz|個|个|件)\.?", re.IGNORECASE
-)
+_PIECES = r"(?:pcs?|pieces?|ea|each|units?|stk|stck|st|stück|pz|шт|個|个|件)\.?"
+_PIECE = re.compile(_PIECES, re.IGNORECASE)
+_COUNT_WORD = re.compile(rf"(?P<number>.*?[0-9¼-¾⅐-⅞.,])\s*(?:x|×|{_PIECES})", re.IGNORECASE)
 
 
 def parse_number(text: str, mark: Mark | None = None) -> Number | None:
@@ -150,6 +150,11 @@ def read_count(text: str, mark: Mark | None = None, *, points_are_decimal: bool 
     """As :func:`read_number`; the text may name what it counts: "4 pcs", "4x", "4 Stk."."""
     counted = _COUNT_WORD.fullmatch(text.strip())
     return read_number(counted["number"] if counted else text, mark, points_are_decimal=points_are_decimal)
+
+
+def counts_pieces(unit: str | None) -> bool:
+    """Return true for no unit and for "pcs" or the like: what a CAD quantity is counted in."""
+    return not unit or not unit.strip() or _PIECE.fullmatch(unit.strip()) is not None
 
 
 def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> Reading:

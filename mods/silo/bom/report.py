@@ -5,22 +5,32 @@ The JSON for people and machines has short paths. :func:`to_plain` keeps everyth
 for later: entries stand in a table, each distinct one once, because nested assemblies share their children
 and a tree written out in full could be exponentially larger. What a look-up adds (``also``,
 ``unregistered``) is a later step's and not kept.
+
+What a sync leaves out of an assembly's BOM: an incomplete BOM must never look like a complete one.
+
+The rules of this module:
+
+* only the assembly's direct children count; its sub-assemblies have a list of their own;
+* paths are relative to the assembly's file, with ``/``, so that two machines agree on them;
+* the list travels with the merge, and the server keeps that of the last one.
 """
 
 from __future__ import annotations
 
 import os.path
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, asdict, dataclass, fields
+from enum import StrEnum
 from types import ModuleType
 from typing import Any
 
 from silo.bom.document import relative
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.identity import walk_entries
-from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts
-from silo.bom.naming import display_name
+from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts, walk_entries
+from silo.bom.resolve import display_name
+from silo.bom.walk.standard import STANDARD_PARTS
 
 # A CAD model counts pieces.
 PIECES = "pcs"
@@ -64,6 +74,7 @@ def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
         "level": entry.level,
         "consolidation_warning": entry.consolidation_warning,
         "children": [entry_json(child, base) for child in entry.children],
+        **({"own": [entry_json(one, base) for one in entry.own]} if entry.own else {}),
     }
 
 
@@ -111,10 +122,13 @@ def check_tree_size(extraction: Extraction, most: int = MOST_LINES) -> None:
         )
 
 
-def bom_json(extraction: Extraction, findings: Sequence[Finding] | None = None) -> dict[str, Any]:
-    """The whole BOM of an assembly. Raises InputError where the tree is too large to be written out."""
+def bom_json(extraction: Extraction, base: str = "") -> dict[str, Any]:
+    """Return the whole BOM of an assembly. Raises InputError if the tree is too large to be written out.
+
+    Paths are relative to ``base``, else to the folder of the assembly's file.
+    """
     check_tree_size(extraction)
-    base = base_of(extraction)
+    base = base or base_of(extraction)
     head = extraction.assembly
     return {
         "assembly": {
@@ -126,7 +140,8 @@ def bom_json(extraction: Extraction, findings: Sequence[Finding] | None = None) 
             "name": head.name,
         },
         "entries": [entry_json(entry, base) for entry in extraction.entries],
-        "findings": [finding_json(f, base) for f in (extraction.findings if findings is None else findings)],
+        **({"own": [entry_json(one, base) for one in head.own]} if head.own else {}),
+        "findings": [finding_json(finding, base) for finding in extraction.findings],
     }
 
 
@@ -205,7 +220,8 @@ def diff_rows(diff: BomDiff) -> Iterator[tuple[str, str, str]]:
             if kind == "quantity_changed":
                 quantity = f"{_quantity(change.remote_quantity)} → {_quantity(change.local_quantity)}"
             elif kind == "conflicts":
-                quantity = f"CAD {_quantity(change.local_quantity)}, Silo {_quantity(change.remote_quantity)}"
+                kept = change.on_server(_quantity(change.remote_quantity))
+                quantity = f"CAD {_quantity(change.local_quantity)}, Silo {kept}"
             elif kind == "manual" and change.part_number in disputed:
                 continue
             else:
@@ -219,7 +235,7 @@ def _quantity(value: float | None) -> str:
 
 FORMAT = 1
 
-_ELSEWHERE = frozenset({"children", "instances", "also", "unregistered"})
+_ELSEWHERE = frozenset({"children", "instances", "also", "unregistered", "own"})
 _PLAIN_FIELDS = tuple(f.name for f in fields(BomEntry) if f.name not in _ELSEWHERE)
 # What an entry usually says is left out: a vault has tens of thousands of them to read every night.
 _USUAL = {f.name: f.default for f in fields(BomEntry) if f.name in _PLAIN_FIELDS and f.default is not MISSING}
@@ -275,7 +291,10 @@ class _Table:
             for name, value in vars(entry).items()
             if name not in _ELSEWHERE and (name not in _USUAL or value != _USUAL[name])
         }
-        self.rows.append({**row, "children": children, "instances": list(entry.instances)})
+        row |= {"children": children, "instances": list(entry.instances)}
+        if entry.own:
+            row["own"] = [self.add(one) for one in entry.own]
+        self.rows.append(row)
         self._known[id(entry)] = len(self.rows) - 1
         return len(self.rows) - 1
 
@@ -283,7 +302,8 @@ class _Table:
 def _entry(row: Mapping[str, Any], before: list[BomEntry]) -> BomEntry:
     children = tuple(before[number] for number in row["children"])
     plain = {name: row[name] for name in _PLAIN_FIELDS if name in row}
-    return BomEntry(**plain, children=children, instances=tuple(row["instances"]))
+    mine = tuple(before[number] for number in row.get("own", ()))
+    return BomEntry(**plain, children=children, instances=tuple(row["instances"]), own=mine)
 
 
 def _plain_finding(finding: Finding) -> dict[str, Any]:
@@ -306,3 +326,95 @@ def _finding(data: Mapping[str, Any]) -> Finding:
         data.get("file", ""),
         data.get("did_you_mean", ""),
     )
+
+
+class Reason(StrEnum):
+    """Why something is not in a BOM."""
+
+    MISSING = "missing"  # its file or object is not there, or cannot be read
+    UNREGISTERED = "unregistered"  # it has no part number yet
+    BROKEN = "broken"  # something else keeps the assembly from being read in full; see the message
+    REFUSED = "refused"  # the server refused the merge; see the message
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """One thing that is left out.
+
+    ``file`` (relative to the assembly's) and ``object`` name a component; ``message`` says more where a
+    name does not. ``quantity`` is per one assembly, 0 where it is unknown.
+    """
+
+    reason: Reason
+    name: str = ""
+    file: str = ""
+    object: str = ""
+    quantity: int = 0
+    message: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; only what is set."""
+        return {key: value for key, value in asdict(self).items() if value}
+
+
+def components_of(entry: BomEntry, base: str) -> list[dict[str, str]]:
+    """The components of a line: what the server remembers it by. ``base``: the assembly's folder.
+
+    Standard parts have no file of their own that could be missing.
+    """
+    return [
+        {"file": relative(path, base), "object": name}
+        for path, name in (entry.key, *entry.also)
+        if path not in ("", STANDARD_PARTS)
+    ]
+
+
+def left_out_of(
+    entries: Iterable[BomEntry], unregistered: Iterable[BomEntry], errors: Iterable[Finding], base: str
+) -> tuple[LeftOut, ...]:
+    """All that a BOM of these direct children leaves out.
+
+    errors
+        the findings that block this assembly. Those that missing entries explain are not repeated.
+    """
+    missing = [entry for entry in entries if entry.missing]
+    explained = {name for entry in missing for name in entry.instances}
+    found = [_component(Reason.MISSING, entry, base) for entry in missing]
+    found += [_component(Reason.UNREGISTERED, entry, base) for entry in unregistered]
+    found += [
+        LeftOut(Reason.BROKEN, message=shorten(finding.message, base))
+        for finding in errors
+        if not {place.obj for place in finding.where} <= explained
+    ]
+    return tuple(found)
+
+
+def _component(reason: Reason, entry: BomEntry, base: str) -> LeftOut:
+    name = display_name(entry) or entry.object_name
+    return LeftOut(reason, name, relative(entry.doc_path, base), entry.object_name, entry.quantity)
+
+
+def remembered(
+    before: Mapping[str, Sequence[Mapping[str, str]]],
+    entries: Iterable[Mapping[str, Any]],
+    kept: Iterable[str],
+) -> dict[str, list[dict[str, str]]]:
+    """Part number → components, to be kept after a merge.
+
+    Lines that were kept because a component is missing keep what they were known by, so that the component
+    is known again in the next sync.
+    """
+    known: dict[str, list[dict[str, str]]] = {}
+    for entry in entries:
+        known.setdefault(entry["child_part_number"], []).extend(map(dict, entry.get("components") or ()))
+    for number in kept:
+        mine = known.setdefault(number, [])
+        mine += [dict(one) for one in before.get(number, ()) if one not in mine]
+    return {number: components for number, components in known.items() if components}
+
+
+def in_words(left: Sequence[LeftOut] | Sequence[Mapping[str, Any]]) -> str:
+    """``2 missing, 1 unregistered``; "" for nothing."""
+    reasons = Counter(str(one["reason"] if isinstance(one, Mapping) else one.reason) for one in left)
+    parts = [f"{reasons.pop(reason)} {reason}" for reason in Reason if reason in reasons]
+    return ", ".join([*parts, *(f"{count} {reason}" for reason, count in reasons.items())])

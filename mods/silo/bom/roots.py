@@ -1,37 +1,36 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Which object of a document is the assembly, when nobody says.
+"""Which object of a document is the assembly when nobody says, and what lies beside it.
 
 In this order: FreeCAD's own ``Assembly::AssemblyObject``, Assembly4's part of ``Type`` "Assembly", an
-Assembly3 container, any top-level part that holds links, and at last the document itself where links lie in
-no container. An Assembly4 ``Parts`` folder beside the model holds spares and is no root.
+Assembly3 container, the one top-level part that holds components, and else the document itself, with all that
+lies at its root: of several equals none is taken because it came first. Folders of Assembly4 beside the model
+(``Parts``, ``Source_shapes``) hold spares and are no roots.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from silo.bom.document import derived, label_of, object_name, own, same_document
-from silo.bom.errors import InputError
-from silo.bom.walk.arrays import left_out_by
-from silo.bom.walk.consumed import consumed
-from silo.bom.walk.contents import Reader
-from silo.bom.walk.counts import Lost
+from silo.bom.document import derived, first_of, label_of, object_name, own, same_document
+from silo.bom.errors import InputError, SeveralAssembliesError
 from silo.bom.walk.kinds import (
     COMPONENTS,
     INLINE,
     REPEATERS,
     Kind,
     Survey,
-    flattened,
+    consumed,
+    elements,
     is_assembly3,
     is_named_assembly,
-    kind_of,
-    sources,
+    left_out_by,
     survey_of,
 )
 from silo.bom.walk.notes import Notes
-from silo.bom.walk.targets import first_of, is_assembly_link
+from silo.bom.walk.roles import SHOWING, Reader, Reading
+from silo.bom.walk.targets import Inspect, is_assembly_link
+from silo.bom.walk.tree import COPIES, Contents, Lost, Role, Tree, climbed, is_switched_on
 
 # What to do where a document holds several assemblies. The window says it in words of its own.
 NAME_ONE = "Name the one that is meant (--assembly NAME)."
@@ -39,9 +38,8 @@ NAME_ONE = "Name the one that is meant (--assembly NAME)."
 # The rank of a part that holds no components; what it holds makes it likelier.
 _HOLDS_NOTHING = 4
 # What may show components of other files, standard parts or declared ones.
-_SHOWING = COMPONENTS | REPEATERS | {Kind.ELEMENT, Kind.LOCAL, Kind.FOREIGN, Kind.CONTAINER}
+_SHOWING = SHOWING | {Kind.LOCAL, Kind.FOREIGN, Kind.CONTAINER}
 _LOOSE = COMPONENTS | REPEATERS | {Kind.LINK_GROUP, Kind.FOREIGN, Kind.STANDARD}
-_HARDWARE = REPEATERS | {Kind.LINK, Kind.LINK_GROUP, Kind.STANDARD}
 _BESIDE = COMPONENTS | REPEATERS | {Kind.LINK_GROUP, Kind.STANDARD, Kind.CONTAINER, Kind.LOCAL, Kind.FOREIGN}
 
 Whole = Callable[[Any], Any]
@@ -50,6 +48,7 @@ _FOLDERS = frozenset({Kind.FOLDER})
 # An Assembly3 container with further properties may be taken for an array or a foreign part.
 _RANKED = frozenset({Kind.CONTAINER, Kind.DRAFT_ARRAY, Kind.FOREIGN})
 _LOCAL = frozenset({Kind.LOCAL})
+_SPARES = ("Parts", "Source_shapes")
 
 
 class DocumentRoot:
@@ -67,26 +66,64 @@ class DocumentRoot:
         return False
 
 
-def _members_of(survey: Survey, kinds: Set[Kind]) -> set[str]:
-    """Names of the objects that lie in some container of these kinds, or are copies such a container made.
+class _Lying:
+    """Where the objects of a document lie: name → the containers and folders that list it.
 
-    Also through folders: a part lists what lies in its folders, a link group does not.
+    Looked at once for a survey that is kept. The survey keeps the tables and not this object, which refers to
+    the survey: in a circle both would wait for the collector.
     """
-    objects = survey.of(kinds | _FOLDERS)
-    held = {
-        object_name(obj): [
-            object_name(one) for name in ("Group", "ElementList") for one in own(obj, name) or ()
-        ]
-        for obj, _ in objects
-    }
-    folders = {object_name(obj) for obj, kind in objects if kind is Kind.FOLDER}
-    names: set[str] = set()
-    further = [object_name(obj) for obj, kind in objects if kind in kinds]
-    while further:
-        inside = [name for name in held[further.pop()] if name not in names]
-        names.update(inside)
-        further += [name for name in inside if name in folders]
-    return names
+
+    def __init__(self, survey: Survey) -> None:
+        self.survey = survey
+        kept = vars(survey)
+        if "lying" not in kept:
+            kept["lying"] = (*_holders(survey), dict[str, bool]())
+        self._holders: dict[str, tuple[Any, Kind]]
+        self._above: dict[str, tuple[str, ...]]
+        self._inner: dict[str, bool]
+        self._holders, self._above, self._inner = kept["lying"]
+
+    def around(self, name: str) -> Iterator[tuple[Any, Kind]]:
+        """All containers and folders around an object, at any distance, the nearest first."""
+        return (self._holders[upper] for upper in climbed(name, lambda one: self._above.get(one, ())))
+
+    def is_inner(self, name: str) -> bool:
+        """True for what lies in a container, also through folders, and for the copies that one made."""
+        if name not in self._inner:
+            self._inner[name] = any(kind in _CONTAINERS for _, kind in self.around(name))
+        return self._inner[name]
+
+    def in_folder(self, name: str) -> bool:
+        return any(self._holders[upper][1] is Kind.FOLDER for upper in self._above.get(name, ()))
+
+    def is_spare(self, name: str) -> bool:
+        """True for what Assembly4 keeps for later."""
+        return any(object_name(obj).rstrip("0123456789") in _SPARES for obj, _ in self.around(name))
+
+    def is_visible(self, obj: Any) -> bool:
+        """True for what is visible itself and lies in visible containers."""
+        return all(
+            is_switched_on(one) for one in (obj, *(outer for outer, _ in self.around(object_name(obj))))
+        )
+
+    def loose(self, kinds: frozenset[Kind]) -> list[Any]:
+        """The objects of these kinds that lie in no container."""
+        return [obj for obj, _ in self.survey.of(kinds) if not self.is_inner(object_name(obj))]
+
+
+def _holders(survey: Survey) -> tuple[dict[str, tuple[Any, Kind]], dict[str, tuple[str, ...]]]:
+    """The containers and folders of a document by name; and what lists an object, by the object's name."""
+    holders: dict[str, tuple[Any, Kind]] = {}
+    above: dict[str, tuple[str, ...]] = {}
+    for obj, kind in survey.of(_CONTAINERS | _FOLDERS):
+        listed = [one for name in ("Group", "ElementList") for one in own(obj, name) or ()]
+        if kind is Kind.CONTAINER and is_assembly3(obj):
+            listed += [one for group in listed for one in own(group, "Group") or ()]
+        holders[name := object_name(obj)] = (obj, kind)
+        alone = (name,)  # one tuple for all that lie in this holder only
+        for one in map(object_name, listed):
+            above[one] = (*above[one], name) if one in above else alone
+    return holders, above
 
 
 def _rank(obj: Any, reader: Reader) -> int | None:
@@ -104,7 +141,7 @@ def _rank(obj: Any, reader: Reader) -> int | None:
 def _holds(container: Any, reader: Reader) -> int:
     """2 for components of other files, 1 for standard or declared parts only, 0 for neither."""
     hardware, shows_others = False, False
-    for _, obj, kind in flattened(container, id):
+    for obj, kind in Tree(container, id_of, lambda _obj, _kind: False).members.values():
         if kind in COMPONENTS:
             target = first_of(getattr(obj, "LinkedObject", None))
             # A broken link stands for a component as well.
@@ -119,6 +156,11 @@ def _holds(container: Any, reader: Reader) -> int:
     return 2 if far else 1 if brought else 0
 
 
+def id_of(obj: Any) -> tuple[str, str]:
+    """What identifies an object within its document."""
+    return ("", object_name(obj))
+
+
 def _is_far(target: Any, container: Any) -> bool:
     """True for a component of another file, also for one that is missing there."""
     return isinstance(target, Lost) or not same_document(target.Document, container.Document)
@@ -126,39 +168,41 @@ def _is_far(target: Any, container: Any) -> bool:
 
 def find_assemblies(document: Any) -> list[Any]:
     """The top-level containers of a document, the likeliest assembly first (document order within a rank)."""
-    return [obj for _, obj in _candidates(survey_of(document))]
+    return [obj for _, obj in _candidates(_Lying(survey_of(document)))]
 
 
-def _candidates(survey: Survey) -> list[tuple[tuple[int, bool], Any]]:
-    objects = survey.of(_RANKED)
-    if not objects:
-        return []
-    inner = _members_of(survey, _CONTAINERS)
-    in_folders = _members_of(survey, _FOLDERS)
+_Candidates = list[tuple[tuple[int, bool], Any]]
+
+
+def _candidates(lying: _Lying) -> _Candidates:
     reader = silent_reader()
     found = []
-    for obj, _ in objects:
-        name = object_name(obj)
-        if name in inner or (rank := _rank(obj, reader)) is None:
+    for obj in lying.loose(_RANKED):
+        if (rank := _rank(obj, reader)) is None:
             continue
         # People sort assemblies into folders too; a plain part in a folder is a spare.
-        if name not in in_folders or rank < 2:
-            found.append(((rank, name in in_folders), obj))
+        in_folder = lying.in_folder(object_name(obj))
+        if not in_folder or rank < 2:
+            found.append(((rank, in_folder), obj))
     return sorted(found, key=lambda candidate: candidate[0])
 
 
-def silent_reader(*, hardware: bool = True, declare: Set[str] = frozenset()) -> Reader:
-    """For a look at documents whose findings nobody needs twice.
-
-    declare
-        names of objects that are taken as declared.
-    """
+def silent_reader(
+    *, hardware: bool = True, counts_beside: bool = False, inspect: Inspect | None = None
+) -> Reader:
+    """For a look at documents whose findings nobody needs twice."""
 
     def path_of(obj: Any) -> str:
         return getattr(getattr(obj, "Document", None), "FileName", "") or ""
 
+    def key(obj: Any) -> tuple[str, str]:
+        return (path_of(obj), object_name(obj))
+
+    silent = Reader(Notes(path_of), key, inspect, hardware=hardware)
+    if not counts_beside:
+        return silent
     return Reader(
-        Notes(path_of), lambda obj: (path_of(obj), object_name(obj)), None, hardware=hardware, declare=declare
+        Notes(path_of), key, inspect, beside=lambda top: loose_hardware(top, silent), hardware=hardware
     )
 
 
@@ -172,15 +216,13 @@ def choose_assembly(document: Any, name: str | None = None) -> Any:
     """
     if name is not None:
         return _named(document, name)
-    survey = survey_of(document)
-    found = _candidates(survey)
+    lying = _Lying(survey_of(document))
+    found = _candidates(lying)
     likely = _likely(found)
-    if len(likely) > 1:
-        raise InputError(f"{_file(document)} holds {len(likely)} assemblies: {_told(likely)}. {NAME_ONE}")
-    return likely[0] if likely else _root_or_part(document, survey, found)
-
-
-_Candidates = list[tuple[tuple[int, bool], Any]]
+    if len(likely) > 1 and found[0][0][0] < 2:
+        told = f"{_file(document)} holds {len(likely)} assemblies: {_told(likely)}. {NAME_ONE}"
+        raise SeveralAssembliesError(told, document.FileName, list(map(object_name, likely)))
+    return likely[0] if len(likely) == 1 else _root_or_part(document, lying, found)
 
 
 def _likely(found: _Candidates) -> list[Any]:
@@ -192,19 +234,15 @@ def _likely(found: _Candidates) -> list[Any]:
     return [obj for obj in best if _holds(obj, reader) == 2] or best
 
 
-def _root_or_part(document: Any, survey: Survey, found: _Candidates) -> Any:
-    """The one part of a file that has nothing else to count, or the document itself."""
+def _root_or_part(document: Any, lying: _Lying, found: _Candidates) -> Any:
+    """The one part of a file that has nothing else to count, or the document with all that lies in it."""
     best = [obj for standing, obj in found if standing == found[0][0]]
-    loose = _loose(survey, _LOOSE)
-    holds_hardware = bool(found) and found[0][0][0] < _HOLDS_NOTHING
-    if best and not loose and (len(best) == 1 or not holds_hardware):
+    loose = lying.loose(_LOOSE)
+    bodies = _loose_bodies(lying)
+    is_plain = bool(found) and found[0][0][0] == _HOLDS_NOTHING
+    if len(best) == 1 and not loose and not (bodies and is_plain):
         return best[0]
-    parts = best if holds_hardware else []
-    if not loose and not parts:
-        # A file with one body is that part; of several, each may be declared.
-        bodies = _loose_local(survey)
-        loose = bodies if len(bodies) > 1 else []
-    return DocumentRoot(document, [*parts, *loose])
+    return DocumentRoot(document, [*(obj for _, obj in found), *loose, *bodies])
 
 
 def _file(document: Any) -> str:
@@ -229,21 +267,16 @@ def _named(document: Any, name: str) -> Any:
     raise InputError(f"{_file(document)} has no assembly named {name!r}; it has: {_told(containers)}.")
 
 
-def _loose(survey: Survey, kinds: Set[Kind]) -> list[Any]:
-    """The objects of these kinds that lie in no container."""
-    if not survey.of(kinds):
-        return []
-    return [obj for obj, _ in survey.of(kinds, _members_of(survey, _CONTAINERS))]
-
-
-def _loose_local(survey: Survey) -> list[Any]:
-    """The geometry that lies in no container, no Body and no feature."""
-    inner = _members_of(survey, _CONTAINERS) | survey.grouped(_LOCAL)
-    loose = [obj for obj, _ in survey.of(_LOCAL, inner)]
+def _loose_bodies(lying: _Lying) -> list[Any]:
+    """The geometry that lies in no container, no Body and no feature; of that the visible, where any is."""
+    loose = lying.loose(_LOCAL)
     if len(loose) > 1:  # to ask every feature costs more than all the rest
-        eaten = consumed([obj for obj, _ in survey.of(_LOCAL)], object_name)
+        inner = lying.survey.grouped(_LOCAL)
+        loose = [obj for obj in loose if object_name(obj) not in inner]
+    if len(loose) > 1:
+        eaten = consumed([obj for obj, _ in lying.survey.of(_LOCAL)], object_name)
         loose = [obj for obj in loose if object_name(obj) not in eaten]
-    return loose
+    return [obj for obj in loose if lying.is_visible(obj)] or loose
 
 
 def as_it_is(document: Any) -> Any:
@@ -251,87 +284,106 @@ def as_it_is(document: Any) -> Any:
     return document
 
 
-def _spares(survey: Survey) -> set[str]:
-    """Names of what lies in Assembly4's folder ``Parts``."""
-    folders = [obj for obj, _ in survey.of(_FOLDERS) if object_name(obj) == "Parts"]
-    return {
-        object_name(one)
-        for obj in folders
-        for name in ("Group", "ElementList")
-        for one in own(obj, name) or ()
-    }
-
-
-def _sources_of(survey: Survey) -> set[str]:
-    """Names of the objects that links, arrays and compounds of the document show."""
-    names = set()
-    for obj, kind in survey.of(COMPONENTS | {Kind.DRAFT_ARRAY, Kind.COMPOUND}):
-        shown = [first_of(getattr(obj, "LinkedObject", None))] if kind in COMPONENTS else sources(obj)
-        names |= {
-            object_name(one) for one in shown if one is not None and same_document(one.Document, obj.Document)
-        }
-    return names
+def _sources_of(top: Any, reader: Reader, survey: Survey) -> set[str]:
+    """Names of the objects that others of the document show."""
+    return {name for _, name in Reading(reader, top).shown_by(survey.of(SHOWING))}
 
 
 def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> list[Any]:
-    """Standard parts beside an assembly, which can only belong to it: it is the one assembly of its file.
+    """Visible standard parts beside an assembly, which can only belong to it: it is the one of its file.
 
-    Single ones, arrays, compounds and links of them, also in folders. What other objects of the document
-    show are sources, and what lies in Assembly4's folder ``Parts`` are spares.
+    What other objects of the document show are sources, what a feature consumes are operands, and what lies
+    in Assembly4's folders are spares.
     """
-    if isinstance(container, DocumentRoot) or getattr(container, "is_document_root", False):
+    if getattr(container, "is_document_root", False):
         return []
     survey = survey_of(whole(container.Document))
     if not survey.has_python():
         return []
-    loose = _loose(survey, _HARDWARE)
+    lying = _Lying(survey)
+    loose = [
+        obj
+        for obj in lying.loose(frozenset({Kind.STANDARD}))
+        if lying.is_visible(obj) and not lying.is_spare(object_name(obj)) and not left_out_by(obj)
+    ]
     if not loose:
         return []
-    aside = _spares(survey) | _sources_of(survey)
+    aside = _sources_of(container, reader, survey)
     aside.update(consumed([obj for obj, _ in survey.of(_LOCAL)], object_name))
-    loose = [obj for obj in loose if object_name(obj) not in aside and _is_hardware(obj, reader)]
-    if not loose:
-        return []
-    likely = _likely(_candidates(survey))
-    is_the_one = len(likely) == 1 and object_name(likely[0]) == object_name(container)
-    return loose if is_the_one else []
+    loose = [obj for obj in loose if object_name(obj) not in aside]
+    likely = _likely(_candidates(lying))
+    return loose if list(map(object_name, likely)) == [object_name(container)] else []
 
 
-def _is_hardware(obj: Any, reader: Reader) -> bool:
-    brought = reader.brings(obj)
-    return bool(brought) and all(
-        kind_of(one) is Kind.STANDARD and same_document(one.Document, obj.Document) for one in brought
-    )
+def beside(top: Any, fates: Mapping[str, Role | None]) -> list[Any]:
+    """What lies in the document of ``top``, but in no container and no folder, and holds components.
 
-
-def beside(top: Any, reader: Reader) -> list[Any]:
-    """What lies in the document of ``top``, but in no container, and holds components.
-
-    It is not counted, and nobody may have noticed. What lies in folders are spares; what other objects of the
-    document show are their sources; another assembly has a BOM of its own.
+    It is not counted, and nobody may have noticed. Another assembly has a BOM of its own.
     """
-    if isinstance(top, DocumentRoot) or is_assembly3(top):
+    if isinstance(top, DocumentRoot):
         return []
-    survey = survey_of(getattr(top, "Document", None))
-    inside = _members_of(survey, _CONTAINERS | _FOLDERS) | {object_name(top)}
-    loose = [obj for obj, _ in survey.of(_BESIDE, inside) if not is_named_assembly(obj)]
-    if not loose:
-        return []
-    shown = _sources_of(survey)
-    counted = {object_name(obj) for obj in loose_hardware(top, reader)}
     return [
         obj
-        for obj in loose
-        if object_name(obj) not in shown | counted
-        and not _holds_object(obj, top)
-        and not left_out_by(obj)
-        and reader.brings(obj)
+        for name, role in fates.items()
+        if role is Role.LOOSE and not is_named_assembly(obj := top.Document.getObject(name))
     ]
 
 
-def _holds_object(container: Any, obj: Any) -> bool:
-    """True where the chosen assembly lies in this container, which then is not beside it."""
-    wanted = object_name(obj)
-    return kind_of(container) in INLINE and any(
-        name == wanted for name, _, _ in flattened(container, object_name)
-    )
+def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, Role | None]:
+    """The role of each object with a shape, a link or a fastener's properties, for the assembly ``top``.
+
+    None breaks the law: a container of the assembly holds the object, and the count does not know it.
+
+    reader
+        for a look at what lies beside the assembly.
+    """
+    survey = survey_of(getattr(top, "Document", None))
+    found: dict[str, Role | None] = {name: role for (_, name), role in contents.roles.items()}
+    found[object_name(top)] = Role.HOLDER
+    if not (left := list(survey.of(_BESIDE | {Kind.ELEMENT}, found.keys()))):
+        return found
+    lying = _Lying(survey)
+    grouped = survey.grouped(_LOCAL)
+    outside = {object_name(obj) for obj, _ in lying.around(object_name(top))}
+    beside = []
+    for obj, kind in left:
+        name = object_name(obj)
+        if name in outside:  # it holds the assembly
+            found[name] = Role.CONSTRUCTION
+        elif name.startswith(COPIES) or kind is Kind.ELEMENT or name in grouped:
+            found[name] = Role.INSIDE
+        elif lying.is_inner(name):
+            found[name] = _inside(lying, name, found)
+        else:
+            beside.append(obj)
+    if not beside:
+        return found
+    shown = _sources_of(top, reader, survey)
+    eaten = consumed([obj for obj, _ in survey.of(_LOCAL)], object_name)
+    for obj in beside:
+        name = object_name(obj)
+        if name in eaten:
+            found[name] = Role.OPERAND
+        elif name in shown or (
+            not lying.is_visible(obj)  # a visible array shows its elements once more
+            and any(found.get(object_name(one)) is Role.COMPONENT for one in elements(obj))
+        ):
+            found[name] = Role.SOURCE
+        elif left_out_by(obj):
+            found[name] = Role.LEFT_OUT
+        elif lying.in_folder(name):
+            found[name] = Role.SPARE
+        else:
+            found[name] = Role.LOOSE if reader.brings(obj) else Role.CONSTRUCTION
+    return found
+
+
+def _inside(lying: _Lying, name: str, known: Mapping[str, Role | None]) -> Role | None:
+    """The role of what lies in a container and is no member of the assembly."""
+    around = list(lying.around(name))
+    if any(is_assembly3(obj) for obj, _ in around):  # its elements and constraints
+        return Role.CONSTRUCTION
+    if any(kind is Kind.ASSEMBLY_LINK or object_name(obj).startswith(COPIES) for obj, kind in around):
+        return Role.INSIDE
+    outer = [known.get(object_name(obj), Role.LOOSE) for obj, kind in around if kind is not Kind.FOLDER]
+    return None if all(role is Role.HOLDER for role in outer) else Role.INSIDE

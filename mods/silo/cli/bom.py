@@ -1,42 +1,41 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod bom``, ``where-used`` and ``relink``: what files hold, which link to which, and mending that."""
+"""``silo-mod bom``, ``where-used`` and ``relink``: what files hold, which link to which, and mending that.
+
+``silo-mod diff`` and ``bom-diff``: CAD against the server; two folders or git revisions without one.
+"""
 
 from __future__ import annotations
 
 import argparse
+import csv
 import os
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
+from io import StringIO
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
-from silo.batch import ask_for_moved
 from silo.bom.document import relative
-from silo.bom.errors import DocumentError, Exit, InputError, SiloError, did_you_mean
-from silo.bom.identity import walk_entries
-from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import base_of, bom_json, flat_json
-from silo.bom.resolve import consolidation_findings
-from silo.bom_sync import resolve
+from silo.bom.errors import ConfigError, DocumentError, Exit, InputError, SiloError, counted, did_you_mean
+from silo.bom.findings import FindingCode
+from silo.bom.headers import safe_cell
+from silo.bom.model import BomDiff, BomEntry, Extraction, walk_entries
+from silo.bom.report import PIECES, base_of, bom_json, diff_json, finding_json, flat_json, shorten
+from silo.bom.resolve import consolidation_findings, display_name, with_allowed_characters
 from silo.cli import common
-from silo.cli.common import Commands
-from silo.files import documents_in
-from silo.open_in_freecad import open_in_any
+from silo.files import check_writable, documents_in
+from silo.platform import replacing, scratch_folder
+
+if TYPE_CHECKING:
+    from silo.bom.compare import AssemblyChange, LineChange
+    from silo.bom_sync import Resolved
+    from silo.vault.plan import FolderBoms
 
 
-def register(commands: Commands) -> None:
-    """Add the commands."""
-    _add_bom(commands)
-    _add_where_used(commands)
-    _add_relink(commands)
-
-
-def _add_bom(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "bom",
-        "show the BOM of a FreeCAD assembly, read from its files without FreeCAD",
-        "silo-mod bom examples/gearbox/TopAssembly.FCStd --flat",
-    )
-    common.add_assembly_options(parser, folders=True)
+def add_bom(parser: argparse.ArgumentParser) -> None:
+    common.add_top(parser)
     parser.add_argument(
         "--flat", action="store_true", help="quantities multiplied down the tree, each part once"
     )
@@ -46,10 +45,19 @@ def _add_bom(commands: Commands) -> None:
         help="have freecadcmd compare the BOM with the solids that FreeCAD shows; 1 where they differ",
     )
     parser.add_argument("--resolve", action="store_true", help="ask the server for part numbers and names")
-    common.add_json_option(parser)
-    common.add_server_options(parser)
+    parser.add_argument(
+        "--why",
+        metavar="PART",
+        help="show why the assembly itself has so many of a part (name, label or standard): each chain",
+    )
+    parser.add_argument(
+        "--verbose", action="store_true", help="also hints, such as links that an array could replace"
+    )
+    parser.add_argument("--csv", metavar="FILE", help="write the lines as CSV (- for standard output)")
+    parser.add_argument("--xlsx", metavar="FILE", help="write the lines as a workbook")
     common.only_with(parser, "--resolve", "--server", "--token")
-    common.not_with(parser, "--verify", "--flat", "--resolve", *common.READING)
+    common.not_with(parser, "--verify", "--flat", "--resolve", "--csv", "--xlsx", "--why", *common.READING)
+    common.not_with(parser, "--why", "--flat", "--resolve", "--csv", "--xlsx", "--json", *common.READING)
     parser.set_defaults(run=run_bom)
 
 
@@ -57,10 +65,16 @@ def run_bom(args: argparse.Namespace) -> int:
     """Print the BOM; 1 where an error says that it is not the whole one."""
     if args.verify:
         return _verify(args)
-    if os.path.isdir(args.top):
-        return _folder(args)
-    extraction = common.read_top(args)
+    if args.why:
+        return _why(args)
+    check_writable(*(path for path in (args.csv, args.xlsx) if path and path != "-"))
+    if os.path.isdir(args.top) or args.assembly == common.EACH:
+        return _several(args)
+    extraction = common.read_tops(args)[0]
     if args.resolve:
+        from silo.batch import ask_for_moved
+        from silo.bom_sync import resolve
+
         with common.client_of(args) as client:
             common.reach(client, extraction)
             resolved = ask_for_moved(resolve(extraction, client), client)
@@ -68,69 +82,171 @@ def run_bom(args: argparse.Namespace) -> int:
         head = _whole(replace(resolved.assembly, children=resolved.entries), known)
         extraction = Extraction(resolved.assembly, head.children, resolved.findings)
     else:
-        told = consolidation_findings(extraction.entries)
-        extraction = replace(extraction, findings=(*extraction.findings, *told))
+        hints = consolidation_findings(extraction.entries)
+        extraction = replace(extraction, findings=(*extraction.findings, *hints))
+    if args.csv:
+        _write_csv(args.csv, _table(extraction, flat=args.flat))
+    if args.xlsx:
+        _write_xlsx(args.xlsx, _table(extraction, flat=args.flat))
     if args.json:
         common.print_json(flat_json(extraction) if args.flat else bom_json(extraction))
-        return Exit.UNDONE if extraction.blocked else Exit.DONE
+    if args.json or args.csv == "-":
+        return _exit_of(extraction)
     from silo.cli import show
 
     out = show.console()
     out.print(show.flat_table(flat_json(extraction)) if args.flat else show.bom_tree(extraction))
-    if extraction.findings:
+    told = [one for one in extraction.findings if args.verbose or one.code is not FindingCode.CONSOLIDATION]
+    if told:
         out.print()
-        out.print(show.findings_text(extraction.findings, base_of(extraction)))
-    return Exit.UNDONE if extraction.blocked else Exit.DONE
+        out.print(show.findings_text(told, base_of(extraction)))
+    return _exit_of(extraction)
 
 
-def _folder(args: argparse.Namespace) -> int:
-    """Each assembly of a folder with its own lines, children first; 1 where one is not whole."""
-    if args.flat or args.resolve:
-        raise InputError("--flat and --resolve are for one assembly; name its file.")
+def _why(args: argparse.Namespace) -> int:
+    """Print each way from the assembly to a part, with the arrays on it."""
+    from silo.bom.document import label_of, object_name
+    from silo.bom.roots import choose_assembly, silent_reader
+    from silo.bom.walk.tree import Lost, chains
+    from silo.cli import show
+    from silo.fcstd import Library
+
+    if os.path.isdir(args.top):
+        raise InputError("--why is for one assembly; name its file.")
+    with Library() as library:
+        top = choose_assembly(library.open(args.top), args.assembly)
+        reader = silent_reader(hardware=not args.no_hardware, counts_beside=True)
+        contents = reader.contents(top)
+        total, known, lines = 0, set[str](), list[str]()
+        for count in (*contents.counts, *contents.own):
+            target = count.target
+            if isinstance(target, Lost):
+                names = {target.name, target.label}
+            else:
+                names = {object_name(target), label_of(target), target.Document.Label}
+                names.add(reader.standard(target)[0])
+            known |= names
+            if args.why not in names:
+                continue
+            total += count.quantity
+            for way in chains(count, contents.tree, reader.key):
+                steps = [f"{label_of(obj)} × {times}" if times > 1 else label_of(obj) for obj, times in way]
+                lines.append(" → ".join(["beside the assembly"] * count.beside + steps))
+    if not lines:
+        meant = did_you_mean(args.why, sorted(known - {""})) or "."
+        raise InputError(f"{args.why!r} is no part of {label_of(top)} itself{meant}")
+    out = show.console()
+    for line in (f"{total} × {args.why} in {label_of(top)}:", *(f"  {line}" for line in lines)):
+        out.print(show.plain(line), markup=False)
+    return Exit.DONE
+
+
+def _exit_of(extraction: Extraction) -> int:
+    """Return 1 if an error says that the BOM is not whole, or if own parts of the file are no items yet."""
+    return Exit.UNDONE if extraction.blocked or extraction.assembly.own else Exit.DONE
+
+
+def _several(args: argparse.Namespace) -> int:
+    """Each assembly of a file; of a folder with its own lines, children first. 1 where one is not whole."""
+    if args.flat or args.resolve or args.csv or args.xlsx:
+        raise InputError("--flat, --resolve, --csv and --xlsx are for one assembly; name its file.")
     from silo.cli import show
 
-    out, fine, data = show.console(), True, []
-    with common.plan_of(args) as (plan, reading, base):
-        for node in (node for layer in plan.layers for node in layer):
-            found = plan.extraction(node, reading)
-            fine = fine and not found.blocked
-            if args.json:
-                data.append(bom_json(found))
-                continue
-            out.print(show.bom_tree(found))
-            if found.findings:
-                out.print(show.findings_text(found.findings, base))
-            out.print()
-    errors = {relative(top, base): str(error) for top, error in plan.errors.items()}
+    out, errors = show.console(), {}
+    if os.path.isdir(args.top):
+        with common.plan_of(args) as (plan, reading, base):
+            tops = [(plan.extraction(node, reading), base) for layer in plan.layers for node in layer]
+        errors = {relative(top, base): str(error) for top, error in plan.errors.items()}
+    else:
+        tops = [(found, base_of(found)) for found in common.read_tops(args)]
     if args.json:
-        common.print_json({"assemblies": data, "errors": errors})
+        common.print_json({"assemblies": [bom_json(*one) for one in tops], "errors": errors})
+    for found, base in tops if not args.json else ():
+        out.print(show.bom_tree(found, base))
+        if found.findings:
+            out.print(show.findings_text(found.findings, base))
+        out.print()
     for path, words in errors.items() if not args.json else ():
         out.print(f"✗ {show.plain(path)}: {show.plain(words)}", style="red", markup=False)
-    return Exit.DONE if fine and not errors else Exit.UNDONE
+    return Exit.UNDONE if errors else max((_exit_of(found) for found, _ in tops), default=Exit.DONE)
+
+
+def _table(extraction: Extraction, *, flat: bool) -> list[list[str | int]]:
+    """Return the lines for a spreadsheet, with a heading; ``level`` 1 stands below the assembly itself."""
+    rows: list[dict[str, Any]] = []
+
+    def grow(entries: list[dict[str, Any]]) -> None:
+        for entry in entries:
+            name = entry["name"] or entry["standard"] or entry["label"]
+            rows.append({**entry, "name": name, "unit": PIECES})
+            grow(entry["children"])
+
+    grow([]) if flat else grow(bom_json(extraction)["entries"])
+    level = () if flat else ("level",)
+    columns = (*level, "part_number", "name", "quantity", "unit", "standard", "doc_path", "object", "missing")
+    told = flat_json(extraction) if flat else rows
+    cells = [["yes" if row[name] is True else row[name] or "" for name in columns] for row in told]
+    return [[name.replace("doc_path", "file").replace("_", " ") for name in columns], *cells]
+
+
+def _write_csv(path: str, rows: list[list[str | int]]) -> None:
+    text = StringIO(newline="")
+    csv.writer(text).writerows(list(map(safe_cell, row)) for row in rows)
+    if path == "-":
+        sys.stdout.write(text.getvalue().replace("\r\n", "\n"))
+        return
+    with replacing(Path(path)) as file:  # spreadsheets want the mark
+        file.write(b"\xef\xbb\xbf" + text.getvalue().encode("utf-8", "surrogateescape"))
+
+
+def _write_xlsx(path: str, rows: list[list[str | int]]) -> None:
+    """Write a workbook; text stays text. ConfigError if XlsxWriter is not installed."""
+    try:
+        from xlsxwriter import Workbook
+    except ImportError:
+        raise ConfigError("--xlsx needs the package XlsxWriter: pip install 'silo-mod[server]'") from None
+    with replacing(Path(path)) as file, Workbook(file, {"in_memory": True}) as book:
+        sheet = book.add_worksheet()
+        for number, row in enumerate(rows):
+            for column, value in enumerate(row):
+                if isinstance(value, str):  # no formula
+                    sheet.write_string(number, column, with_allowed_characters(value)[:32767])
+                else:
+                    sheet.write_number(number, column, value)
+        sheet.freeze_panes(1, 0)
 
 
 def _verify(args: argparse.Namespace) -> int:
     """The geometry as witness: the BOM as live FreeCAD has it, against the solids shown."""
-    from silo.freecadcmd.run import verify_in_freecad
+    from silo.bom.document import saved_by
+    from silo.fcstd import Library
+    from silo.freecads import freecad_for, run_freecad
 
     if os.path.isdir(args.top):
-        raise InputError("--verify is for one assembly; name its file.")
-    ((_, found),) = verify_in_freecad([args.top], args.assembly, hardware=not args.no_hardware)
+        raise InputError("--verify is for one file; name the file.")
+    with Library() as library:
+        command, version = freecad_for(saved_by(library.open(args.top).ProgramVersion))
+    print(f"Compared in FreeCAD {version} ({command}).", file=sys.stderr)
+    witness: dict[str, list[dict[str, Any]]] = {}
+    ((top, found),) = run_freecad(
+        [args.top], args.assembly, command=command, hardware=not args.no_hardware, witness=witness
+    )
     if isinstance(found, SiloError):
         raise found
-    fine = found.agrees and not found.extraction.blocked
+    accounts = witness[top]
+    differs = found.blocked or not all(account["agrees"] for account in accounts)
     if args.json:
-        common.print_json({**bom_json(found.extraction), "witness": list(found.accounts)})
-        return Exit.DONE if fine else Exit.UNDONE
+        common.print_json({**bom_json(found), "witness": accounts})
+        return int(differs)
     from silo.cli import show
 
     out = show.console()
-    for account in found.accounts:
+    for account in accounts:
         mark = "✓" if account["agrees"] else "✗"
         out.print(f"{mark} {show.plain(account['sentence'])}", markup=False)
-    if found.extraction.blocked:
-        out.print(show.findings_text(found.extraction.findings, base_of(found.extraction)))
-    return Exit.DONE if fine else Exit.UNDONE
+    if found.blocked:
+        out.print(show.findings_text(found.findings, base_of(found)))
+    return int(differs)
 
 
 def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> BomEntry:
@@ -143,25 +259,17 @@ def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> B
     return replace(entry, children=tuple(children))
 
 
-def _add_where_used(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "where-used",
-        "show which files of a vault link to a file, and which tops a change of it touches",
-        "silo-mod where-used vault/parts/Bracket.FCStd vault/",
-    )
+def add_where_used(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("part", metavar="PART.FCStd", help="the file; it need not be there any more")
     parser.add_argument(
         "vault", metavar="VAULT", nargs="?", default=".", help="the folder (default: this one)"
     )
-    common.add_json_option(parser)
-    common.add_reading_options(parser)
     parser.set_defaults(run=run_where_used)
 
 
 def run_where_used(args: argparse.Namespace) -> int:
     """Print the files; those of an unchanged vault are known from the index."""
-    from silo.vault.session import Question
+    from silo.vault.reading import Question
 
     if not os.path.isdir(args.vault):
         raise InputError(f"{args.vault} is no folder. Name the folder of the vault.")
@@ -219,13 +327,7 @@ def _above(part: str, users: Mapping[str, set[str]]) -> set[str]:
     return found
 
 
-def _add_relink(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "relink",
-        "let the links of an assembly and its sub-assemblies lead to a file that has moved",
-        "silo-mod relink TopAssembly.FCStd --from parts/Bolt.FCStd --to hardware/Bolt.FCStd --dry-run",
-    )
+def add_relink(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("top", metavar="TOP.FCStd", help="the assembly's file")
     parser.add_argument(
         "--from",
@@ -235,13 +337,6 @@ def _add_relink(commands: Commands) -> None:
         help="the file that the links record; relative to TOP's folder, as `silo-mod bom` prints it",
     )
     parser.add_argument("--to", dest="new", metavar="NEW", required=True, help="the file that is meant")
-    parser.add_argument(
-        "--even-if-open",
-        action="store_true",
-        help="also files that a running FreeCAD has open; whoever saves them there undoes this",
-    )
-    parser.add_argument("--dry-run", action="store_true", help="show what would change and write nothing")
-    common.add_json_option(parser)
     parser.set_defaults(run=run_relink)
 
 
@@ -274,7 +369,7 @@ def run_relink(args: argparse.Namespace) -> int:
 
     out = show.console()
     for one in done:
-        links = "1 link" if one.links == 1 else f"{one.links} links"
+        links = counted(one.links, "link")
         verb = "would lead" if args.dry_run else "now leads" if one.links == 1 else "now lead"
         text = f"✓ {relative(one.path, folder)}: {links} {verb} to {relative(new, folder)}"
         out.print(show.plain(text), markup=False)
@@ -286,6 +381,8 @@ def _any(_path: str) -> None:
 
 
 def _closed(path: str) -> None:
+    from silo.freecads import open_in_any
+
     if open_in_any().has_file(path):
         raise DocumentError(
             path,
@@ -307,3 +404,317 @@ def _documents(top: str) -> list[str]:
 def _either(folder: str, path: str) -> str:
     beside = os.path.normpath(os.path.join(folder, path))
     return beside if os.path.exists(beside) else os.path.abspath(path)
+
+
+def add_diff(parser: argparse.ArgumentParser) -> None:
+    common.add_top(parser)
+    parser.set_defaults(run=run_diff)
+
+
+def run_diff(args: argparse.Namespace) -> int:
+    """Print the comparison; with ``--check`` 1 on drift, on broken links and on unregistered components."""
+    from silo.batch import suggest_by_identity
+    from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
+
+    if os.path.isdir(args.top):
+        return _folder_diff(args)
+    extraction = common.read_tops(args)[0]
+    with common.client_of(args) as client:
+        common.reach(client, extraction)
+        whole = resolve(extraction, client)
+        chosen = list(assemblies(whole)) if args.recursive else [whole]
+        lines = [server_lines(one, client) for one in chosen]
+        whole = suggest_by_identity(whole, list(zip(chosen, lines, strict=True)))
+    compared = [(one, one.diff(known)) for one, known in zip(chosen, lines, strict=True)]
+    base = base_of(extraction)
+    drifted = bool(whole.unresolved or whole.assembly.part_number is None) or any(
+        diff.drifted or blocking(one) for one, diff in compared
+    )
+    if args.json:
+        data = [{**_head(one, base), "diff": diff_json(diff)} for one, diff in compared]
+        told = chain(whole.findings, *(diff.findings_at(one.assembly) for one, diff in compared))
+        findings = [finding_json(finding, base) for finding in told]
+        common.print_json({"drift": drifted, "assemblies": data, "findings": findings})
+    else:
+        _show(whole, compared, names_of(whole, chain.from_iterable(lines)), base)
+    # What cannot be compared whole is no answer, whether one wants to know of differences or not.
+    broken = any(blocking(one) or one.assembly.part_number is None for one, _ in compared)
+    return Exit.UNDONE if broken or (args.check and drifted) else Exit.DONE
+
+
+def _folder_diff(args: argparse.Namespace) -> int:
+    """Every assembly of a folder against the server; only those that differ are shown."""
+    from silo.batch import Options, Summary, is_news
+    from silo.bom_sync import blocking
+    from silo.cli import show
+    from silo.vault.job import Job
+
+    out, data = show.console(), []
+    with common.plan_of(args) as (plan, reading, base), common.client_of(args) as client:
+        if not plan.uuids:
+            common.reach(client)
+        summary = Summary(base)
+        drifted = broken = False
+        compared_count = 0
+        for result in Job(plan, reading, client, Options(recursive=True, dry_run=True), base).results():
+            summary.add(result)
+            broken = broken or result.error is not None
+            drifted = drifted or not result.fine or bool(result.unregistered)
+            for outcome in result.outcomes:
+                news = is_news(outcome)
+                whole = not blocking(outcome.resolved)
+                numbered = outcome.resolved.assembly.part_number is not None
+                broken = broken or not whole or not numbered or outcome.error is not None
+                compared_count += outcome.plan is not None and whole
+                drifted = drifted or (outcome.plan is not None and outcome.plan.diff.drifted)
+                if args.json:
+                    compared = {"diff": diff_json(outcome.plan.diff)} if outcome.plan is not None else {}
+                    data.append({**_head(outcome.resolved, base), **compared})
+                elif news:
+                    out.print(show.outcome_text(outcome, base))
+                    if outcome.plan is not None and whole:
+                        out.print(show.diff_table(outcome.plan.diff, outcome.names))
+    if args.json:
+        findings = [finding_json(finding, base) for finding in summary.findings]
+        errors = [{"message": words, "files": files} for words, files in summary.errors.items()]
+        common.print_json({"drift": drifted, "assemblies": data, "findings": findings, "errors": errors})
+    else:
+        for words in (*summary.warnings, *summary.errors):
+            out.print(show.plain(words), markup=False)
+        words = "no differences"
+        if drifted:
+            words = "there are differences, or what could not be compared (see above)"
+        out.print(f"Assemblies compared: {compared_count}; {words}.")
+    if summary.exit_code is Exit.REMOTE:
+        return Exit.REMOTE
+    return Exit.UNDONE if broken or (args.check and drifted) else Exit.DONE
+
+
+def _head(one: Resolved, base: str) -> dict[str, Any]:
+    head = one.assembly
+    return {
+        "doc_path": relative(head.doc_path, base),
+        "object": head.object_name,
+        "part_number": head.part_number,
+        "name": head.name,
+    }
+
+
+def _show(
+    whole: Resolved, compared: list[tuple[Resolved, BomDiff]], names: dict[str, str], base: str
+) -> None:
+    from silo.bom_sync import blocking
+    from silo.cli import show
+
+    out = show.console()
+    for one, diff in compared:
+        head = one.assembly
+        if head.part_number:
+            out.print(show.entry_text(head, base))
+        else:
+            name = show.plain(display_name(head))
+            out.print(
+                f"{name}: no part number yet, so nothing to compare with (silo-mod register)", markup=False
+            )
+        if head.part_number or diff.added:
+            out.print(show.diff_table(diff, names, whole=not (blocking(one) or one.unresolved)))
+        out.print()
+    out.print(show.findings_text(whole.findings, base))
+
+
+_MARK = {
+    "added": ("+", "green"),
+    "removed": ("-", "red"),
+    "quantity_changed": ("~", "yellow"),
+    "moved": ("→", "dim"),
+}
+
+
+def add_bom_diff(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "folders", metavar="FOLDER", nargs="*", help="OLD and NEW; with --git the one folder to compare"
+    )
+    parser.add_argument(
+        "--git",
+        metavar="A..B",
+        help="compare two revisions of a repository; A...B: from where B branched off A; "
+        "A alone: against the files as they are",
+    )
+    parser.set_defaults(run=run_bom_diff)
+
+
+def run_bom_diff(args: argparse.Namespace) -> int:
+    """Print the comparison. 1 where a BOM could not be read whole, and with ``--check`` where one changed."""
+    from silo.bom.compare import compare_assemblies
+
+    check_writable(*args.report)
+    old, new = _two_states(args)
+    unread = {path for state in (old, new) for path, _ in state.unreadable}
+    # A file that cannot be read has neither lost its assembly nor got one.
+    changes = tuple(
+        change
+        for change in compare_assemblies(old.assemblies, new.assemblies)
+        if change.head.doc_path not in unread or (change.old and change.new)
+    )
+    for path in args.report:
+        make = _markdown if path.lower().endswith(".md") else _changes_json
+        made = make(changes, old, new)
+        text = made if isinstance(made, str) else common.json_text(made, indent=2)
+        with replacing(Path(path)) as stream:
+            stream.write(f"{text}\n".encode())
+    if args.json:
+        common.print_json(_changes_json(changes, old, new))
+    else:
+        _show_changes(changes, old, new)
+    # An old state that is damaged cannot be mended any more; a new one can.
+    return Exit.UNDONE if not new.complete or (args.check and changes) else Exit.DONE
+
+
+def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
+    """What is to be compared. Raises InputError."""
+    from silo.vault.plan import read_folder
+
+    if args.git is None:
+        if len(args.folders) != 2:
+            raise InputError("Name two folders, OLD and NEW, or two revisions with --git A..B.")
+        return read_folder(args.folders[0]), read_folder(args.folders[1])
+    if len(args.folders) > 1:
+        raise InputError("With --git name at most one folder, the part of the repository to compare.")
+    from silo.vault.git import lay_out, parse_range, top_of
+
+    top, below, work_tree = top_of(args.folders[0] if args.folders else ".")
+    chosen = parse_range(top, args.git)
+    if chosen.new is None and not work_tree:
+        raise InputError(f"{top} has no work tree to compare with. Name two revisions, A..B.")
+    laid: dict[str, Path] = {}
+    with scratch_folder("silo-bom-diff-") as scratch:
+
+        def state(name: str, revision: str | None) -> tuple[Path, list[tuple[str, str]]]:
+            """The whole repository as it was: the folder may use what lies beside it."""
+            folder = Path(top) if revision is None else Path(scratch, name)
+            return folder, [] if revision is None else lay_out(top, revision, folder, laid)
+
+        states = [state("old", chosen.old), state("new", chosen.new)]
+        if not any((folder / below).is_dir() for folder, _ in states):
+            raise InputError(f"There are no FreeCAD files in {below or top}, before or after.")
+        nothing = Path(scratch, "nothing")
+        nothing.mkdir()
+        old, new = (
+            read_folder(there if (there := folder / below).is_dir() else nothing, root=folder, lost=lost)
+            for folder, lost in states
+        )
+    return old, new
+
+
+# --- what people see ------------------------------------------------------------------------------------
+
+
+def _title(change: AssemblyChange) -> str:
+    words = {"added": "new assembly", "removed": "assembly removed", "moved": "moved", "changed": ""}
+    note = words[change.kind]
+    if change.old and change.new and change.old.head.key != change.new.head.key:
+        note = f"was {change.old.head.doc_path}"
+    return f"{change.head.doc_path}: {_name(change.head)}{f' ({note})' if note else ''}"
+
+
+def _quantities(line: LineChange) -> str:
+    if line.old and line.new and line.old.quantity != line.new.quantity:
+        return f"{line.old.quantity:g} → {line.new.quantity:g}"
+    return f"{line.entry.quantity:g}"
+
+
+def _where(line: LineChange, change: AssemblyChange) -> str:
+    """The file, and the object if the assembly has another one of it."""
+    heads = [one for state in (change.old, change.new) if state for one in (state.head, *state.lines)]
+
+    def place(entry: BomEntry) -> str:
+        several = len({one.object_name for one in heads if one.doc_path == entry.doc_path}) > 1
+        return f"{entry.doc_path}#{entry.object_name}" if several and not entry.standard else entry.doc_path
+
+    gone = " (missing)" if line.entry.missing else ""
+    if line.old and line.new and line.old.key != line.new.key:
+        return f"{place(line.old)} → {place(line.new)}{gone}"
+    return f"{place(line.entry)}{gone}"
+
+
+def _incomplete(state: FolderBoms, name: str) -> list[str]:
+    words = [
+        f"{name}: {path} could not be read: {shorten(why, state.base)}" for path, why in state.unreadable
+    ]
+    return words + [f"{name}: {shorten(finding.message, state.base)}" for finding in state.findings]
+
+
+def _show_changes(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderBoms) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from silo.cli import show
+
+    out = show.console()
+    for change in changes:
+        out.print(Text(show.plain(_title(change)), "bold"))
+        table = Table(box=None, pad_edge=False, show_header=False)
+        columns: tuple[Literal["left", "right"], ...] = ("left", "left", "right", "left")
+        for justify in columns:
+            table.add_column(justify=justify)
+        for line in change.lines:
+            mark, style = _MARK[line.kind]
+            name = Text(show.plain(_name(line.entry)))
+            table.add_row(
+                Text(f"  {mark}", style),
+                name,
+                _quantities(line),
+                Text(show.plain(_where(line, change)), "dim"),
+            )
+        if change.lines:
+            out.print(table)
+        out.print()
+    if not changes:
+        out.print(Text(_unchanged(old, new), "green" if new.assemblies and new.complete else "yellow"))
+    for words in (*_incomplete(old, "old"), *_incomplete(new, "new")):
+        out.print(Text("✗ ", "bold red").append(show.plain(words), ""))
+
+
+def _name(entry: BomEntry) -> str:
+    return display_name(entry) or entry.object_name
+
+
+def _unchanged(old: FolderBoms, new: FolderBoms) -> str:
+    if not (old.assemblies or new.assemblies):
+        return "There is no assembly to compare, before or after."
+    part = "" if old.complete and new.complete else " as far as they could be read"
+    return f"No BOM changed{part}; assemblies compared: {len(new.assemblies)}."
+
+
+def _markdown(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderBoms) -> str:
+    from silo.batch import cell
+
+    lines = ["## BOM changes", ""]
+    if not changes:
+        lines += [_unchanged(old, new), ""]
+    for change in changes:
+        lines += [f"### {cell(_title(change))}", ""]
+        if change.lines:
+            lines += ["| | Part | Quantity | File |", "|---|---|---:|---|"]
+        for line in change.lines:
+            words = (line.kind.replace("_", " "), _name(line.entry), _quantities(line), _where(line, change))
+            lines.append(f"| {' | '.join(map(cell, words))} |")
+        lines.append("")
+    incomplete = [*_incomplete(old, "old"), *_incomplete(new, "new")]
+    if incomplete:
+        lines += ["### Not complete", "", *(f"- {cell(words)}" for words in incomplete), ""]
+    return "\n".join(lines).rstrip()
+
+
+def _changes_json(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderBoms) -> dict[str, object]:
+    from silo.bom.compare import changes_json
+
+    def state(boms: FolderBoms) -> dict[str, object]:
+        return {
+            "assemblies": len(boms.assemblies),
+            "complete": boms.complete,
+            "unreadable": [{"file": path, "reason": why} for path, why in boms.unreadable],
+            "findings": [finding_json(finding, boms.base) for finding in boms.findings],
+        }
+
+    return {"changes": changes_json(changes), "old": state(old), "new": state(new)}

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What the commands share: options, opening files, reaching the server."""
+"""What the commands share: options, opening files, reaching the server.
+
+How results look on a terminal: a tree, tables, the Activity box. Text of others is shown as text.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,24 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from silo.bom.errors import InputError, NotFoundError, RouteMissingError, SiloError
+from silo.bom.errors import (
+    InputError,
+    NotFoundError,
+    RouteMissingError,
+    SeveralAssembliesError,
+    SiloError,
+    duration,
+)
 from silo.bom.findings import respelt_findings
-from silo.bom.identity import walk_entries
 from silo.bom.links import extract
-from silo.bom.model import Extraction
+from silo.bom.model import Extraction, walk_entries
 from silo.bom.roots import choose_assembly
 
 if TYPE_CHECKING:
@@ -27,21 +37,98 @@ if TYPE_CHECKING:
     from silo.vault.plan import Plan
     from silo.vault.reading import Reading
 
-Commands = Any  # argparse keeps the type of its sub-parsers to itself
+
 READING = ("--index", "--no-index", "--jobs", "--dask")
 
 
-def add_command(commands: Commands, name: str, help_text: str, example: str) -> argparse.ArgumentParser:
-    """A sub-command with its help and an example."""
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name,
-        help=help_text,
-        description=help_text[0].upper() + help_text[1:] + ".",
-        epilog=f"example:\n  {example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,  # --all is no --allow-missing
+class Shared(NamedTuple):
+    """An option that several commands have. ``group`` after a slash: options that exclude each other."""
+
+    commands: str
+    option: str
+    how: dict[str, Any]
+    group: str = ""
+
+
+# For ``--assembly``: each of the assemblies of a file.
+EACH = "all"
+_READ = "bom diff register sync where-used"
+_ASK = "bom diff register commit status sync queue pull search show log watch whoami doctor inertia mass"
+
+
+def shared_options() -> Iterator[Shared]:
+    """Yield the options that several commands have, in the order of their help."""
+    text = "the assembly to read, where a file holds several"
+    yield Shared("diff register mass", "--assembly", {"metavar": "NAME", "help": text})
+    text += f"; {EACH!r} for each of them"
+    yield Shared("bom sync", "--assembly", {"metavar": "NAME", "help": text})
+    servers = "serve backup restore summaries"
+    every = f"{_ASK} where-used relink bom-diff {servers} login logout install-addon schema links"
+    open_there = "also files that a running FreeCAD has open; whoever saves them there undoes this"
+    for commands, option, text in (
+        ("diff sync", "--recursive", "the sub-assemblies too, children before parents"),
+        ("diff bom-diff", "--check", "exit 1 where anything differs, for CI"),
+        ("sync relink", "--dry-run", "show what would change, and change nothing"),
+        ("register relink pull", "--even-if-open", open_there),
+        (
+            "bom diff register mass sync",
+            "--no-hardware",
+            "leave out standard parts (screws, nuts, washers, inserts)",
+        ),
+        (every, "--json", "print JSON for machines"),
+    ):
+        yield Shared(commands, option, {"action": "store_true", "help": text})
+    for commands, forms in (
+        ("sync", ".html .md .json .xml"),
+        ("inertia mass", ".json .csv .md"),
+        ("bom-diff", ".md .json"),
+    ):
+        text = f"write a report, by its suffix ({forms.replace(' ', ', ')}); may be repeated"
+        how = {"metavar": "FILE", "action": "append", "default": [], "type": _report_in(forms), "help": text}
+        yield Shared(commands, "--report", how)
+    text = "where to remember what files hold (else your cache)"
+    index = {"metavar": "FILE", "type": a_path, "help": text}
+    yield Shared(f"{_READ} mass", "--index", index, "reading/index")
+    text = "read every file, and remember nothing"
+    yield Shared(f"{_READ} mass", "--no-index", {"action": "store_true", "help": text}, "reading/index")
+    text = "processes that read (default: the processors)"
+    yield Shared(_READ, "--jobs", {"metavar": "N", "type": job_count, "help": text}, "reading")
+    text = "read on a Dask cluster that sees the same files (extra: dask)"
+    yield Shared(_READ, "--dask", {"metavar": "ADDRESS", "help": text}, "reading")
+    text = "address of the Silo server (else SILO_API_URL)"
+    yield Shared(_ASK, "--server", {"metavar": "URL", "help": text}, "server")
+    text = "API token (else SILO_API_TOKEN, which other users cannot read)"
+    yield Shared(_ASK, "--token", {"help": text}, "server")
+
+
+def _report_in(forms: str) -> Callable[[str], str]:
+    def checked(text: str) -> str:
+        if os.path.splitext(text)[1].lower() not in forms.split():
+            raise InputError(f"--report writes {', '.join(forms.split())}; got {text}")
+        return text
+
+    return checked
+
+
+def add_shared(parser: argparse.ArgumentParser, command: str) -> None:
+    """Give a command the options that it shares with others."""
+    groups: dict[str, Any] = {"": parser}
+    for one in shared_options():
+        if command in one.commands.split():
+            title, _, exclusive = one.group.partition("/")
+            group = groups.get(title) or groups.setdefault(title, parser.add_argument_group(title))
+            if exclusive:
+                group = groups.get(one.group) or groups.setdefault(
+                    one.group, group.add_mutually_exclusive_group()
+                )
+            group.add_argument(one.option, **one.how)
+
+
+def add_top(parser: argparse.ArgumentParser) -> None:
+    """Add the assembly's file, or a folder."""
+    parser.add_argument(
+        "top", metavar="TOP", help="the assembly's file, or a folder: all assemblies below it"
     )
-    return parser
 
 
 def only_with(parser: argparse.ArgumentParser, needed: str, *options: str) -> None:
@@ -74,54 +161,6 @@ def refuse_idle_options(parser: argparse.ArgumentParser, args: argparse.Namespac
             raise InputError(f"{option} does nothing with {other}; leave one of them out")
 
 
-def add_server_options(parser: argparse.ArgumentParser) -> None:
-    """``--server`` and ``--token``."""
-    group = parser.add_argument_group("server")
-    group.add_argument("--server", metavar="URL", help="address of the Silo server (else SILO_API_URL)")
-    group.add_argument("--token", help="API token (else SILO_API_TOKEN, which other users cannot read)")
-
-
-def add_assembly_options(parser: argparse.ArgumentParser, *, folders: bool = False) -> None:
-    """``TOP.FCStd`` and ``--assembly``; where the command takes them, whole folders."""
-    more = ", or a folder: all assemblies below it" if folders else ""
-    parser.add_argument("top", metavar="TOP" if folders else "TOP.FCStd", help=f"the assembly's file{more}")
-    parser.add_argument("--assembly", metavar="NAME", help="the assembly to read, where a file holds several")
-    add_hardware_option(parser)
-    add_reading_options(parser, jobs=folders)
-
-
-def add_hardware_option(parser: argparse.ArgumentParser) -> None:
-    """``--no-hardware``."""
-    parser.add_argument(
-        "--no-hardware", action="store_true", help="leave out standard parts (screws, nuts, washers, inserts)"
-    )
-
-
-def add_json_option(parser: argparse.ArgumentParser) -> None:
-    """``--json``."""
-    parser.add_argument("--json", action="store_true", help="print JSON for machines")
-
-
-def add_reading_options(parser: argparse.ArgumentParser, *, jobs: bool = True) -> None:
-    """``--index``, ``--no-index``, and for many files ``--jobs`` and ``--dask``."""
-    group = parser.add_argument_group("reading")
-    index = group.add_mutually_exclusive_group()
-    index.add_argument(
-        "--index",
-        metavar="FILE",
-        type=a_path,
-        help="where to remember what files hold (else your cache)",
-    )
-    index.add_argument("--no-index", action="store_true", help="read every file, and remember nothing")
-    if jobs:
-        group.add_argument(
-            "--jobs", type=job_count, metavar="N", help="processes that read (default: the processors)"
-        )
-        group.add_argument(
-            "--dask", metavar="ADDRESS", help="read on a Dask cluster that sees the same files (extra: dask)"
-        )
-
-
 def a_path(text: str) -> Path:
     """An argument that is a path; an empty one would be the current folder."""
     if not text:
@@ -145,8 +184,7 @@ def above_zero(text: str, most: int = 1_000_000_000) -> int:
 def reading_of(args: argparse.Namespace) -> Iterator[Reading]:
     """What reads files, as the options say."""
     from silo.vault.index import Index, default_path
-    from silo.vault.pool import pool_of
-    from silo.vault.reading import Reading
+    from silo.vault.reading import Reading, pool_of
 
     given = getattr(args, "index", None)
     path = None if getattr(args, "no_index", False) else given or default_path()
@@ -176,11 +214,10 @@ def client_of(
     stop
         once it is set, nobody waits for the server any more.
     """
-    from silo.api.caller import abilities_path
     from silo.api.client import SiloClient
     from silo.api.config import resolve_server
     from silo.api.policy import Retries
-    from silo.api.transport import stop_if
+    from silo.api.transport import abilities_path, stop_if
 
     stopped = stop or threading.Event()
 
@@ -188,8 +225,13 @@ def client_of(
         stopped.wait(seconds)
         stop_if(stopped)
 
+    def tell(seconds: float, error: SiloError) -> None:
+        if seconds > 5:
+            again = f"It is asked again in {duration(seconds)}; Ctrl-C ends this, what was sent stays"
+            print(f"silo-mod: {error}. {again}", file=sys.stderr, flush=True)
+
     where = resolve_server(getattr(args, "server", None), getattr(args, "token", None))
-    retries = Retries(busy_tries=busy_tries, longest=longest, sleep=rest)
+    retries = Retries(busy_tries=busy_tries, longest=longest, sleep=rest, tell=tell)
     memory = abilities_path()
     with SiloClient(where.url, where.token, verify=where.verify, memory=memory, retries=retries) as client:
         yield client
@@ -198,25 +240,62 @@ def client_of(
 def read_assembly(top: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
     """The BOM of a file, read without FreeCAD; missing files come with the ones that were probably meant."""
     from silo.fcstd import Library
-    from silo.fcstd.suggest import with_suggestions
 
     with Library() as library:
         document = library.open(top)
         found = extract(choose_assembly(document, assembly), hardware=hardware)
         told = respelt_findings(library.notes, document.FileName)
-    return with_suggestions(replace(found, findings=(*found.findings, *told)))
+    return _with_suggestions(replace(found, findings=(*found.findings, *told)))
 
 
-def read_top(args: argparse.Namespace) -> Extraction:
-    """The BOM of the file that the options name, from the index where it is known. Raises SiloError."""
-    from silo.fcstd.suggest import with_suggestions
-    from silo.vault.session import Question
+def _with_suggestions(found: Extraction) -> Extraction:
+    if not any(entry.missing for entry in walk_entries(found.entries)):
+        return found
+    from silo.fcstd.linked import with_suggestions
 
-    with reading_of(args) as reading:
-        found = reading.ask(Question(args.top, args.assembly, not args.no_hardware, below=True)).found
-    if isinstance(found, SiloError):
-        raise found
     return with_suggestions(found)
+
+
+def read_tops(args: argparse.Namespace) -> list[Extraction]:
+    """The BOM of the file that the options name, from the index where it is known. Raises SiloError.
+
+    Of each assembly of the file if all are asked for, else one.
+    """
+    from silo.vault.reading import Question
+
+    names = [None if args.assembly == EACH else args.assembly]
+    tops = []
+    with reading_of(args) as reading:
+        for name in names:
+            found = reading.ask(Question(args.top, name, not args.no_hardware, below=True)).found
+            if isinstance(found, SeveralAssembliesError) and args.assembly == EACH:
+                names += found.names
+            elif isinstance(found, SiloError):
+                raise found
+            else:
+                tops.append(_with_suggestions(found))
+    return tops
+
+
+class Progress:
+    """Prints on standard error how far a long run is: after 5 seconds, then every 10."""
+
+    def __init__(self, count: int = 0, clock: Callable[[], float] = time.monotonic) -> None:
+        self._count, self._number = count, 0
+        self._clock, self._due = clock, clock() + 5
+
+    def begin(self, top: str) -> None:
+        """Begin with the next file."""
+        self._number += 1
+        self.tell(f"[{self._number}/{self._count}] {top}")
+
+    def tell(self, text: str) -> None:
+        """Print the text if it is time."""
+        from silo.cli.show import plain
+
+        if self._clock() >= self._due:
+            self._due = self._clock() + 10
+            print(plain(text), file=sys.stderr)
 
 
 @contextmanager
@@ -232,13 +311,13 @@ def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, Reading, str]]:
         raise InputError(f"no FreeCAD files (*.FCStd) in {args.top}")
     with reading_of(args) as reading:
         reading.index.expect(base)
-        plan = make_plan(tops, reading, hardware=not args.no_hardware)
+        plan = make_plan(tops, reading, hardware=not args.no_hardware, progress=Progress(len(tops)).begin)
         yield plan, reading, base
 
 
 def refuse_assembly_of(tops: Sequence[str], assembly: str | None) -> None:
     """A name picks one of the assemblies of a file; the files of a folder have their own."""
-    if assembly and any(os.path.isdir(top) for top in tops):
+    if assembly not in (None, EACH) and any(os.path.isdir(top) for top in tops):
         raise InputError("--assembly picks an assembly of one file, and this is a folder; name the file")
 
 

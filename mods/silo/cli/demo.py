@@ -29,11 +29,9 @@ from silo.bom.report import base_of
 from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import Outcome, Status, resolve, sync_tree
 from silo.cli import common, show
-from silo.cli.common import Commands
-from silo.cli.server import need_server_extra
-from silo.durable import replace_patiently
+from silo.cli.setup import need_server_extra
 from silo.files import shipped
-from silo.folders import scratch_folder
+from silo.platform import replace_patiently, scratch_folder
 from silo.registering.on_disk import proposals_for, register_all
 
 if TYPE_CHECKING:
@@ -51,14 +49,8 @@ EVENT_SECONDS = 20.0
 DOCUMENT_XML = "Document.xml"
 
 
-def register(commands: Commands) -> None:
+def add_demo(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = common.add_command(
-        commands,
-        "demo",
-        "sync a real assembly with a temporary server and show what happens",
-        "silo-mod demo --keep",
-    )
     parser.add_argument("--keep", action="store_true", help="leave the server running until Ctrl-C")
     parser.add_argument("--port", type=int, default=0, help="port of the server (default: a free one)")
     parser.set_defaults(run=run)
@@ -177,7 +169,7 @@ class Demo:
             sync_tree(whole, self.client, sync_id=lambda: str(uuid.uuid4()), describe=source_document)
         )
         for outcome in outcomes:
-            self.out.print(show.outcome_text(outcome))
+            self.out.print(show.outcome_text(outcome, os.path.dirname(outcome.assembly.doc_path)))
             if outcome.error is not None:
                 raise outcome.error
             if outcome.status is Status.MERGED and outcome.plan is not None:

@@ -1,43 +1,371 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod inertia``, ``mass`` and ``links``: mass properties of an assembly, by link or as a whole."""
+"""``silo-mod inertia``, ``mass`` and ``links``: mass properties of an assembly, by link or as a whole.
+
+What ``silo-mod inertia`` and ``silo-mod mass`` share: options, reading with progress, results, push.
+"""
 
 from __future__ import annotations
 
 import argparse
+import math
+import os
 import sys
-from collections.abc import Iterator, Sequence
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import Exit, InputError
+from silo.bom.errors import ConfigError, Exit, InputError, counted, listed
 from silo.cli import common
-from silo.cli import inertia_common as shared
-from silo.cli.common import Commands
 
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry
+    from silo.inertia.bom import BomTable
     from silo.inertia.calculator import Task
+    from silo.inertia.geometry import ReadOptions
+    from silo.inertia.materials import MaterialTable
+    from silo.inertia.model import Assembly
+    from silo.inertia.output.push import PushPlan
+    from silo.inertia.output.urdf import Urdf
     from silo.inertia.report import InertiaReport
 
 
-def register(commands: Commands) -> None:
-    """Add the commands."""
-    _add_inertia(commands)
-    _add_links(commands)
-    _add_mass(commands)
+def add_geometry_options(parser: argparse.ArgumentParser) -> None:
+    """How files are read."""
+    group = parser.add_argument_group("geometry")
+    group.add_argument(
+        "--mesh-unit", metavar="UNIT", help="length unit of meshes that state none (mm, cm, m, in)"
+    )
+    group.add_argument(
+        "--timeout", type=float, default=600.0, metavar="S", help="give up reading after S seconds"
+    )
+    group.add_argument(
+        "--jobs",
+        type=common.job_count,
+        dest="geometry_jobs",
+        default=0,
+        metavar="N",
+        help="processes that read one large file or split assembly (default: the processors)",
+    )
+    group.add_argument(
+        "--no-siblings", action="store_true", help="do not look for the files of split assemblies"
+    )
+    group.add_argument(
+        "--no-cache", action="store_true", help="read afresh, and keep nothing for the next time"
+    )
+
+
+def add_material_options(parser: argparse.ArgumentParser) -> None:
+    """Where densities come from."""
+    group = parser.add_argument_group("materials")
+    group.add_argument(
+        "--materials", action="append", default=[], metavar="FILE", help="your own densities (.csv or .toml)"
+    )
+    group.add_argument(
+        "--no-freecad-materials", action="store_true", help="do not look into an installed FreeCAD's cards"
+    )
+
+
+def add_bom_options(parser: argparse.ArgumentParser) -> None:
+    """How the BOM is read, where what is found out from it is wrong."""
+    group = parser.add_argument_group("BOM")
+    group.add_argument("--bom", metavar="BOM", help="CSV, XLSX, XLS or ODS; names, masses or materials")
+    group.add_argument(
+        "--column",
+        action="append",
+        default=[],
+        metavar="ROLE=HEADER",
+        help="a renamed column; roles: name, part_number, description, material, mass, total_mass, "
+        "mass_unit, quantity, item, level, find_number",
+    )
+    group.add_argument("--encoding", help="of the BOM, for example cp1252")
+    group.add_argument("--delimiter", help="of the BOM, one character")
+    group.add_argument("--decimal", choices=(".", ","), help="decimal mark of the BOM")
+    group.add_argument("--mass-unit", metavar="UNIT", help="of masses without one (kg, g, lb, …)")
+    common.only_with(parser, "--bom", "--column", "--encoding", "--delimiter", "--decimal", "--mass-unit")
+
+
+def add_result_options(parser: argparse.ArgumentParser) -> None:
+    """Where results go, and when a warning is a failure."""
+    group = parser.add_argument_group("results")
+    group.add_argument(
+        "--preview",
+        action="append",
+        default=[],
+        metavar="OUT",
+        help="write a 3D scene (.glb) with centres of mass and inertia ellipsoids; may be repeated",
+    )
+    group.add_argument(
+        "--html",
+        metavar="OUT",
+        help="write one page to look at: a 3D view to turn, masses by source, warnings, tables",
+    )
+    group.add_argument("--strict", action="store_true", help="exit 1 where there is any warning")
+    group.add_argument(
+        "--allow", action="append", default=[], metavar="CODE", help="with --strict: this warning is fine"
+    )
+    common.only_with(parser, "--strict", "--allow")
+
+
+def add_push_options(parser: argparse.ArgumentParser) -> None:
+    """Back to Silo."""
+    group = parser.add_argument_group("back to Silo")
+    group.add_argument(
+        "--push", action="store_true", help="write mass, volume and centre of mass into the items' properties"
+    )
+    group.add_argument("--dry-run", action="store_true", help="with --push: only show what would be written")
+    group.add_argument("--item", metavar="NUMBER", help="with --push: part number of the whole assembly")
+    common.only_with(parser, "--push", "--dry-run", "--item", "--server", "--token")
+
+
+def need_inertia_extra() -> None:
+    """Raise ConfigError if the extra is not installed."""
+    missing = [name for name in ("numpy", "OCP", "trimesh", "yaml") if find_spec(name) is None]
+    if missing:
+        raise ConfigError(
+            f"mass and inertia need the packages of the extra “inertia” ({', '.join(missing)} not found); "
+            "install them with: pip install 'silo-mod[inertia]'"
+        )
+
+
+def bom_table(args: argparse.Namespace) -> BomTable | None:
+    """The BOM by the user's options."""
+    from silo.inertia.bom import BOMParser
+
+    columns = _pairs(args.column, "--column", "ROLE=HEADER, for example mass=Gewicht")
+    delimiter = "\t" if args.delimiter in ("\\t", "tab") else args.delimiter
+    parser = BOMParser(
+        columns=columns,
+        encoding=args.encoding,
+        delimiter=delimiter,
+        decimal=args.decimal,
+        mass_unit=args.mass_unit,
+    )
+    return parser.parse(args.bom) if args.bom else None
+
+
+def _pairs(texts: Sequence[str], option: str, wanted: str) -> dict[str, str]:
+    if bad := [text for text in texts if "=" not in text]:
+        raise InputError(f"{option} wants {wanted}; got “{bad[0]}”")
+    return {name.strip(): value.strip() for name, _, value in (text.partition("=") for text in texts)}
+
+
+def material_table(args: argparse.Namespace) -> MaterialTable:
+    """The table by the user's options."""
+    from silo.inertia.materials import load_materials
+
+    return load_materials(args.materials, freecad=not args.no_freecad_materials)
+
+
+def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
+    """Bad numbers, output files and a missing server are reported before minutes of reading, not after."""
+    from silo.inertia.materials import checked_density
+
+    if args.default_density is not None:
+        checked_density(args.default_density)
+    if not (args.timeout >= 0 and math.isfinite(args.timeout)):
+        raise InputError(f"--timeout: wanted seconds, 0 for no limit, got {args.timeout:g}")
+    if asks_server:
+        from silo.api.config import resolve_server
+
+        resolve_server(args.server, args.token)
+    check_outputs(args)
+
+
+def check_outputs(args: argparse.Namespace) -> None:
+    """InputError for files that cannot be written, or that must not: what is read, and one file twice."""
+    from silo.inertia.geometry.graph import is_model_name
+
+    report: list[str] = getattr(args, "report", [])
+    single = [getattr(args, name) for name in ("urdf_out", "html", "out") if getattr(args, name, None)]
+    written = [*report, *args.preview, *single]
+    for name in single:
+        if is_model_name(Path(name)) and os.path.lexists(name):
+            raise InputError(f"{name} is there already and is named like a model; write to another file")
+    if bad := [name for name in args.preview if Path(name).suffix.lower() != ".glb"]:
+        raise InputError(f"--preview writes .glb, --html a page to look at; got {', '.join(bad)}")
+    read = [getattr(args, "top", args.assembly), *getattr(args, "materials", [])]
+    read += filter(None, (getattr(args, name, None) for name in ("bom", "links", "urdf")))
+    known = {os.path.realpath(name) for name in read}
+    for name in written:
+        if not Path(name).absolute().parent.is_dir():
+            raise InputError(f"{name}: there is no folder {Path(name).parent}")
+        if (real := os.path.realpath(name)) in known:
+            raise InputError(f"{name} is read by this command, or written twice; write to another file")
+        known.add(real)
+
+
+def read_options(args: argparse.Namespace, **more: Any) -> ReadOptions:
+    """What the arguments say about reading geometry."""
+    from silo.inertia.geometry import ReadOptions
+
+    return ReadOptions(
+        mesh_unit=args.mesh_unit,
+        timeout_s=args.timeout,
+        processes=args.geometry_jobs,
+        siblings=not args.no_siblings,
+        cache=not args.no_cache,
+        **more,
+    )
+
+
+def read(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
+    """Return the geometry, with progress on standard error; Ctrl-C stops it at once."""
+    from silo.inertia.calculator import read_geometry
+
+    with _progress(Path(path).name) as told:
+        return read_geometry(path, read_options(args, progress=told, **more))
+
+
+@contextmanager
+def _lines(name: str, progress: common.Progress | None = None) -> Iterator[Any]:
+    """Print from time to time what is being done, for logs and pipes; the kernel calls nobody meanwhile."""
+    begun, ended, at = time.monotonic(), threading.Event(), ["reading"]
+    progress = progress or common.Progress()
+
+    def say() -> None:
+        while not ended.wait(0.2):
+            progress.tell(f"{name}: {at[0]}, {time.monotonic() - begun:.0f} s")
+
+    thread = threading.Thread(target=say, daemon=True)
+    thread.start()
+    try:
+        yield lambda progress: at.__setitem__(0, str(progress))
+    finally:
+        ended.set()
+        thread.join()
+
+
+@contextmanager
+def _progress(name: str) -> Iterator[Any]:
+    if not sys.stderr.isatty():
+        with _lines(name) as told:
+            yield told
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    bar = Progress(
+        TextColumn("{task.fields[file]}: {task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total}"),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task("reading", total=None, file=name)
+
+        def told(progress: Any) -> None:
+            bar.update(
+                task, description=progress.stage, completed=progress.done, total=progress.total or None
+            )
+
+        yield told
+
+
+def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly, *, quiet: bool = False) -> None:
+    """Write every file that was asked for, and print the report; only its warnings where ``quiet``."""
+    from silo.cli.show import console
+
+    _write_files(args, report, assembly)
+    if quiet:
+        from silo.inertia.output.text import report_warnings
+
+        console(sys.stderr).print(report_warnings(report, whole=not sys.stderr.isatty()))
+        return
+    if args.json:
+        from silo.inertia.output.text import report_json
+
+        # A pipe on Windows takes the country's code page: names must not turn into question marks there.
+        sys.stdout.write(report_json(report, sys.stdout.encoding or "ascii"))
+        return
+    from silo.inertia.output.text import report_tables
+
+    console().print(report_tables(report, whole=not sys.stdout.isatty()))
+
+
+def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:
+    from silo.inertia.output.text import write_whole
+
+    for name in args.preview:
+        from silo.inertia.preview.page import views_of, write_glb
+
+        write_whole(name, write_glb(assembly, views_of(report, assembly)))
+    if args.html:
+        from silo.inertia.preview.page import report_html
+
+        write_whole(args.html, report_html(report, assembly).encode("utf-8"))
+    for name in args.report:
+        from silo.inertia.output.text import report_csv, report_json, report_markdown
+
+        writers = {".json": report_json, ".csv": report_csv, ".md": report_markdown}
+        write_whole(name, writers[Path(name).suffix.lower()](report).encode("utf-8"))
+
+
+def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
+    """The exit code: with --strict, 1 where a warning is not allowed."""
+    if not args.strict:
+        return Exit.DONE
+    left = [w for w in report.warnings if str(w.code) not in args.allow]
+    if left:
+        codes = sorted({str(w.code) for w in left})
+        count = counted(len(left), "warning")
+        print(f"silo-mod: --strict: {count} ({', '.join(codes)})", file=sys.stderr)
+    return Exit.UNDONE if left else Exit.DONE
+
+
+def push_report(
+    args: argparse.Namespace, report: InertiaReport, part_numbers: Mapping[str, str] | None = None
+) -> int:
+    """Write the masses to the server, or show the plan; 1 where an item is unknown there."""
+    from silo.inertia.output.push import plan_push, push
+
+    plan = plan_push(report, part_numbers, args.item)
+    if args.dry_run:
+        _tell_plan(plan)
+        return Exit.DONE
+    with common.client_of(args) as client:
+        done = push(client, plan)
+    written = counted(len(done.written), "item")
+    _say(f"Silo: {written} written, {len(done.unchanged)} had these numbers already.")
+    if done.unknown:
+        _say(f"Unknown to the server: {', '.join(done.unknown)}")
+    for number, error in done.failed:
+        _say(f"Not written: {number}: {error}")
+    _tell_skipped(plan)
+    return Exit.REMOTE if done.failed else Exit.UNDONE if done.unknown else Exit.DONE
+
+
+def _tell_plan(plan: PushPlan) -> None:
+    from silo.inertia.output.push import describe
+
+    _say(f"Would write {counted(len(plan.items), 'item')} ({plan.comment}):")
+    for item in plan.items:
+        _say(f"  {describe(item)}")
+    _tell_skipped(plan)
+
+
+def _tell_skipped(plan: PushPlan) -> None:
+    for skipped in plan.skipped:
+        _say(f"Not written: {skipped.name}: {skipped.reason}")
+
+
+def _say(text: str) -> None:
+    # Standard output may be JSON; what a push did is for people.
+    from silo.cli.show import plain
+
+    print(plain(text), file=sys.stderr)
 
 
 FRAMES = ("assembly", "own", "urdf")
 SNIPPETS = ("urdf", "sdf", "mjcf")
 
 
-def _add_inertia(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "inertia",
-        "mass, centre of mass and inertia of each link of a STEP assembly, with masses from a BOM",
-        "silo-mod inertia examples/arm/arm.step --bom examples/arm/bom.csv --urdf examples/arm/arm.urdf",
-    )
+def add_inertia(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "assembly", metavar="ASSEMBLY", help="STEP, mesh (STL, OBJ, 3MF, GLB, PLY) or FCStd file"
     )
@@ -51,22 +379,33 @@ def _add_inertia(commands: Commands) -> None:
         help="the link of what no other link claims (without a map: base_link, warned of)",
     )
     group.add_argument(
+        "--mass",
+        action="append",
+        default=[],
+        metavar="NAME=MASS",
+        help="what a scale says of a link, or of each component of a pattern, for example arm=1.25kg; its "
+        "parts are scaled to it; may be repeated",
+    )
+    group.add_argument(
         "--frame",
         choices=FRAMES,
         help="frame of the numbers: the assembly's, each sub-assembly's own, or the URDF's link frames "
         "(default: urdf with --urdf, else assembly)",
     )
     group.add_argument(
-        "--urdf", metavar="FILE", help="write <inertial> into this URDF, the rest of it untouched"
+        "--urdf", metavar="FILE", help="take names and frames of the links from this URDF, to fill it"
     )
-    group.add_argument("--urdf-out", metavar="FILE", help="write the URDF here, and leave --urdf as it is")
+    group.add_argument(
+        "--urdf-out", metavar="FILE", help="write the URDF with its <inertial> here, the rest of it untouched"
+    )
+    group.add_argument("--in-place", action="store_true", help="write the <inertial> into the --urdf itself")
     group.add_argument(
         "--snippet",
         choices=SNIPPETS,
         help="print a file of the links with their <inertial> and nothing else; joints and shapes are yours",
     )
-    shared.add_bom_options(parser)
-    shared.add_material_options(parser)
+    add_bom_options(parser)
+    add_material_options(parser)
     parser.add_argument(
         "--default-density",
         type=float,
@@ -77,98 +416,85 @@ def _add_inertia(commands: Commands) -> None:
     parser.add_argument(
         "--density-from-step", action="store_true", help="use densities in the file before the default one"
     )
-    shared.add_geometry_options(parser)
-    shared.add_result_options(parser)
-    shared.add_push_options(parser)
+    add_geometry_options(parser)
+    add_result_options(parser)
+    add_push_options(parser)
+    common.only_with(parser, "--urdf", "--urdf-out", "--in-place")
     parser.set_defaults(run=run_inertia)
 
 
 def run_inertia(args: argparse.Namespace) -> int:
     """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
-    shared.need_inertia_extra()
-    shared.check_options(args, asks_server=args.push and not args.dry_run)
-    if args.urdf_out and not args.urdf:
-        raise InputError("--urdf-out needs --urdf, the file to start from")
+    need_inertia_extra()
+    check_options(args, asks_server=args.push and not args.dry_run)
+    if args.urdf_out and args.in_place:
+        raise InputError("--urdf-out and --in-place name two places for one URDF; give one of them")
     if args.snippet and args.json:
         raise InputError("--snippet and --json both go to standard output; use --report OUT.json")
     from silo.inertia.calculator import calculate
 
     # The small files first: a mistake in them should not cost the reading of the geometry.
-    parser = shared.bom_parser(args)
-    table = parser.parse(args.bom) if args.bom else None
+    table = bom_table(args)
     task = _task(args)
-    assembly = shared.read(args.assembly, args)
+    assembly = read(args.assembly, args)
     report = calculate(assembly, table, task)
     # What was found is shown first: where a link is refused, that is what explains it.
-    shared.show(args, report, assembly, quiet=bool(args.snippet))
+    show(args, report, assembly, quiet=bool(args.snippet))
     if args.snippet:
         _print_snippet(args.snippet, report)
-    if args.urdf:
-        _write_urdf(args, report)
-    pushed = shared.push_report(args, report) if args.push else 0
-    return max(pushed, shared.verdict(args, report))
+    if task.urdf is not None:
+        _write_urdf(args, report, task.urdf)
+    pushed = push_report(args, report) if args.push else 0
+    return max(pushed, verdict(args, report))
 
 
 def _task(args: argparse.Namespace) -> Task:
     from silo.inertia.calculator import Task
-    from silo.inertia.links import ROOT_LINK, FrameChoice, read_link_map
-    from silo.inertia.massrule import Options
-    from silo.inertia.output.urdf import frame_doubts, link_names, read_urdf, root_link, urdf_frames
+    from silo.inertia.links import FrameChoice, read_link_map
+    from silo.inertia.masses import Options
+    from silo.inertia.output.urdf import read_urdf
 
     frame = FrameChoice(args.frame or ("urdf" if args.urdf else "assembly"))
-    frames, root = None, ROOT_LINK
-    doubts: tuple[str, ...] = ()
     if frame is FrameChoice.URDF and not args.urdf:
         raise InputError("--frame urdf needs --urdf FILE, whose joints say where the link frames are")
-    if args.urdf:
-        data = read_urdf(args.urdf)
-        link_names(data, args.urdf)  # a file that cannot be filled is reported before anything else is read
-        try:
-            frames, root = urdf_frames(data, args.urdf), root_link(data, args.urdf)
-            doubts = frame_doubts(data, args.urdf)
-        except InputError:
-            # A xacro that is not expanded has no frames; who named another one does without the comparison.
-            if frame is FrameChoice.URDF:
-                raise
     return Task(
-        shared.material_table(args),
+        material_table(args),
         Options(args.default_density, args.density_from_step),
         read_link_map(args.links) if args.links else None,
         frame,
-        frames,
-        doubts,
+        read_urdf(args.urdf) if args.urdf else None,
         args.loose,
-        root,
+        weights=_pairs(args.mass, "--mass", "NAME=MASS, for example arm=1.25kg"),
     )
 
 
-def _write_urdf(args: argparse.Namespace, report: InertiaReport) -> None:
+def _write_urdf(args: argparse.Namespace, report: InertiaReport, urdf: Urdf) -> None:
+    from silo.inertia.output.text import writable
     from silo.inertia.output.urdf import write_urdf
-    from silo.inertia.output.values import writable
 
     links = writable(report.links.values())
-    filled = write_urdf(args.urdf, links, args.urdf_out)
+    target = args.urdf if args.in_place else args.urdf_out
+    filled = write_urdf(urdf, links, target)
     if not filled.written:
         raise InputError(
-            f"{args.urdf}: none of its links ({shared.names_of(filled.untouched)}) is one of ours "
-            f"({shared.names_of(tuple(report.links))}); a link map with --links gives them the URDF's names"
+            f"{args.urdf}: none of its links ({listed(filled.untouched, 8)}) is one of ours "
+            f"({listed(tuple(report.links), 8)}); a link map with --links gives them the URDF's names"
         )
-    target = args.urdf_out or args.urdf
-    print(f"{target}: wrote the inertia of {shared.names_of(filled.written)}.", file=sys.stderr)
-    if filled.absent:
-        print(f"{target}: has no link {shared.names_of(filled.absent)}.", file=sys.stderr)
+    if target is None:
+        print(f"{args.urdf}: not written; --urdf-out FILE or --in-place says where to", file=sys.stderr)
+        return
+    print(f"{target}: wrote the inertia of {listed(filled.written, 8)}.", file=sys.stderr)
     left = [name for name in filled.untouched if name not in report.links]
     if left:
-        print(f"{target}: left as they were, no link of ours: {shared.names_of(left)}.", file=sys.stderr)
+        print(f"{target}: left as they were, no link of ours: {listed(left, 8)}.", file=sys.stderr)
     massless = [name for name in report.links if name not in links]
     if massless:
-        print(f"{target}: not written, without mass: {shared.names_of(massless)}.", file=sys.stderr)
+        print(f"{target}: not written, without mass: {listed(massless, 8)}.", file=sys.stderr)
 
 
 def _print_snippet(kind: str, report: InertiaReport) -> None:
     from silo.cli.show import plain
-    from silo.inertia.output.snippets import document
-    from silo.inertia.output.values import writable
+    from silo.inertia.output.text import document, writable
 
     text = document(writable(report.links.values()), kind, report.assembly)
     # A file that says nothing of its encoding is UTF-8; a pipe of another code page gets ASCII.
@@ -179,13 +505,7 @@ def _print_snippet(kind: str, report: InertiaReport) -> None:
         print(f"{plain(name)}: frame of the numbers: {plain(link.frame.description)}", file=sys.stderr)
 
 
-def _add_links(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "links",
-        "a link map to start from: which part of an assembly belongs to which link of the robot",
-        "silo-mod links examples/arm/arm.step --urdf examples/arm/arm.urdf > map.yaml",
-    )
+def add_links(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "assembly", metavar="ASSEMBLY", help="STEP, mesh (STL, OBJ, 3MF, GLB, PLY) or FCStd file"
     )
@@ -201,32 +521,28 @@ def _add_links(commands: Commands) -> None:
         action="append",
         default=[],
         metavar="OUT",
-        help="draw the links, one colour each: .png or .glb; may be repeated",
+        help="write the links as a 3D scene (.glb), one colour each; may be repeated",
     )
     parser.add_argument("--out", metavar="MAP", help="write the map here, not to standard output")
-    common.add_json_option(parser)
-    shared.add_geometry_options(parser)
+    add_geometry_options(parser)
     parser.set_defaults(run=run_links)
 
 
 def run_links(args: argparse.Namespace) -> int:
     """Read, group, write."""
-    shared.need_inertia_extra()
+    need_inertia_extra()
     if args.clusters is not None and args.clusters < 1:
         raise InputError(f"--clusters: wanted a number of links above 0, got {args.clusters}")
     if args.clusters is not None and args.urdf:
         raise InputError("--clusters groups by position and --urdf by names; give one of them")
-    shared.check_outputs(args)
-    from silo.inertia.links import ROOT_LINK, claim
-    from silo.inertia.output.files import write_whole
-    from silo.inertia.output.urdf import link_meshes, read_urdf, root_link
-    from silo.inertia.starting_map import as_map, as_yaml, starting_map
+    check_outputs(args)
+    from silo.inertia.links import ROOT_LINK, as_map, as_yaml, claim, starting_map
+    from silo.inertia.output.text import write_whole
+    from silo.inertia.output.urdf import read_urdf
 
-    links, root = None, ROOT_LINK
-    if args.urdf:
-        data = read_urdf(args.urdf)
-        links, root = link_meshes(data, args.urdf), root_link(data, args.urdf)
-    assembly = shared.read(args.assembly, args)
+    urdf = read_urdf(args.urdf) if args.urdf else None
+    links, root = (urdf.meshes, urdf.root) if urdf is not None else (None, ROOT_LINK)
+    assembly = read(args.assembly, args)
     if not assembly.instances:
         raise InputError(f"{args.assembly}: holds no part, so there is nothing to give to links")
     start = starting_map(assembly, links, root=root, clusters=args.clusters)
@@ -239,18 +555,17 @@ def run_links(args: argparse.Namespace) -> int:
     if claim(assembly, made).members != start.members:
         print(
             f"silo-mod: {args.assembly}: the names of some parts make their lines match other parts as well; "
-            "look at the picture (--preview) before you use the map",
+            "look at the scene (--preview) before you use the map",
             file=sys.stderr,
         )
     for name in args.preview:
-        from silo.inertia.preview.picture import preview_bytes
-        from silo.inertia.preview.scene import LinkView
+        from silo.inertia.preview.page import LinkView, write_glb
 
         views = [
             LinkView(link, tuple(assembly.instances[index] for index in ids))
             for link, ids in start.members.items()
         ]
-        write_whole(name, preview_bytes(assembly, views, Path(name).suffix))
+        write_whole(name, write_glb(assembly, views))
     if args.out:
         write_whole(args.out, text.encode("utf-8"))
     else:
@@ -259,53 +574,37 @@ def run_links(args: argparse.Namespace) -> int:
     return Exit.DONE
 
 
-def _add_mass(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "mass",
-        "mass, centre of mass and inertia of a FreeCAD assembly, from its parts' shapes and materials",
-        "silo-mod mass TopAssembly.FCStd --push",
-    )
-    common.add_assembly_options(parser)
-    shared.add_bom_options(parser)
-    shared.add_material_options(parser)
+def add_mass(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("top", metavar="TOP.FCStd", help="the assembly's file")
+    add_bom_options(parser)
+    add_material_options(parser)
     parser.add_argument(
         "--default-density",
         type=float,
         metavar="RHO",
         help="kg/m³ of parts without a material (default: they count as zero, and are listed)",
     )
-    parser.add_argument(
-        "--via",
-        choices=("files", "freecad"),
-        default="files",
-        help="read the files directly (default), or let freecadcmd open and measure them",
-    )
-    shared.add_geometry_options(parser)
-    shared.add_result_options(parser)
-    shared.add_push_options(parser)
-    # FreeCAD reads its own documents, in one process, afresh. The index is asked only for part numbers.
-    common.not_with(parser, "--via", "--mesh-unit", "--jobs", "--no-siblings", "--no-cache")
+    add_geometry_options(parser)
+    add_result_options(parser)
+    add_push_options(parser)
+    # The index is asked only for part numbers.
     common.only_with(parser, "--push", "--index", "--no-index")
     parser.set_defaults(run=run_mass)
 
 
 def run_mass(args: argparse.Namespace) -> int:
     """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
-    shared.need_inertia_extra(args.via)
+    need_inertia_extra()
     # The documents hold identities; their part numbers are the server's, for a preview as well.
-    shared.check_options(args, asks_server=args.push)
+    check_options(args, asks_server=args.push)
     from silo.inertia.calculator import Task, calculate
     from silo.inertia.links import Link, LinkMap
-    from silo.inertia.massrule import Options
+    from silo.inertia.masses import Options
     from silo.inertia.model import GeometryCode
 
-    parser = shared.bom_parser(args)
-    table = parser.parse(args.bom) if args.bom else None
-    materials = shared.material_table(args)
-    assembly = shared.read(
-        args.top, args, via=args.via, object_name=args.assembly, hardware=not args.no_hardware
-    )
+    table = bom_table(args)
+    materials = material_table(args)
+    assembly = read(args.top, args, object_name=args.assembly, hardware=not args.no_hardware)
     name = assembly.name or "assembly"
     # A FreeCAD document is its own BOM: where it states no material, nobody does.
     options = Options(
@@ -319,9 +618,9 @@ def run_mass(args: argparse.Namespace) -> int:
     if not assembly.instances:
         words = "the document holds no part with a shape: there is nothing to weigh"
         report.add_warning("", "", words, GeometryCode.NO_GEOMETRY)
-    shared.show(args, report, assembly)
+    show(args, report, assembly)
     pushed = _push(args, report) if args.push else 0
-    return max(pushed, shared.verdict(args, report))
+    return max(pushed, verdict(args, report))
 
 
 def _push(args: argparse.Namespace, report: InertiaReport) -> int:
@@ -330,7 +629,7 @@ def _push(args: argparse.Namespace, report: InertiaReport) -> int:
     from silo.bom_sync import resolve
     from silo.inertia.geometry.freecad.walk import product_key
 
-    extraction = common.read_top(args)
+    extraction = common.read_tops(args)[0]
     base = base_of(extraction)
     with common.client_of(args) as client:
         resolved = resolve(extraction, client)
@@ -342,7 +641,7 @@ def _push(args: argparse.Namespace, report: InertiaReport) -> int:
         if entry.part_number
     }
     args.item = args.item or resolved.assembly.part_number
-    return shared.push_report(args, report, numbers)
+    return push_report(args, report, numbers)
 
 
 def _all(entries: Sequence[BomEntry]) -> Iterator[BomEntry]:

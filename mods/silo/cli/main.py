@@ -10,29 +10,177 @@ import argparse
 import importlib
 import io
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
-from typing import TextIO, TypeVar
+from typing import NoReturn, TextIO, TypeVar
 
-from silo.bom.errors import CancelledError, Exit, InputError, SiloError, exit_of
-from silo.cli.common import refuse_idle_options
+from silo.bom.errors import CancelledError, Exit, InputError, SiloError, did_you_mean, exit_of
 
 T = TypeVar("T")
 
-_MODULES = (
-    "bom",
-    "diff",
-    "sync",
-    "register",
-    "pull",
-    "server",
-    "setup",
-    "inertia",
-    "demo",
-)
+# By theme, each command's module, help and example. A module is imported if its command is chosen.
+THEMES = {
+    "Look at files": {
+        "bom": (
+            "bom",
+            "show the BOM of a FreeCAD assembly, read from its files without FreeCAD",
+            "silo-mod bom examples/gearbox/TopAssembly.FCStd --flat",
+        ),
+        "bom-diff": (
+            "bom",
+            "show what changed in parts between two folders, or two git revisions; needs no server",
+            "silo-mod bom-diff --git main...HEAD",
+        ),
+        "where-used": (
+            "bom",
+            "show which files of a vault link to a file, and which tops a change of it touches",
+            "silo-mod where-used vault/parts/Bracket.FCStd vault/",
+        ),
+        "diff": (
+            "bom",
+            "compare an assembly's BOM with the server's; changes nothing",
+            "silo-mod diff TopAssembly.FCStd --check",
+        ),
+    },
+    "Bring them to Silo": {
+        "register": (
+            "register",
+            "create items for components without a part number and write their identity into the files",
+            "silo-mod register vault/ --plan parts.csv      (edit the table, then)\n  "
+            "silo-mod register vault/ --apply parts.csv",
+        ),
+        "commit": (
+            "project",
+            "send the files of a project and its BOMs: what differs from Silo, with all that it links to",
+            'silo-mod commit TopAssembly.FCStd --comment "longer arm"',
+        ),
+        "status": (
+            "project",
+            "compare a project with Silo: edited here, newer there, both, not in Silo; changes nothing",
+            "silo-mod status robot/",
+        ),
+        "sync": (
+            "sync",
+            "merge BOMs into the server; nothing is ever deleted, manual lines are never touched",
+            "silo-mod sync vault/ --report night.md --report night.xml",
+        ),
+        "relink": (
+            "bom",
+            "let the links of an assembly and its sub-assemblies lead to a file that has moved",
+            "silo-mod relink TopAssembly.FCStd --from parts/Bolt.FCStd --to hardware/Bolt.FCStd --dry-run",
+        ),
+    },
+    "What is not in Silo yet": {
+        "queue": (
+            "sync",
+            "list the commits that wait, send them again, save their files or discard them",
+            "silo-mod queue retry",
+        ),
+    },
+    "Look at Silo": {
+        "search": (
+            "items",
+            "find items by words of their name or by part number",
+            "silo-mod search base plate",
+        ),
+        "show": ("items", "show an item with its BOM lines", "silo-mod show A01-0001"),
+        "log": (
+            "sync",
+            "show the revisions of a file's item, and which one the file is",
+            "silo-mod log TopAssembly.FCStd --bom",
+        ),
+        "watch": (
+            "setup",
+            "show the server's events as they happen (Ctrl-C ends)",
+            "silo-mod watch --item A01-0001",
+        ),
+    },
+    "Get files back": {
+        "pull": (
+            "sync",
+            "fetch the file of an item with all that it links to; edited files stay as they are",
+            "silo-mod pull A01-0001 --to robot",
+        ),
+    },
+    "Mass and inertia": {
+        "inertia": (
+            "inertia",
+            "mass, centre of mass and inertia of each link of a STEP assembly, with masses from a BOM",
+            "silo-mod inertia arm.step --bom bom.csv --urdf arm.urdf --urdf-out robot.urdf",
+        ),
+        "mass": (
+            "inertia",
+            "mass, centre of mass and inertia of a FreeCAD assembly, from its parts' shapes and materials",
+            "silo-mod mass TopAssembly.FCStd --push",
+        ),
+        "links": (
+            "inertia",
+            "a link map to start from: which part of an assembly belongs to which link of the robot",
+            "silo-mod links examples/arm/arm.step --urdf examples/arm/arm.urdf > map.yaml",
+        ),
+    },
+    "The connection": {
+        "login": (
+            "setup",
+            "try a server's address and a token, and remember both for this user",
+            "silo-mod login https://silo.example.com",
+        ),
+        "logout": ("items", "forget the server and the token that login remembered", "silo-mod logout"),
+        "whoami": ("items", "show which server is meant, and as whom", "silo-mod whoami"),
+        "doctor": (
+            "setup",
+            "show what is where on this machine, which server is meant, and what fails; changes nothing",
+            "silo-mod doctor",
+        ),
+    },
+    "A server": {
+        "serve": (
+            "setup",
+            "run a Silo server here, on SQLite or PostgreSQL; prints its address and a token",
+            "silo-mod serve --port 8080 --database postgresql://silo@localhost/silo",
+        ),
+        "backup": (
+            "setup",
+            "save a server's database and files to a new folder, while it serves",
+            "silo-mod backup /backups/silo-2026-02-08 --database postgresql://silo@localhost/silo",
+        ),
+        "restore": (
+            "setup",
+            "bring a server's database and files back from a backup, to SQLite or PostgreSQL",
+            "silo-mod restore /backups/silo-2026-02-08 --database sqlite:///silo.db",
+        ),
+        "summaries": (
+            "setup",
+            "sum all products of a server up anew, while it serves",
+            "silo-mod summaries --database postgresql://silo@localhost/silo",
+        ),
+        "demo": (
+            "demo",
+            "sync a real assembly with a temporary server and show what happens",
+            "silo-mod demo --keep",
+        ),
+    },
+    "FreeCAD and shell": {
+        "install-addon": (
+            "setup",
+            "put the add-on and its Python packages into a FreeCAD found on this machine",
+            "silo-mod install-addon --freecadcmd /usr/bin/freecadcmd",
+        ),
+        "completion": (
+            "items",
+            "print what completes commands and options in a shell",
+            "silo-mod completion bash > ~/.local/share/bash-completion/completions/silo-mod",
+        ),
+        "schema": (
+            "setup",
+            "print the JSON Schema of what a command prints with --json",
+            "silo-mod schema bom > bom.schema.json",
+        ),
+    },
+}
 
 _EPILOG = """exit codes: 0 done, 1 differences or something left undone, 2 bad input, 3 server, 130 cancelled
 
@@ -40,29 +188,74 @@ The server and the token come from --server and --token, else from SILO_API_URL 
 the configuration file. `silo-mod serve` starts a server of your own; `silo-mod demo` shows it all at once."""
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """The whole command line."""
-    parser = argparse.ArgumentParser(
+class _Parser(argparse.ArgumentParser):
+    """Names the command or option that was probably meant, and lists commands by theme."""
+
+    def error(self, message: str) -> NoReturn:
+        known = self._known()
+        given = re.search(r"(?:invalid choice: '|unrecognized arguments: )([^' =]+)", message)
+        self.print_usage(sys.stderr)
+        raise InputError(message + (did_you_mean(given[1], known) if given else ""))
+
+    def format_help(self) -> str:
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                action.help = argparse.SUPPRESS  # the end of the help has them, by theme
+        return super().format_help()
+
+    def _known(self) -> set[str]:
+        if self._subparsers is None:
+            return {str(choice) for action in self._actions for choice in action.choices or ()}
+        (commands,) = (action for action in self._actions if isinstance(action, argparse._SubParsersAction))
+        options = (one._option_string_actions for one in commands.choices.values())
+        return set(commands.choices).union(*options)
+
+
+def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
+    """Return the whole command line; of the commands only what ``words`` choose, if they are given."""
+    parser = _Parser(
         prog="silo-mod",
+        usage="silo-mod [-h] [--version] COMMAND ...",
         description="The BOM of FreeCAD assemblies in Silo: read, compare, sync, register; mass and inertia.",
-        epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("--version", action="version", version=f"silo-mod {_version()}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name in _MODULES:
-        importlib.import_module(f"silo.cli.{name}").register(commands)
-    for one in commands.choices.values():
-        one.set_defaults(parser=one)
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    commands = parser.add_subparsers(prog="silo-mod", dest="command", metavar="COMMAND", title="commands")
+    chosen = None if words is None else next((word for word in words if not word.startswith("-")), "")
+    lines = []
+    for theme, names in THEMES.items():
+        lines.append(f"\n{theme}:")
+        for name, (module, help_text, example) in names.items():
+            lines.append(f"  {name:<14} {help_text}")
+            one = commands.add_parser(
+                name,
+                help=help_text,
+                description=help_text[0].upper() + help_text[1:] + ".",
+                epilog=f"example:\n  {example}",
+                formatter_class=argparse.RawDescriptionHelpFormatter,
+                allow_abbrev=False,  # --all is no --allow-missing
+            )
+            if chosen in (None, name):
+                from silo.cli.common import add_shared
+
+                add = f"add_{name.replace('-', '_')}"
+                getattr(importlib.import_module(f"silo.cli.{module}"), add)(one)
+                add_shared(one, name)
+                one.set_defaults(parser=one)
+    parser.epilog = "\n".join([*lines, "", _EPILOG])
     return parser
 
 
-def _version() -> str:
-    try:
-        return version("silo-mod")
-    except PackageNotFoundError:  # run from a checkout that is not installed
-        return "(not installed)"
+class _Version(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            print(f"silo-mod {version('silo-mod')}")
+        except PackageNotFoundError:
+            print("silo-mod (not installed)")  # run from a checkout
+        parser.exit()
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -83,33 +276,52 @@ def main(argv: Sequence[str] | None = None) -> int:
                 one.close()
     if kept.failure is None or isinstance(kept.failure, BrokenPipeError):
         return code
-    return max(code, _system_said_no(kept.failure))
+    return max(code, _failed(_system_said_no(kept.failure), ()))
 
 
 def _run(argv: Sequence[str] | None) -> int:
+    args = argparse.Namespace()
+    words = sys.argv[1:] if argv is None else argv
     try:
-        args = build_parser().parse_args(argv)
+        parser = build_parser(words)
+        args = parser.parse_args(words)
+        if args.command is None:
+            parser.print_help()
+            return Exit.DONE
         if getattr(args, "ends_with_its_reader", False):
             sys.stdout.strict = True  # type: ignore[union-attr]
         _refuse_empty(args)
+        from silo.cli.common import refuse_idle_options
+
         refuse_idle_options(args.parser, args)
         code: int = args.run(args)
         return code
     except SystemExit as end:  # argparse: --help and --version are output like any other
         return end.code if isinstance(end.code, int) else Exit.BAD_INPUT
     except KeyboardInterrupt:
-        print("\nCancelled.", file=sys.stderr)
-        return Exit.CANCELLED
+        return _failed(CancelledError("\nCancelled."), words)
     except OSError as error:
         if isinstance(error, BrokenPipeError) and getattr(sys.stdout, "failure", None) is error:
             return Exit.DONE  # of a command that only ends with its reader
-        return _system_said_no(error)
+        return _failed(_system_said_no(error), words)
     except CancelledError:
-        print("Cancelled.", file=sys.stderr)
-        return Exit.CANCELLED
+        return _failed(CancelledError("Cancelled."), words)
     except SiloError as error:
-        _tell(error)
-        return exit_of(error)
+        return _failed(error, words)
+
+
+def _failed(error: SiloError, words: Sequence[str]) -> int:
+    """Print an error as a sentence, and with --json as an object on standard output."""
+    text = str(error)
+    print(text if isinstance(error, CancelledError) else f"silo-mod: {text}", file=sys.stderr)
+    problems = list(getattr(error, "problems", ()))
+    for problem in problems:
+        print(f"  - {problem}", file=sys.stderr)
+    if "--json" in words and not getattr(sys.stdout, "begun", True):
+        from silo.cli.common import print_json
+
+        print_json({"error": {"code": error.code, "message": text.strip(), "problems": problems}})
+    return exit_of(error)
 
 
 def _refuse_empty(args: argparse.Namespace) -> None:
@@ -141,9 +353,10 @@ class _Output(io.TextIOBase):
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self.failure: OSError | None = None
-        self.strict = False
+        self.strict = self.begun = False
 
     def write(self, text: str, /) -> int:
+        self.begun = True
         return self._attempt(lambda: self._stream.write(text), len(text))
 
     def flush(self) -> None:
@@ -179,17 +392,10 @@ class _Output(io.TextIOBase):
         return getattr(self._stream, "encoding", None) or "utf-8"
 
 
-def _system_said_no(error: OSError) -> int:
+def _system_said_no(error: OSError) -> InputError:
     """A file that we were asked to write, or the output itself: no such folder, no right, a full disk."""
     what = error.filename or "the output cannot be written"
-    print(f"silo-mod: {what}: {error.strerror or error}", file=sys.stderr)
-    return Exit.BAD_INPUT
-
-
-def _tell(error: SiloError) -> None:
-    print(f"silo-mod: {error}", file=sys.stderr)
-    for problem in getattr(error, "problems", ()):
-        print(f"  - {problem}", file=sys.stderr)
+    return InputError(f"{what}: {error.strerror or error}")
 
 
 if __name__ == "__main__":

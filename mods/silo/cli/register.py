@@ -2,6 +2,11 @@
 """``silo-mod register``: items for components without a number, and the identity into their files.
 
 Asked one by one, as a table to edit (``--plan``, ``--apply``), or all at once (``--yes``).
+
+The questions of ``silo-mod register`` on a terminal, one component at a time.
+
+An answer is taken for what it says and nothing else: what is not understood is asked again, and never becomes
+a name or a category. Nothing is registered before the last question, so Ctrl-C leaves everything as it was.
 """
 
 from __future__ import annotations
@@ -10,45 +15,183 @@ import argparse
 import os
 import shlex
 import sys
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.document import relative
-from silo.bom.errors import ConflictError, DocumentError, Exit, InputError
-from silo.bom.identity import walk_entries
-from silo.bom.model import Extraction
-from silo.bom.naming import Proposal, propose
+from silo.bom.errors import ConflictError, DocumentError, Exit, InputError, SiloError, counted
+from silo.bom.model import Extraction, walk_entries
 from silo.bom.report import base_of
+from silo.bom.resolve import Proposal, propose
 from silo.cli import common
-from silo.cli.common import Commands
-from silo.cli.register_dialog import Dialog
+from silo.cli.show import plain
 from silo.files import check_writable
-from silo.open_in_freecad import open_in_any
+from silo.freecads import open_in_any
 from silo.registering.items import Ask, Registration, unclear
 from silo.registering.journal import Journal
 from silo.registering.modelled import chosen, modelled
-from silo.registering.offer import Candidate, Offer, State, offer
+from silo.registering.offer import ITEM_TYPES, Candidate, Contents, Offer, State, offer
 from silo.registering.on_disk import OPEN, carry_out_on_disk, is_own, seen_on_disk, whole_folder
 from silo.registering.orders import Order
-from silo.registering.table import Row, doubts, orders_of, read_table, write_table
+from silo.registering.table import (
+    Row,
+    doubts,
+    find_item,
+    orders_of,
+    read_table,
+    remarks,
+    write_table,
+    wrong_name,
+)
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
 
 
-def register(commands: Commands) -> None:
+_HELP = """  y, yes        register it as shown; Enter alone does the same where there is no doubt
+  n, no         leave it out; it stays without a number
+  name TEXT     give it another name
+  type TYPE     part, assembly, consumable or tool
+  cat CODE      another category; cat alone lists them all, cat WORD those with the word
+  join NUMBER   it is this item of Silo already: take its number, make no new one
+  all           register this one and the others, and ask only where there is a doubt
+  q, quit       ask no more: what you said yes to is registered, the rest is left out
+  ?             this list
+Nothing is registered before the last question. Ctrl-C leaves everything as it was."""
+
+
+def read_line(prompt: str) -> str | None:
+    """What a person types; None at the end of the input. Standard output may be JSON, so they read stderr."""
+    print(prompt, end="", file=sys.stderr, flush=True)
+    try:
+        return input()
+    except EOFError:
+        return None
+
+
+class Dialog:
+    """Asks about candidates; :meth:`ask` gives the orders, and what stays without a number.
+
+    own
+        True where the look-alike on the server is the component's own item.
+    """
+
+    def __init__(
+        self,
+        candidates: Sequence[Candidate],
+        found: Offer,
+        api: Any,
+        base: str,
+        own: Callable[[Candidate], bool],
+        read: Callable[[str], str | None] = read_line,
+    ) -> None:
+        self._candidates, self._found, self._api, self._base = candidates, found, api, base
+        self._own, self._read = own, read
+        self._all = self._quit = False
+        self._earlier = Contents()
+
+    def ask(self) -> tuple[list[Order], list[Candidate]]:
+        """The orders, and the components that are left without a number."""
+        orders: list[Order] = []
+        left: list[Candidate] = []
+        for number, one in enumerate(self._candidates):
+            fine = one.state.usable and one.state is not State.ELSEWHERE
+            # A file that cannot be written is not asked about; carrying it out reports the reason.
+            order = None if self._quit else self._one(one, number) if fine else Order.of(one)
+            if order is not None:
+                orders.append(order)
+            elif not one.same_as:
+                left.append(one)
+        return orders, left
+
+    def _one(self, candidate: Candidate, number: int) -> Order | None:
+        self._earlier.add(candidate)
+        doubtful = bool(doubts(candidate, self._earlier)) and not self._own(candidate)
+        order = Order.of(candidate)
+        if self._all and not doubtful:
+            return order
+        entry = candidate.entry
+        where = entry.standard or f"{relative(entry.doc_path, self._base)}#{entry.object_name}"
+        _say(f"\n[{number + 1}/{len(self._candidates)}] {where}")
+        for remark in remarks(candidate, self._earlier):
+            _say(f"  ⚠ {remark}")
+        yes = "y" if doubtful else "Y"
+        while True:
+            _say(f"  {self._described(order)}")
+            answer = self._read(f"  register it? [{yes}/n/name/type/cat/join/all/q/?] ")
+            word, _, rest = ("q" if answer is None else answer.strip()).partition(" ")
+            match word.lower(), rest.strip():
+                case (("q" | "quit"), ""):
+                    self._quit = True
+                    return None
+                case (("n" | "no"), ""):
+                    return None
+                case (("y" | "yes"), ""):
+                    return order
+                case ("" | "all") as said, "":
+                    self._all = self._all or bool(said)
+                    if not doubtful:
+                        return order
+                    _say("  There is a doubt (⚠): please answer y or n, or join NUMBER.")
+                case (("?" | "h" | "help"), _):
+                    _say(_HELP)
+                case ("name" | "type" | "cat" | "join") as what, text:
+                    order = self._changed(order, what, text)
+                case _:
+                    _say(f"  {answer!r} is no answer; ? lists what can be answered.")
+
+    def _described(self, order: Order) -> str:
+        if order.existing is not None:
+            return f"join {order.existing.part_number} {order.existing.name!r}"
+        meaning = self._found.categories.get(order.category, "")
+        return f"{order.item_type} {order.name!r}, category {order.category} ({meaning})"
+
+    def _changed(self, order: Order, what: str, text: str) -> Order:
+        """The order with what was said; as it was where that is not possible, which is explained."""
+        if what == "name":
+            if problem := wrong_name(text, order.candidate):
+                _say(f"  {problem}")
+                return order
+            return replace(order, name=text)
+        if what == "type":
+            if text.lower() in ITEM_TYPES:
+                return order.retyped(text.lower(), self._found.categories)
+            _say(f"  type: one of {', '.join(ITEM_TYPES)}")
+            return order
+        if what == "cat":
+            return self._category(order, text)
+        try:
+            return replace(order, existing=find_item(text, order.candidate, self._api) if text else None)
+        except InputError as problem:
+            _say(f"  {problem}")
+        except SiloError as error:
+            _say(f"  Silo cannot say: {error}")
+        return order
+
+    def _category(self, order: Order, text: str) -> Order:
+        known = self._found.categories
+        if text.upper() in known:
+            return replace(order, category=text.upper())
+        if text in known:
+            return replace(order, category=text)
+        found = [code for code, words in known.items() if text.casefold() in f"{code} {words}".casefold()]
+        if not found:
+            _say(f"  There is no category {text!r}; cat alone lists them all.")
+        for code in found:
+            _say(f"    {code}  {known[code]}")
+        return order
+
+
+def _say(text: str) -> None:
+    for line in text.split("\n"):
+        print(plain(line), file=sys.stderr)
+
+
+def add_register(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = common.add_command(
-        commands,
-        "register",
-        "create items for components without a part number and write their identity into the files",
-        "silo-mod register vault/ --plan parts.csv      (edit the table, then)\n"
-        "  silo-mod register vault/ --apply parts.csv",
-    )
-    common.add_assembly_options(parser, folders=True)
+    common.add_top(parser)
     how = parser.add_mutually_exclusive_group()
     how.add_argument("--yes", action="store_true", help="take every proposal without asking")
     how.add_argument("--plan", metavar="FILE", help="write the proposals as a table (CSV) to edit; no more")
@@ -73,11 +216,6 @@ def register(commands: Commands) -> None:
         "ask (default), take it where only one fits, or make a new one",
     )
     parser.add_argument(
-        "--even-if-open",
-        action="store_true",
-        help="also files that a running FreeCAD has open; whoever saves them there undoes the registration",
-    )
-    parser.add_argument(
         "--declare",
         metavar="OBJECT",
         action="append",
@@ -92,28 +230,35 @@ def register(commands: Commands) -> None:
         default=[],
         help="take the identity from an object in the assembly's own file; its item stays",
     )
+    parser.add_argument(
+        "--not-a-part",
+        metavar="OBJECT",
+        action="append",
+        default=[],
+        help="say of what is modelled in the assembly's own file that it is no part; the file keeps that",
+    )
     parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
-    common.add_json_option(parser)
-    common.add_server_options(parser)
     common.only_with(parser, "--yes", "--duplicates")
     common.only_with(parser, "--declare", "--apart")
-    common.not_with(parser, "--undeclare", "--declare", "--category")
+    common.not_with(parser, "--undeclare", "--declare", "--category", "--not-a-part")
+    common.not_with(parser, "--not-a-part", "--declare", "--category")
     common.not_with(parser, "--apply", "--category")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Register what is unregistered; 1 where something was skipped or failed."""
-    if not (args.yes or args.plan or args.apply or args.undeclare or sys.stdin.isatty()):
+    taken = args.undeclare or args.not_a_part
+    if not (args.yes or args.plan or args.apply or taken or sys.stdin.isatty()):
         raise InputError(
             "register asks before it creates items, and there is nobody to ask here; say --yes, "
             "or write a table with --plan FILE, edit it, and use it with --apply FILE"
         )
     if args.plan and args.json:
         raise InputError("--plan writes a table and no JSON; leave out --json")
-    if (args.declare or args.undeclare) and (args.plan or args.apply or os.path.isdir(args.top)):
-        raise InputError("--declare and --undeclare are for one file, and not for a table")
-    if args.undeclare:
+    if (args.declare or taken) and (args.plan or args.apply or os.path.isdir(args.top)):
+        raise InputError("--declare, --undeclare and --not-a-part are for one file, and not for a table")
+    if taken:
         return _undeclare(args)
     if args.declare:
         return _declare(args)
@@ -141,7 +286,7 @@ def run(args: argparse.Namespace) -> int:
 def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
     """The components, the files that no assembly uses, and whether there is a file that cannot be read."""
     if not os.path.isdir(args.top):
-        extraction = common.read_top(args)
+        extraction = common.read_tops(args)[0]
         return extraction, frozenset(), _tell_missing(extraction, base_of(extraction))
     with common.plan_of(args) as (plan, reading, base):
         for path, error in plan.errors.items():
@@ -191,18 +336,14 @@ def _tell_rules(categories: Mapping[str, str]) -> None:
 
 
 class _Told:
-    """A long run on a terminal says where it is, once a second; Ctrl-C ends it."""
+    """A long run says where it is; Ctrl-C ends it."""
 
     def __init__(self) -> None:
-        self._at = time.monotonic()
+        self._progress = common.Progress()
 
     def progress(self, detail: str = "", fraction: float | None = None) -> None:
-        from silo.cli import show
-
-        now = time.monotonic()
-        if fraction and now - self._at > 1 and sys.stderr.isatty():
-            self._at = now
-            print(f"[{fraction:4.0%}] {show.plain(detail)}", file=sys.stderr)
+        if fraction:
+            self._progress.tell(f"[{fraction:4.0%}] {detail}")
 
     def check(self) -> None:
         return
@@ -235,13 +376,13 @@ class _Run:
 
     def write_plan(self, unused: frozenset[str]) -> int:
         """The table; nothing is registered."""
-        from silo.durable import replacing
+        from silo.platform import replacing
 
-        earlier: list[Candidate] = []
+        earlier = Contents()
 
         def wanted(one: Candidate) -> bool:
+            earlier.add(one)
             doubtful = bool(doubts(one, earlier)) and not is_own(one)
-            earlier.append(one)
             return not doubtful and one.article is None and one.entry.doc_path not in unused
 
         table = write_table(self.found, wanted, self.base)
@@ -252,7 +393,7 @@ class _Run:
             file.write(table)
         count = sum(not one.declared for one in self.found.candidates)
         print(
-            f"{self.args.plan}: {count} {'row' if count == 1 else 'rows'}. Edit it, then: "
+            f"{self.args.plan}: {counted(count, 'row')}. Edit it, then: "
             f"silo-mod register {shlex.quote(self.args.top)} --apply {shlex.quote(self.args.plan)}",
             file=sys.stderr,
         )
@@ -261,12 +402,12 @@ class _Run:
     def all_but_duplicates(self, unused: frozenset[str]) -> tuple[list[Order], list[Candidate]]:
         """Every proposal; what seems to be an item already is treated as ``--duplicates`` says."""
         orders, left = [], []
-        earlier: list[Candidate] = []
+        earlier = Contents()
         for one in self.found.candidates:
             if one.article is not None or one.same_as or one.entry.doc_path in unused:
                 continue
+            earlier.add(one)
             doubtful = bool(doubts(one, earlier)) and not is_own(one)
-            earlier.append(one)
             if not doubtful or self.args.duplicates == "new":
                 orders.append(Order.of(one))
             elif self.args.duplicates == "join" and len(one.similar) == 1:
@@ -274,7 +415,7 @@ class _Run:
             else:
                 left.append(one)
         if unused:
-            files = "1 file" if len(unused) == 1 else f"{len(unused)} files"
+            files = counted(len(unused), "file")
             words = f"{files} that no assembly uses: left alone (name the file, or use --plan)"
             print(words, file=sys.stderr)
         return orders, left
@@ -302,11 +443,14 @@ class _Run:
         declared = {one.proposal.entry.key for one in self.done}
         from silo.cli import show
 
+        contents = Contents()
+        for one in self.found.candidates:
+            contents.add(one)
         show.registrations(
             self.args,
             self.base,
             self.done,
-            [(one.proposal, "; ".join(doubts(one, self.found.candidates))) for one in left],
+            [(one.proposal, "; ".join(doubts(one, contents))) for one in left],
             [one for one in articles if one.entry.key not in declared],
         )
         if already and not self.args.json:
@@ -339,18 +483,21 @@ def _declare(args: argparse.Namespace) -> int:
 
 
 def _undeclare(args: argparse.Namespace) -> int:
-    """Take identities out of the file."""
+    """Take identities out of the file; what is no part is marked there as well."""
     from silo.fcstd import unstamp
 
-    articles = [one for one in modelled(args.top, args.assembly) if one.declared]
+    no_part = bool(args.not_a_part)
+    articles = [one for one in modelled(args.top, args.assembly) if no_part or one.declared]
     path = articles[0].entry.doc_path if articles else os.path.realpath(args.top)
-    wanted = chosen(articles, args.undeclare)
+    wanted = chosen(articles, args.not_a_part or args.undeclare)
     if not args.even_if_open and open_in_any().has_file(path):
         raise DocumentError(path, OPEN)
     names = [name for one in wanted for name in one.objects]
-    taken = [name for name in names if unstamp(path, name)]
+    taken = [name for name in names if unstamp(path, name, no_part=no_part)]
     if args.json:
         common.print_json({"undeclared": taken})
+    elif no_part:
+        print(f"No part of any BOM: {', '.join(taken)} (SiloBomExclude).")
     else:
         print(f"No component any more: {', '.join(taken)}. The next sync flags the line as unreferenced.")
     return Exit.DONE

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod login``, ``doctor`` and ``install-addon``: what the other commands need, and what is wrong."""
+"""``silo-mod login``, ``doctor`` and ``install-addon``: what the other commands need, and what is wrong.
+
+``silo-mod serve``, ``backup``, ``restore``, ``summaries``: a server of your own.
+``watch``: what happens on a server.
+"""
 
 from __future__ import annotations
 
@@ -7,40 +11,263 @@ import argparse
 import getpass
 import importlib.metadata
 import importlib.util
+import json
 import os
+import queue
 import sys
+import time
+import webbrowser
 from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from silo.bom.errors import ConfigError, Exit, ForbiddenError, InputError, NotFoundError, SiloError, exit_of
+from silo.activity import activity_text
+from silo.bom.errors import (
+    AuthError,
+    ConfigError,
+    Exit,
+    ForbiddenError,
+    InputError,
+    NotFoundError,
+    RouteMissingError,
+    SiloError,
+    exit_of,
+)
 from silo.cli import common
-from silo.cli.common import Commands
 
 if TYPE_CHECKING:
-    from silo.addon_install import Place
     from silo.api.client import SiloClient
+    from silo.api.events import ConnectionState, ServerEvent
+    from silo.freecads import Place
 
 
-def register(commands: Commands) -> None:
-    """Add the commands."""
-    _add_login(commands)
-    _add_doctor(commands)
-    _add_install_addon(commands)
-    _add_schema(commands)
-
-
-def _add_login(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "login",
-        "try a server's address and a token, and remember both for this user",
-        "silo-mod login https://silo.example.com",
+def add_serve(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="address to listen on (default: this machine only)"
     )
+    parser.add_argument("--port", type=int, default=8080, help="port; 0 takes a free one (default: 8080)")
+    parser.add_argument(
+        "--database", metavar="URL", help="sqlite:///FILE or postgresql://…; default: your data folder"
+    )
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="server processes (PostgreSQL)")
+    parser.add_argument(
+        "--reset-admin", metavar="NAME", help="make this user an active admin, and print a login link"
+    )
+    parser.set_defaults(run=run_serve)
+
+
+def need_server_extra() -> None:
+    """One plain sentence where the server's packages are not installed."""
+    missing = [
+        name for name in ("fastapi", "sqlalchemy", "alembic", "uvicorn") if not importlib.util.find_spec(name)
+    ]
+    if missing:
+        raise ConfigError(
+            f"the embedded server needs {', '.join(missing)}; install it with: pip install 'silo-mod[server]'"
+        )
+
+
+def run_serve(args: argparse.Namespace) -> int:
+    """Serve until stopped, which is how a server ends: 0 also after Ctrl-C or a TERM signal."""
+    need_server_extra()
+    from silo_server.run import Greeting, serve
+
+    def tell(greeting: Greeting) -> None:
+        text = json.dumps(asdict(greeting)) if args.json else "\n".join(greeting.lines())
+        # Whoever reads the output of a pipe waits for the address, and the server never ends by itself.
+        print(text, flush=True)
+
+    with suppress(KeyboardInterrupt):
+        serve(
+            args.host, args.port, args.database, workers=args.workers, reset_admin=args.reset_admin, tell=tell
+        )
+    return Exit.DONE
+
+
+def add_backup(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("target", metavar="TARGET", type=common.a_path, help="a folder that is not there yet")
+    _add_place(parser)
+    parser.set_defaults(run=run_backup)
+
+
+def add_restore(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("source", metavar="SOURCE", type=common.a_path, help="the folder of a backup")
+    parser.add_argument(
+        "--replace", action="store_true", help="replace a database that has items; they are lost"
+    )
+    parser.add_argument(
+        "--verify", action="store_true", help="only check that the backup is whole; change nothing"
+    )
+    _add_place(parser)
+    common.not_with(parser, "--verify", "--replace", "--database", "--files")
+    parser.set_defaults(run=run_restore)
+
+
+def add_summaries(parser: argparse.ArgumentParser) -> None:
+    _add_place(parser)
+    parser.set_defaults(run=run_summaries)
+
+
+def run_summaries(args: argparse.Namespace) -> int:
+    """0 once all is summed up; the server keeps it from then on by itself."""
+    need_server_extra()
+    from silo_server.db.engine import Database
+    from silo_server.db.migrate import upgrade
+    from silo_server.services.bom.summary import keep_all
+    from silo_server.settings import settings_from_environment
+
+    settings = settings_from_environment(database_url=args.database, files_dir=args.files)
+    if settings.sqlite_path is not None and not settings.sqlite_path.is_file():
+        raise ConfigError(f"summaries: there is no database {settings.sqlite_path}")
+    db = Database(settings)
+    try:
+        upgrade(db)
+        count = keep_all(db, _report)
+    finally:
+        db.close()
+    print(json.dumps({"assemblies": count}) if args.json else f"{count} assemblies summed up.")
+    return Exit.DONE
+
+
+def _add_place(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--database", metavar="URL", help="sqlite:///FILE or postgresql://… (else SILO_DATABASE_URL)"
+    )
+    parser.add_argument(
+        "--files",
+        metavar="FOLDER",
+        type=common.a_path,
+        help="folder of the files (else SILO_STORAGE_ROOT_DIR)",
+    )
+
+
+def run_backup(args: argparse.Namespace) -> int:
+    """0; 1 where files are missing that the server itself has lost."""
+    need_server_extra()
+    from silo_server.operation.backup import back_up
+    from silo_server.settings import settings_from_environment
+
+    settings = settings_from_environment(database_url=args.database, files_dir=args.files)
+    made = back_up(settings, args.target, _report)
+    for checksum in made.missing_files:
+        print(f"missing: the file {checksum} is lost or damaged in the server's store", file=sys.stderr)
+    text = f"Backup {args.target}: {sum(made.rows.values())} rows, {made.files} files."
+    print(json.dumps(asdict(made)) if args.json else text)
+    return Exit.UNDONE if made.missing_files else Exit.DONE
+
+
+def run_restore(args: argparse.Namespace) -> int:
+    """0 where the backup was whole and is now the server's state."""
+    need_server_extra()
+    from silo_server.operation.backup import restore, verify
+    from silo_server.settings import settings_from_environment
+
+    if args.verify:
+        made = verify(args.source)
+        text = f"The backup of {made.made_at} is whole: {sum(made.rows.values())} rows, {made.files} files."
+    else:
+        settings = settings_from_environment(database_url=args.database, files_dir=args.files)
+        made = restore(settings, args.source, replace=args.replace, report=_report)
+        text = f"Restored the backup of {made.made_at}: {sum(made.rows.values())} rows, {made.files} files."
+    print(json.dumps(asdict(made)) if args.json else text)
+    return Exit.DONE
+
+
+def _report(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
+# Windows takes Ctrl-C between two waits, never within one.
+_CTRL_C_S = 0.5
+
+
+def add_watch(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--item", metavar="PART_NUMBER", help="only events of this item")
+    parser.add_argument("--count", type=common.above_zero, metavar="N", help="end after N events")
+    parser.set_defaults(run=run_watch, ends_with_its_reader=True)
+
+
+def run_watch(args: argparse.Namespace) -> int:
+    """Print events until stopped; the connection is made anew whenever it is lost."""
+    from silo.api.events import EventListener
+
+    events: queue.Queue[ServerEvent | ConnectionState] = queue.Queue()
+    with common.client_of(args) as client:
+        with suppress(NotFoundError):  # a server that does not say who we are has answered all the same
+            client.whoami()  # a wrong address or token is reported at once, not retried
+        if args.item:
+            args.item = common.named_item(client, args.item).part_number
+        mode = client.ready().mode
+        print(f"[{client.base_url}: {mode}]", file=sys.stderr)
+        listener = EventListener(client, on_event=events.put, on_state=events.put)
+        listener.start()
+        try:
+            return _print_events(args, client, events)
+        finally:
+            listener.stop()
+
+
+def _print_events(
+    args: argparse.Namespace, client: SiloClient, events: queue.Queue[ServerEvent | ConnectionState]
+) -> int:
+    from silo.api.events import Connection, ConnectionState
+
+    shown = 0
+    while args.count is None or shown < args.count:
+        try:
+            event = events.get(timeout=_CTRL_C_S)
+        except queue.Empty:
+            continue
+        if isinstance(event, ConnectionState):
+            if event.kind is Connection.UNSUPPORTED:
+                raise RouteMissingError(f"there is no live connection: {event.message}")
+            if event.kind is Connection.REFUSED:
+                raise AuthError(f"the live connection ended: {event.message}")
+            print(f"[{event}]", file=sys.stderr)
+            continue
+        if event.type == "heartbeat" or (args.item and event.item != args.item):
+            continue
+        shown += 1
+        if args.json:
+            print(
+                common.json_text(
+                    {
+                        "id": event.id,
+                        "type": event.type,
+                        "event": event.name or event.type,
+                        "data": event.data,
+                    }
+                ),
+                flush=True,
+            )
+        else:
+            _show_event(client, event)
+    return Exit.DONE
+
+
+def _show_event(client: SiloClient, event: ServerEvent) -> None:
+    from silo.cli import show
+
+    out = show.console()
+    if event.merge is not None:
+        url = client.web_url(event.merge.resolve_url) if event.merge.resolve_url else ""
+        out.print(show.activity_box(activity_text(event.merge.item, event.merge, resolve_url=url)))
+        return
+    out.print(show.plain(f"{event.type}  {event.item or ''}"), markup=False)
+
+
+LOGIN_SECONDS = 600
+
+
+def add_login(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("url", metavar="URL", help="address of the Silo server")
-    parser.add_argument("--token", help="API token (else it is asked for, or read from standard input)")
+    parser.add_argument("--token", help="API token (else the browser asks you, or standard input has it)")
+    parser.add_argument(
+        "--paste", action="store_true", help="type the token at the terminal, without a browser"
+    )
     parser.add_argument("--ca", metavar="FILE", help="certificate authorities to trust")
-    common.add_json_option(parser)
     parser.set_defaults(run=run_login)
 
 
@@ -48,8 +275,10 @@ def run_login(args: argparse.Namespace) -> int:
     """Save what was seen to work; nothing is written where the server refuses."""
     from silo.api.client import SiloClient
     from silo.api.config import config_path, resolve_server, save_config
+    from silo.outbox.store import Store
 
-    where = resolve_server(args.url, args.token or _token(args.url), args.ca, env={}, path=config_path())
+    token = args.token or _token_by_browser(args) or _token(args.url)
+    where = resolve_server(args.url, token, args.ca, env={}, path=config_path())
     with SiloClient(where.url, where.token, verify=where.verify) as client:
         client.ready()
         name, role = None, None
@@ -59,6 +288,8 @@ def run_login(args: argparse.Namespace) -> int:
         except NotFoundError:
             client.search_items(limit=1)
     path = save_config(where.url, where.token, where.verify)
+    if (store := Store()).path.exists():
+        store.resume(where.url, told=False)  # the pause of a wrong token
     if args.json:
         data = {"url": client.base_url, "username": name, "role": role, "configuration": str(path)}
         common.print_json(data)
@@ -66,6 +297,31 @@ def run_login(args: argparse.Namespace) -> int:
         who = ", ".join(filter(None, (name, role))) or "this server does not say who you are"
         print(f"{client.base_url}: {who}. Kept in {path}, which only you can read.")
     return Exit.DONE
+
+
+def _token_by_browser(args: argparse.Namespace) -> str:
+    """Return the token that a person let in on the server's page; "" without a terminal or such a page."""
+    if args.paste or not sys.stdin.isatty():
+        return ""
+    from silo.api.client import SiloClient
+    from silo.api.config import config_path, resolve_server
+
+    where = resolve_server(args.url, None, args.ca, env={}, path=config_path())
+    with SiloClient(where.url, None, verify=where.verify) as client:
+        login = client.begin_login("silo-mod")
+    if login is None:
+        return ""
+    print(
+        f"Open this page and let silo-mod in; it shows the code {login.code}:\n{login.page}", file=sys.stderr
+    )
+    webbrowser.open(login.page)
+    with SiloClient(where.url, login.token, verify=where.verify) as client:
+        for _ in range(LOGIN_SECONDS):
+            with suppress(AuthError):
+                client.whoami()
+                return login.token
+            time.sleep(1)
+    raise AuthError(f"nobody let silo-mod in within {LOGIN_SECONDS // 60} minutes; begin again")
 
 
 def _token(url: str) -> str:
@@ -85,16 +341,8 @@ Rows = dict[str, "str | SiloError"]
 T = TypeVar("T")
 
 
-def _add_doctor(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "doctor",
-        "show what is where on this machine, which server is meant, and what does not work; changes nothing",
-        "silo-mod doctor",
-    )
+def add_doctor(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--schema", default="kindred-rd", help="part number schema (default: kindred-rd)")
-    common.add_json_option(parser)
-    common.add_server_options(parser)
     parser.set_defaults(run=run_doctor)
 
 
@@ -115,12 +363,12 @@ def run_doctor(args: argparse.Namespace) -> int:
 
 def _machine() -> Rows:
     """This machine: versions, folders, extras, FreeCAD and the add-on in it."""
-    from silo.folders import cache_folder, data_folder
     from silo.freecads import material_folders
+    from silo.platform import cache_folder, data_folder
 
     place = _tried(_freecad)
     return {
-        "silo-mod": f"{importlib.metadata.version('silo-mod')}, Python {sys.version.split()[0]}",
+        "silo-mod": _tried(_program),
         "configuration": _tried(_configuration),
         "data": _folder(data_folder()),
         "cache": _folder(cache_folder()),
@@ -129,6 +377,17 @@ def _machine() -> Rows:
         **({} if isinstance(place, (str, SiloError)) else {"add-on": _tried(lambda: _addon(place[1]))}),
         "materials": _listed(map(str, material_folders())),
     }
+
+
+def _program() -> str:
+    """The version; ConfigError if another distribution has files in the same package."""
+    found = {name.replace("_", "-") for name in importlib.metadata.packages_distributions().get("silo", ())}
+    if others := sorted(found - {"silo-mod"}):
+        raise ConfigError(
+            f"{', '.join(others)} also has a package named silo, in the same place. Uninstall it, and "
+            "install silo-mod again"
+        )
+    return f"{importlib.metadata.version('silo-mod')}, Python {sys.version.split()[0]}"
 
 
 def _configuration() -> str:
@@ -156,12 +415,10 @@ def _extra(name: str, package: str, used_by: str) -> str:
 
 
 def _freecad() -> str | tuple[str, Place]:
-    from silo.addon_install import ask_freecad
-    from silo.freecadcmd.run import find_freecadcmd
-    from silo.freecads import commands
+    from silo.freecads import ask_freecad, commands, find_freecadcmd
 
     if not os.environ.get("SILO_FREECADCMD") and next(commands(), None) is None:
-        return "none found (files are read without it; only --via freecad and the add-on need one)"
+        return "none found (files are read without it; only the add-on and bom --verify need one)"
     command = find_freecadcmd()
     place = ask_freecad(command)
     others = [one for one in commands() if one != command]
@@ -173,7 +430,9 @@ def _addon(place: Place) -> str:
     if not place.mod.exists():
         return f"not in {place.mod}: silo-mod install-addon puts it there"
     if place.missing:
-        return f"{place.mod}, without {', '.join(place.missing)}: silo-mod install-addon installs them"
+        lacks = ", ".join(f"{name} ({reason})" for name, reason in place.missing.items())
+        them = "it" if len(place.missing) == 1 else "them"
+        return f"{place.mod}, without {lacks}: silo-mod install-addon installs {them}"
     return str(place.mod)
 
 
@@ -182,8 +441,8 @@ def _listed(texts: Iterable[str]) -> str:
 
 
 def _server(args: argparse.Namespace) -> Rows:
-    from silo.api.caller import Abilities
     from silo.api.config import resolve_server
+    from silo.api.transport import Abilities
 
     try:
         where = resolve_server(args.server, args.token)
@@ -249,23 +508,16 @@ def _events(client: SiloClient) -> str:
     return "live"
 
 
-def _add_install_addon(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "install-addon",
-        "put the add-on and its Python packages into a FreeCAD found on this machine",
-        "silo-mod install-addon --freecadcmd /usr/bin/freecadcmd",
-    )
+def add_install_addon(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--freecadcmd", metavar="PATH", help="freecadcmd (default: found on the PATH)")
     parser.add_argument("--freecad-data", metavar="DIR", help="its data folder (default: FreeCAD is asked)")
     parser.add_argument("--copy", action="store_true", help="copy the add-on, do not link to this checkout")
-    common.add_json_option(parser)
     parser.set_defaults(run=run_install_addon)
 
 
 def run_install_addon(args: argparse.Namespace) -> int:
     """Install, and say where."""
-    from silo.addon_install import ask_freecad, install_folder, install_packages
+    from silo.freecads import ask_freecad, install_folder, install_packages
 
     place = ask_freecad(args.freecadcmd, Path(args.freecad_data) if args.freecad_data else None)
     found = {
@@ -281,15 +533,8 @@ def run_install_addon(args: argparse.Namespace) -> int:
     return Exit.DONE
 
 
-def _add_schema(commands: Commands) -> None:
-    parser = common.add_command(
-        commands,
-        "schema",
-        "print the JSON Schema of what a command prints with --json",
-        "silo-mod schema bom > bom.schema.json",
-    )
+def add_schema(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="COMMAND", nargs="?", help="the command (default: list them)")
-    common.add_json_option(parser)
     parser.set_defaults(run=run_schema)
 
 

@@ -93,8 +93,15 @@ Entry = _shape(
     level=int,
     consolidation_warning=bool,
     children="list[Entry]",
+    own=(_said("list[Entry]", "what an assembly shows of its own file and is no item yet"), []),
 )
-Bom = _shape("Bom", assembly=Head, entries=_many(Entry), findings=_many(Finding))
+Bom = _shape(
+    "Bom",
+    assembly=Head,
+    entries=_many(Entry),
+    own=(_said(_many(Entry), "what the assembly shows of its own file and is no item yet"), []),
+    findings=_many(Finding),
+)
 FlatLine = _shape(
     "FlatLine",
     doc="A component once, with its total.",
@@ -120,7 +127,7 @@ Witnessed = _shape(
     witness=list[dict[str, Any]],
 )
 Line = _shape("Line", part_number=str, quantity=float | None)
-Change = _shape("Change", part_number=str, local_quantity=float, remote_quantity=float | None)
+Change = _shape("Change", part_number=str, local_quantity=float, remote_quantity=float | None, unit=(str, ""))
 Diff = _shape(
     "Diff",
     doc="CAD against the server; ``kept``: lines whose file is missing.",
@@ -174,6 +181,7 @@ TopResult = _shape(
     unregistered=(_many(Entry), []),
     findings=(_many(Finding), []),
 )
+Caused = _shape("Caused", base=Files, cause=_said(str, "what several have in common"))
 Unregistered = _shape("Unregistered", doc_path=str, object=str, label=str)
 Moved = _shape("Moved", name=str, from_=str, to=str)
 Summary = _shape(
@@ -182,9 +190,11 @@ Summary = _shape(
     in_order=int,
     parts=int,
     assemblies=dict[Status, int],
+    not_sent=_said(int, "assemblies that the server, or the way to it, kept from being sent"),
     lines_changed=int,
-    errors=_many(Files),
-    warnings=_many(Files),
+    new=_said(list[str] | None, "what the run before did not have; null if it is not known"),
+    errors=_many(Caused),
+    warnings=_many(Caused),
     unregistered=_many(Unregistered),
     moved=_many(Moved),
     notes=list[str],
@@ -256,6 +266,33 @@ PulledFile = _shape(
 )
 Lost = _shape("Lost", file=str, link=str, reason=str)
 Pulled = _shape("Pulled", top=str, complete=bool, files=_many(PulledFile), missing=_many(Lost))
+Standing = _shape(
+    "Standing",
+    path=str,
+    state=Literal["same", "new", "edited", "newer", "both", "waiting", "no item"],
+    document=str | None,
+    items=int,
+    moved_from=str | None,
+    newest=_said(int | None, "the newest revision in Silo"),
+)
+_ProjectLink = _shape("ProjectLink", file=str, link=str)
+ProjectStatus = _shape(
+    "ProjectStatus",
+    root=str,
+    files=_many(Standing),
+    outside=_many(_ProjectLink),
+    missing=_many(_ProjectLink),
+    unreadable=_many(_shape("Unreadable", file=str, reason=str)),
+    gone=list[str],
+    copies=_many(_shape("Copy", file=str, of=str)),
+)
+SentFile = _shape("SentFile", path=str, part_number=str, revision=int | None, bom=str | None, remark=str)
+Committed = _shape(
+    "Committed",
+    base=ProjectStatus,
+    sent=_many(SentFile),
+    waiting=_many(_shape("InQueue", path=str, reason=str)),
+)
 Revision = _shape(
     "Revision",
     revision_number=int,
@@ -267,6 +304,21 @@ Revision = _shape(
     base_revision=(int | None, None),
     bom=(_said(str | None, "with --bom: what the revision changed, in words"), None),
 )
+_Waiting = _shape(
+    "Waiting",
+    part_number=str,
+    label=str,
+    path=str,
+    what=str,
+    state=str,
+    reason=str,
+    server=str,
+    number=int,
+    since=_said(float, "seconds since 1970"),
+    needs_a_person=bool,
+)
+Queue = _shape("Queue", pause=str | None, commits=_many(_Waiting))
+
 Log = _shape(
     "Log",
     part_number=str,
@@ -286,8 +338,14 @@ Backup = _shape(
     files=int,
     missing_files=list[str],
 )
+Summaries = _shape("Summaries", assemblies=int)
 Event = _shape("Event", doc="One line each, as they come.", id=str | None, type=str, event=str, data=Any)
 Login = _shape("Login", url=str, username=str | None, role=str | None, configuration=str)
+Found = _shape("Found", part_number=str, name=str, item_type=str)
+ItemLine = _shape("ItemLine", part_number=str, name=str, quantity=float | None, source=str | None)
+Shown = _shape("Shown", base=Found, current_revision=int, page=str, bom=_many(ItemLine))
+Whoami = _shape("Whoami", url=str, from_=str, username=str | None, role=str | None)
+Logout = _shape("Logout", configuration=str, removed=bool)
 Addon = _shape("Addon", freecad=str, addon=str, packages=str)
 Doctor = _shape(
     "Doctor",
@@ -311,11 +369,19 @@ SHAPES: dict[str, Any] = {
     "relink": Relinked,
     "sync": Sync,
     "register": Registered | Undeclared,
+    "commit": Committed,
+    "status": ProjectStatus,
     "pull": Pulled,
     "log": Log,
+    "queue": Queue,
+    "search": _many(Found),
+    "show": Shown,
+    "whoami": Whoami,
+    "logout": Logout,
     "serve": Greeting,
     "backup": Backup,
     "restore": Backup,
+    "summaries": Summaries,
     "watch": Event,
     "doctor": Doctor,
     "login": Login,

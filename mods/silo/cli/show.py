@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""How results look on a terminal: a tree, tables, the Activity box. Text of others is shown as text."""
+"""What the commands print for people."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
@@ -14,18 +14,20 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
-from silo.activity import ActivityText
-from silo.api.merging import unusual
-from silo.batch_report import STATUS_WORDS
 from silo.bom.document import relative
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
-from silo.bom.naming import Proposal, display_name
-from silo.bom.report import base_of, diff_rows, shorten
-from silo.bom_sync import Outcome, Status
+from silo.bom.report import MOST_LINES, base_of, check_tree_size, diff_rows, shorten
+from silo.bom.resolve import display_name
 from silo.cli import common
-from silo.registering.items import Registration
-from silo.registering.modelled import Modelled
+
+if TYPE_CHECKING:
+    from silo.activity import ActivityText
+    from silo.bom.resolve import Proposal
+    from silo.bom_sync import Outcome
+    from silo.registering.items import Registration
+    from silo.registering.modelled import Modelled
+
 
 _MARK = {
     Severity.ERROR: ("✗", "bold red"),
@@ -42,10 +44,11 @@ _DIFFERENCE = {
     "manual": ("✎", "blue", "manual line; not touched"),
 }
 _MOST_MODELLED = 40
-# A tree longer than this helps nobody on a terminal; --json has it all.
+# A tree longer than this helps nobody on a terminal; a pipe and --json have it all.
 _MOST_LINES = 2000
 # A hostile file's name may have 60 MB; a path of the system has 4096 at most.
 _LONGEST = 5000
+_ENDLESS = 1_000_000
 
 
 class _Terminal(Console):
@@ -54,9 +57,10 @@ class _Terminal(Console):
         raise BrokenPipeError
 
 
-def console(*, stderr: bool = False) -> Console:
-    """The terminal; plain text where the output is a file or a pipe."""
-    return _Terminal(stderr=stderr, highlight=False, soft_wrap=not sys.stdout.isatty())
+def console(stream: TextIO | None = None) -> Console:
+    """Return the terminal. A file or a pipe has no width: each record is one line there, and whole."""
+    stream = stream or sys.stdout
+    return _Terminal(file=stream, highlight=False, width=None if stream.isatty() else _ENDLESS)
 
 
 def plain(text: str) -> str:
@@ -79,15 +83,18 @@ def entry_text(entry: BomEntry, base: str) -> Text:
     return text
 
 
-def bom_tree(extraction: Extraction) -> Tree:
-    """The multi-level BOM; quantities are per one parent."""
-    base = base_of(extraction)
+def bom_tree(extraction: Extraction, base: str = "") -> Tree:
+    """Return the multi-level BOM; quantities are per one parent, paths as in :func:`bom_json`."""
+    base = base or base_of(extraction)
     head = extraction.assembly
     title = Text(plain(head.part_number or display_name(head)), "bold")
     if head.name:
         title.append("  ").append(plain(head.name))
+    title.append(f"  {plain(relative(head.doc_path, base))}#{plain(head.object_name)}", "dim")
     tree = Tree(title)
-    left = [_MOST_LINES]
+    if not sys.stdout.isatty():
+        check_tree_size(extraction)
+    left = [_MOST_LINES if sys.stdout.isatty() else MOST_LINES]
 
     def grow(branch: Tree, entries: Iterable[BomEntry]) -> None:
         for entry in entries:
@@ -95,9 +102,16 @@ def bom_tree(extraction: Extraction) -> Tree:
                 branch.add(Text("… more; --json has all", "dim"))
                 return
             left[0] -= 1
-            grow(branch.add(entry_text(entry, base)), entry.children)
+            inner = branch.add(entry_text(entry, base))
+            grow(inner, entry.children)
+            grow_own(inner, entry.own)
+
+    def grow_own(branch: Tree, entries: Iterable[BomEntry]) -> None:
+        for entry in entries:
+            branch.add(entry_text(entry, base).append("  not an item yet", "yellow"))
 
     grow(tree, extraction.entries)
+    grow_own(tree, head.own)
     return tree
 
 
@@ -160,17 +174,20 @@ def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -
 
 
 _STATUS = {
-    Status.MERGED: ("✓", "green"),
-    Status.UNCHANGED: ("✓", "green"),
-    Status.DRY_RUN: ("·", "cyan"),
-    Status.BLOCKED: ("✗", "red"),
-    Status.UNREGISTERED: ("⚠", "yellow"),
-    Status.FAILED: ("✗", "red"),
+    "merged": ("✓", "green"),
+    "unchanged": ("✓", "green"),
+    "dry_run": ("·", "cyan"),
+    "blocked": ("✗", "red"),
+    "unregistered": ("⚠", "yellow"),
+    "failed": ("✗", "red"),
 }
 
 
-def outcome_text(outcome: Outcome) -> Text:
-    """One line: which assembly, and what became of it."""
+def outcome_text(outcome: Outcome, base: str) -> Text:
+    """Return one line: which assembly, what became of it, and its file relative to ``base``."""
+    from silo.api.boms import unusual
+    from silo.batch import STATUS_WORDS
+
     mark, style = _STATUS[outcome.status]
     head = outcome.assembly
     who = " ".join(filter(None, (head.part_number, head.name))) or display_name(head)
@@ -178,6 +195,7 @@ def outcome_text(outcome: Outcome) -> Text:
     text.append(f": {STATUS_WORDS[outcome.status]}")
     if outcome.error is not None:
         text.append(f": {plain(str(outcome.error))}")
+    text.append(f"  {plain(relative(head.doc_path, base))}", "dim")
     for message in unusual(outcome.result):
         text.append(f"\n  ⚠ {plain(message)}", "yellow")
     return text
@@ -213,13 +231,14 @@ def article_json(article: Modelled, base: str) -> Mapping[str, Any]:
 def articles_text(articles: Sequence[Modelled], base: str) -> list[str]:
     """The section of what is modelled in the file, line by line."""
     lines = ["Modelled in this file, not counted:"]
-    for one in articles[:_MOST_MODELLED]:
+    most = _MOST_MODELLED if sys.stdout.isatty() else len(articles)
+    for one in articles[:most]:
         copies = f", {len(one.objects)} copies of one {one.alike}" if len(one.objects) > 1 else ""
         source = f", imported from {plain(relative(one.source, base))}" if one.source else ""
         label = plain(one.entry.label)
         lines.append(f"  {one.entry.quantity} × {label} ({one.entry.object_name}{copies}{source})")
-    if len(articles) > _MOST_MODELLED:
-        lines.append(f"  and {len(articles) - _MOST_MODELLED} more; --json has them all")
+    if len(articles) > most:
+        lines.append(f"  and {len(articles) - most} more; --json has them all")
     lines.append("Declare what is a part: silo-mod register TOP.FCStd --yes --declare OBJECT")
     return lines
 

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod sync``: bring BOMs to the server; of one file, or of a whole vault every night."""
+"""``silo-mod sync``: bring BOMs to the server; of one file, or of a whole vault every night.
+
+``silo-mod pull`` and ``silo-mod log``: files from Silo, and what became of one over time.
+
+``silo-mod queue``: the commits that are not in Silo yet.
+"""
 
 from __future__ import annotations
 
@@ -9,82 +14,57 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from silo.batch import Options, TopResult, stopped_by, sync_top
-from silo.bom.errors import DocumentError, InputError, SiloError
+from silo.batch import Options, TopResult
+from silo.bom.errors import ConfigError, Exit, InputError, SiloError
 from silo.cli import common
-from silo.cli.common import Commands
 from silo.files import check_writable, documents_in
+from silo.outbox.store import KEPT_ASIDE_DAYS
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.batch_report import Summary
+    from silo.api.config import Pause
+    from silo.api.wire import Revision
+    from silo.batch import Summary
+    from silo.outbox.entry import Entry
+    from silo.outbox.store import Store
+    from silo.vault.pull import Pulled
+
 
 # A job at night waits for a server that is busy.
 _BUSY_TRIES, _LONGEST_S = 12, 120.0
 
 
-def register(commands: Commands) -> None:
+def add_sync(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = common.add_command(
-        commands,
-        "sync",
-        "merge BOMs into the server; nothing is ever deleted, manual lines are never touched",
-        "silo-mod sync vault/ --report night.md --report night.xml",
-    )
     parser.add_argument(
         "tops", metavar="TOP", nargs="+", help="assembly files, or folders: all assemblies below them"
     )
-    parser.add_argument("--assembly", metavar="NAME", help="the assembly to read, where a file holds several")
-    common.add_hardware_option(parser)
-    parser.add_argument(
-        "--recursive", action="store_true", help="sub-assemblies too, children before parents"
-    )
-    parser.add_argument("--dry-run", action="store_true", help="show what would change and send nothing")
     parser.add_argument(
         "--allow-missing",
         action="store_true",
         help="sync although files are missing; their known lines stay as they are",
     )
-    parser.add_argument(
-        "--via",
-        choices=("files", "freecad"),
-        default="files",
-        help="read the files directly (default), or let freecadcmd open them",
-    )
-    parser.add_argument(
-        "--report",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="write a report: Markdown (.md), JSON (.json) or JUnit XML (.xml); may be given several times",
-    )
-    common.add_json_option(parser)
-    common.add_reading_options(parser)
-    common.add_server_options(parser)
-    common.not_with(parser, "--via", *common.READING)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Sync each file; one failure does not stop the rest. 1 or 3 where anything was left undone."""
-    from silo.batch_report import Report, Summary, form_of
-    from silo.vault.lock import only_job
+    from silo.batch import Report, Summary
+    from silo.vault.job import only_job
 
     common.refuse_assembly_of(args.tops, args.assembly)
     tops = documents_in(args.tops)
     if not tops:
         raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")
     check_writable(*args.report)
-    for path in args.report:
-        form_of(path)
     folders = [top for top in args.tops if Path(top).is_dir()]
     base = os.path.realpath(folders[0]) if len(folders) == len(args.tops) == 1 else ""
     options = Options(
-        recursive=args.recursive or (bool(folders) and args.via == "files"),
+        recursive=args.recursive or bool(folders),
         allow_missing=args.allow_missing,
         dry_run=args.dry_run,
         skip_parts=bool(folders),
@@ -98,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
             common.client_of(args, busy_tries=_BUSY_TRIES, longest=_LONGEST_S, stop=stop)
         )
         reports = [Report(path) for path in args.report]
-        shown = _Shown(args, summary, many=len(tops) > 1)
+        shown = _Shown(args, many=len(tops) > 1)
         ended = None
         try:
             for result in _results(args, tops, options, client, summary, stop):
@@ -124,21 +104,19 @@ def _results(
     summary: Summary,
     stop: threading.Event,
 ) -> Iterator[TopResult]:
-    if args.via == "freecad":
-        yield from _by_freecad(args, tops, options, client)
-        return
     from silo.vault.job import Job
     from silo.vault.plan import make_plan
 
     begin = time.monotonic()
-    told = _Progress(len(tops))
+    told = common.Progress(len(tops))
     with common.reading_of(args) as reading:
         if summary.base:
             reading.index.expect(summary.base)
         plan = make_plan(
             tops,
             reading,
-            assembly=args.assembly,
+            assembly=None if args.assembly == common.EACH else args.assembly,
+            each=options.skip_parts or args.assembly == common.EACH,
             hardware=not args.no_hardware,
             recursive=options.recursive,
             skip_parts=options.skip_parts,
@@ -156,59 +134,23 @@ def _results(
         summary.notes += filter(None, [reading.index.trouble])
         if summary.base:
             summary.moved += moved(reading.index.places(summary.base), plan.places, summary.base)
+            summary.before = reading.index.told(summary.base)
             if not options.dry_run:  # a look takes no news from the report of the night
                 reading.index.keep_places(summary.base, plan.places)
+                if not summary.unsent:  # else the findings are not known, and all would be new the next time
+                    reading.index.keep_told(summary.base, summary.told())
             reading.index.forget(summary.base, {os.path.realpath(top) for top in tops})
-
-
-def _by_freecad(
-    args: argparse.Namespace, tops: Sequence[str], options: Options, client: SiloClient
-) -> Iterator[TopResult]:
-    """Files that FreeCAD opens, one by one."""
-    from silo.freecadcmd.run import run_freecad
-
-    stopped: SiloError | None = None
-    asked = dict.fromkeys(top for top in tops if os.path.isfile(top))
-    found = run_freecad(list(asked), args.assembly, hardware=not args.no_hardware)
-    told = _Progress(len(tops), always=True)
-    for number, top in enumerate(tops):
-        told.begin(top)
-        if stopped is not None:
-            yield TopResult(top, error=stopped)
-            continue
-        if top not in asked:  # a link to nothing, a folder that cannot be listed
-            yield TopResult(top, error=DocumentError(top, "it cannot be opened"))
-            continue
-        _, extraction = next(found)
-        if number == 0 and not isinstance(extraction, SiloError):
-            common.reach(client, extraction)
-        result = sync_top(top, extraction, client, options)
-        stopped = stopped_by(result, client)
-        yield result
-
-
-class _Progress:
-    """Names each file when it is begun, on a terminal: a person wants to know which one takes so long."""
-
-    def __init__(self, count: int, *, always: bool = False) -> None:
-        self._count, self._number = count, 0
-        self._shows = (count > 1 or always) and sys.stderr.isatty()
-
-    def begin(self, top: str) -> None:
-        self._number += 1
-        if self._shows:
-            print(f"[{self._number}/{self._count}] {top}", file=sys.stderr)
 
 
 class _Shown:
     """What standard output gets: JSON as the run goes, or what changed, and errors last."""
 
-    def __init__(self, args: argparse.Namespace, summary: Summary, *, many: bool) -> None:
-        from silo.batch_report import Json
+    def __init__(self, args: argparse.Namespace, *, many: bool) -> None:
+        from silo.batch import Json
 
         self._json, self._many, self._count = Json() if args.json else None, many, 0
         if self._json is not None:
-            print(self._json.head(summary), end="")
+            print(self._json.head(None), end="")
 
     def add(self, result: TopResult) -> None:
         if self._json is not None:
@@ -226,7 +168,7 @@ class _Shown:
 
 def _show(result: TopResult, *, whole: bool) -> None:
     """``whole``: everything about the one file; of many only what changed, for the summary says the rest."""
-    from silo.batch_report import is_news
+    from silo.batch import is_news
     from silo.bom_sync import Status
     from silo.cli import show
 
@@ -239,7 +181,7 @@ def _show(result: TopResult, *, whole: bool) -> None:
     for outcome in result.outcomes:
         if not whole and not is_news(outcome):
             continue
-        out.print(show.outcome_text(outcome))
+        out.print(show.outcome_text(outcome, result.base))
         if outcome.plan is not None and outcome.status in (Status.MERGED, Status.DRY_RUN):
             out.print(show.diff_table(outcome.plan.diff, outcome.names))
     if whole and result.findings:
@@ -250,20 +192,17 @@ def _show_summary(summary: Summary) -> None:
     from silo.cli import show
 
     out = show.console()
-    sections: list[tuple[str, str, Sequence[str]]] = [
-        ("Moved", "cyan", [f"{name}: {old} → {new}" for name, old, new in summary.moved]),
-        ("Without a part number (silo-mod register)", "yellow", list(summary.unregistered.values())),
-        ("Warnings", "yellow", list(summary.warnings)),
-        ("Errors", "bold red", list(summary.errors)),
-    ]
-    for title, style, lines in sections:
+    out.print(f"\n{show.plain(summary.sentence())}", markup=False)
+    for title, lines in summary.sections():
         if lines:
-            out.print(f"\n{title}", style=style)
-        for line in lines:
+            out.print(f"\n{title}", style=_STYLES.get(title, ""))
+        for line, more in lines:
             out.print(f"  {show.plain(line)}", markup=False)
-    for note in summary.notes:
-        out.print(show.plain(note), style="yellow", markup=False)
-    out.print(f"\n{summary.sentence()}", markup=False)
+            for one in more:
+                out.print(f"    {show.plain(one)}", markup=False)
+
+
+_STYLES = {"New since the last run": "bold", "Moved": "cyan", "Warnings": "yellow", "Errors": "bold red"}
 
 
 def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> list[tuple[str, str, str]]:
@@ -284,3 +223,307 @@ def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> 
             name = os.path.splitext(os.path.basename(new_path))[0]
             found.append((name, relative(old_path, base), relative(new_path, base)))
     return found
+
+
+def add_pull(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("part_number", metavar="PART_NUMBER")
+    parser.add_argument(
+        "--revision",
+        metavar="N",
+        type=common.above_zero,
+        help="this revision, with the linked files as they were then; else the newest of all",
+    )
+    parser.add_argument(
+        "--to",
+        "--into",
+        dest="into",
+        metavar="FOLDER",
+        default=".",
+        help="the project's folder (else this one)",
+    )
+    parser.add_argument(
+        "--replace",
+        action="store_true",
+        help="replace files with edits that are not in Silo; a copy of each is kept",
+    )
+    parser.set_defaults(run=run_pull)
+
+
+def add_log(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="a FreeCAD file that is registered")
+    parser.add_argument(
+        "--limit", metavar="N", type=common.above_zero, default=20, help="the newest N revisions (20)"
+    )
+    parser.add_argument("--bom", action="store_true", help="what each revision changed in the BOM")
+    parser.set_defaults(run=run_log)
+
+
+def add_queue(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "do",
+        nargs="?",
+        choices=("list", "retry", "discard", "save"),
+        default="list",
+        help="list them (default); retry: end the pauses and send all, with NUMBER also what is held; "
+        "discard: forget commits, the documents stay; save: write the files of commits",
+    )
+    parser.add_argument(
+        "numbers", metavar="NUMBER", nargs="*", type=common.above_zero, help="commits, as list shows them"
+    )
+    parser.add_argument("--here", action="store_true", help="retry: send them to the server in use instead")
+    parser.add_argument("--into", metavar="FOLDER", default=".", help="save: the folder (else this one)")
+    parser.set_defaults(run=run_queue)
+
+
+def run_queue(args: argparse.Namespace) -> int:
+    """1 where something waits or is held after all."""
+    from silo.api.config import canonical, resolve_server
+    from silo.outbox.store import Store
+
+    store, here = Store(), ""
+    with suppress(ConfigError):
+        here = canonical(resolve_server(args.server, args.token).url)
+    if args.do in ("discard", "save") and not args.numbers:
+        raise InputError(f"queue {args.do}: which commit? Give the number that `silo-mod queue` shows")
+    if args.do == "retry":
+        _retry(args, store, here)
+    for number in args.numbers:
+        entry = next((one for one in store.entries() if one.id == number), None)
+        if entry is None:
+            if args.do != "retry":
+                raise InputError(f"there is no commit {number} in the queue; `silo-mod queue` lists them")
+        elif args.do == "discard":
+            store.discard(number, keep=True)
+        elif args.do == "save":
+            Path(args.into).mkdir(parents=True, exist_ok=True)
+            target = Path(args.into) / f"{number}-{entry.file_name}"
+            store.save_copy(number, target)
+            print(f"{target} is written", file=sys.stderr)
+    left = store.entries()
+    pause = store.pause(here) if here else None
+    if pause is not None and not pause.left(store.clock()):
+        pause = None
+    _show_queue(args, left, here, pause, store.clock())
+    return Exit.UNDONE if left else Exit.DONE
+
+
+def _retry(args: argparse.Namespace, store: Store, here: str) -> None:
+    from silo.outbox.send import send_all
+
+    for number in args.numbers:
+        store.retry(number, here if args.here else None)
+    with common.client_of(args) as client:
+        report = send_all(store, client, force=True)
+    for sent in report.sent:
+        print(f"{sent.part_number} {sent.entry.label or sent.entry.file_name} is in Silo", file=sys.stderr)
+    if report.busy:
+        print("silo-mod: another program sends just now", file=sys.stderr)
+
+
+def _show_queue(
+    args: argparse.Namespace, left: Sequence[Entry], here: str, pause: Pause | None, now: float
+) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from silo.cli import show
+    from silo.outbox.entry import parts, pause_text, words
+
+    told = [(one, words(one, here, is_paused=pause is not None)) for one in left]
+    notice = pause_text(pause, here, now) if pause is not None else ""
+    if args.json:
+        rows = [
+            {
+                "number": one.id,
+                "part_number": one.part_number,
+                "label": one.label,
+                "path": one.path,
+                "what": parts(one),
+                "state": said.state,
+                "reason": said.reason,
+                "since": one.taken_at,
+                "server": one.server,
+                "needs_a_person": said.urgent,
+            }
+            for one, said in told
+        ]
+        common.print_json({"pause": notice or None, "commits": rows})
+        return
+    out = show.console()
+    if notice:
+        out.print(show.plain(notice), style="yellow", markup=False)
+    if not left:
+        out.print("Nothing waits: every commit of this computer is in Silo.", markup=False)
+        return
+    table = Table("", "Commit", "What", "Since", "State", "Why", box=None, pad_edge=False)
+    for one, said in told:
+        name = " ".join(filter(None, (one.part_number, one.label or one.file_name)))
+        since = time.strftime("%Y-%m-%d %H:%M", time.localtime(one.taken_at))
+        cells = (str(one.id), show.plain(name), parts(one), since, said.state, show.plain(said.reason))
+        table.add_row(*map(Text, cells), style="bold" if said.urgent else "")
+    out.print(table)
+
+
+def run_pull(args: argparse.Namespace) -> int:
+    """1 where a file was left alone, or is not in Silo."""
+    from silo.freecads import open_in_any
+    from silo.outbox.store import Store
+    from silo.vault.pull import Rules, fetched, place, pulled_json
+
+    store, into = Store(), Path(args.into)
+    opened = open_in_any()
+    with common.client_of(args) as client:
+        rules = Rules(
+            overwrite=args.replace,
+            keep=store.keep_aside,
+            is_open=lambda path: not args.even_if_open and opened.has_file(path),
+            learn=lambda sha256, item, number: store.learn(client.base_url, sha256, item, number),
+        )
+        number = common.named_item(client, args.part_number).part_number
+        with fetched(client, number, args.revision) as tree:
+            into.mkdir(parents=True, exist_ok=True)
+            pulled = place(tree, into, rules)
+    if args.json:
+        common.print_json(pulled_json(pulled, Path(os.path.realpath(into))))
+    else:
+        _show_pulled(pulled, into)
+    return Exit.DONE if pulled.complete else Exit.UNDONE
+
+
+_MARKS = {
+    "new": ("+", "green", ""),
+    "same": ("=", "dim", "up to date"),
+    "updated": ("~", "yellow", "updated"),
+    "edited": ("✗", "red", "has edits that are not in Silo; left alone (--replace replaces it)"),
+    "overwritten": ("~", "yellow", f"replaced; your file is kept for {KEPT_ASIDE_DAYS} days at"),
+    "open": ("✗", "red", "is open in FreeCAD; left alone (close it, or --even-if-open)"),
+}
+
+
+def _show_pulled(pulled: Pulled, into: Path) -> None:
+    from rich.text import Text
+
+    from silo.cli import show
+
+    out = show.console()
+    for one in pulled.files:
+        mark, style, words = _MARKS[one.state.value]
+        text = Text(f"{mark} ", style).append(show.plain(os.path.relpath(one.path, os.path.realpath(into))))
+        text.append(f"  {one.part_number}, revision {one.revision}", "dim")
+        if words:
+            text.append(f"  {words}{f' {one.kept}' if one.kept else ''}", style)
+        out.print(text)
+    for lost in pulled.lost:
+        line = f"{lost.position}: {lost.path} was not fetched: {lost.reason}"
+        out.print(Text("✗ ", "bold red").append(show.plain(line), ""))
+    out.print(Text(show.plain(f"Open {pulled.top}"), "bold"))
+
+
+def run_log(args: argparse.Namespace) -> int:
+    """Print the revisions, newest first."""
+    from silo.fcstd import Library
+    from silo.fcstd.linked import identity_in
+    from silo.files import sha256_of
+    from silo.outbox.store import Store
+    from silo.vault.pull import RevisionBoms, file_revisions, words
+
+    path = os.path.realpath(args.file)
+    if not os.path.isfile(path):
+        raise InputError(f"{args.file} is no file")
+    with Library() as library:
+        library.open(path)
+        identity = identity_in(library, path)
+    if not identity:
+        raise InputError(f"{args.file} belongs to no single item in Silo; register it (silo-mod register)")
+    with common.client_of(args) as client:
+        item = client.get_item_by_uuid(identity)
+        if item is None:
+            raise InputError(f"{args.file}: this server has no item {identity}; is it the right server?")
+        known = client.revisions(item.part_number)
+        shown = known[: args.limit]
+        here = _here(Store(), sha256_of(path), identity, client.base_url, known)
+        changes: dict[int, str] = {}
+        if args.bom:
+            files = file_revisions(known)
+            with RevisionBoms(client, item.part_number, path) as boms:
+                for number, one in enumerate(files):
+                    if one.revision_number < shown[-1].revision_number:
+                        break
+                    older = files[number + 1].revision_number if number + 1 < len(files) else None
+                    try:
+                        changes[one.revision_number] = words(boms.change(older, one.revision_number))
+                    except SiloError as error:
+                        changes[one.revision_number] = f"cannot be read: {error}"
+    if args.json:
+        common.print_json(_log_json(item.part_number, shown, here, changes, args.bom))
+    else:
+        _show_log(item.part_number, item.name, shown, here, changes, len(known))
+    return Exit.DONE
+
+
+def _here(
+    store: Store, sha256: str, identity: str, server: str, known: list[Revision]
+) -> tuple[int | None, bool]:
+    """The revision that the file is, or was made from, and whether it has edits since."""
+    from silo.api.files import standing
+
+    for content, edited in ((sha256, False), (store.origin_of(sha256), True)):
+        number = store.known_revision(server, content, identity)
+        if (base := standing(known, content, number).base) is not None:
+            return base.revision_number, edited
+    return None, True
+
+
+def _log_json(
+    number: str,
+    shown: list[Revision],
+    here: tuple[int | None, bool],
+    changes: dict[int, str],
+    with_bom: bool,
+) -> dict[str, Any]:
+    keys = {
+        "revision_number",
+        "comment",
+        "created_by",
+        "created_at",
+        "file_name",
+        "file_size",
+        "base_revision",
+    }
+    rows = []
+    for one in shown:
+        row = one.model_dump(mode="json", include=keys)
+        rows.append({**row, "bom": changes.get(one.revision_number)} if with_bom else row)
+    return {"part_number": number, "file_is": here[0], "edited": here[1], "revisions": rows}
+
+
+def _show_log(
+    number: str,
+    name: str,
+    shown: list[Revision],
+    here: tuple[int | None, bool],
+    changes: dict[int, str],
+    total: int,
+) -> None:
+    from rich.text import Text
+
+    from silo.cli import show
+
+    out = show.console()
+    out.print(Text(show.plain(f"{number}  {name}"), "bold"))
+    if here[0] is None:
+        out.print(Text("This file is no revision in Silo, and it is not known which one it was made from."))
+    for one in shown:
+        stamp = one.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if one.created_at else ""
+        text = Text(f"{one.revision_number:>4}  ", "cyan")
+        text.append(f"{stamp}  {show.plain(one.created_by or '')}  ", "dim")
+        text.append(show.plain(one.comment) or "(no comment)")
+        if not (one.file_name or one.file_checksum):
+            text.append("  properties only", "dim")
+        if one.revision_number == here[0]:
+            text.append("  ← this file, edited since" if here[1] else "  ← this file", "green")
+        out.print(text)
+        if said := changes.get(one.revision_number):
+            out.print(Text(f"      {show.plain(said)}", "yellow"))
+    if total > len(shown):
+        out.print(Text(f"… and {total - len(shown)} older; --limit shows more", "dim"))

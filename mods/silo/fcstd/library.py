@@ -1,26 +1,209 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A reading session: documents opened when a link is followed, each file once, whatever it is called."""
+"""A reading session: documents opened when a link is followed, each file once, whatever it is called.
+
+What a file was found to say of itself, in place of the file: enough for most links to it.
+
+A vault has tens of thousands of these in memory at one time, so each is made of few objects.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from silo.bom.document import LinkProblem
+from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode
-from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FileState
-from silo.fcstd.document import FcstdDocument
-from silo.fcstd.facts import Remembered
-from silo.fcstd.limits import FcstdError, Limits
+from silo.bom.walk.kinds import Kind
+from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FcstdError, FileState, Limits
+from silo.fcstd.document import FcstdDocument, FcstdObject
 from silo.fcstd.locate import Found, Locator, NotFound
-from silo.fcstd.objects import FcstdObject
-from silo.fcstd.values import Ref
+from silo.fcstd.properties import ABSENT, Properties, Ref, Text, table_of
 from silo.fcstd.xmltext import Shared, XmlText
+
+# Which objects of a file its facts describe: what may be a component, but no features of a body.
+_TARGETS = frozenset(Kind) - {Kind.NOTHING, Kind.FOLDER, Kind.LINK, Kind.ASSEMBLY_LINK, Kind.ELEMENT}
+_TARGETS_AT_MOST = 24
+# What is mostly text. The values are kept, as they are asked for by each assembly that uses the file.
+_TEXTS = frozenset({"Label", "Meta", "SiloItemId", "SiloUUID"})
+# What lies in a target is asked for only where a link names an object inside it.
+_NOT_OF_TARGETS = frozenset({"ElementList", "Group"})
+_ENCODER = json.JSONEncoder(separators=(",", ":"))
+
+
+class Facts(NamedTuple):
+    """The facts of a file. Goes through JSON.
+
+    document
+        of the document's own properties: all names, what is text, and the kept pieces of others.
+    objects
+        name → (type, and the same three), of those that links most likely mean.
+    """
+
+    digest: str
+    state: FileState
+    changed_ns: int
+    read_ns: int
+    document: tuple[Sequence[str], Mapping[str, Text], Mapping[str, str]]
+    objects: Mapping[str, tuple[str, Sequence[str], Mapping[str, Text], Mapping[str, str]]]
+
+
+def facts_of(document: FcstdDocument) -> str:
+    """The facts of a document that was read to its end, as JSON; "" where none can be given."""
+    content = document.content
+    if isinstance(content, Remembered) or content.xml.is_careful:
+        return ""
+    try:
+        survey = document.survey
+        targets = survey.of(_TARGETS, survey.grouped({Kind.LOCAL}))[:_TARGETS_AT_MOST]
+        objects = {obj.Name: (obj.TypeId, *_to_keep(obj.properties)) for obj, _ in targets}
+        own = _to_keep(document.properties)
+        facts = Facts(content.digest, content.state, content.changed_ns, content.read_ns, own, objects)
+    except (FcstdError, UnicodeDecodeError):  # who asks for it gets the error
+        return ""
+    return _ENCODER.encode(facts)
+
+
+def _to_keep(table: Properties) -> tuple[tuple[str, ...], dict[str, Text], dict[str, str]]:
+    texts, pieces = dict[str, Text](), dict[str, str]()
+    for name, piece in table.kept.items():
+        if name in _NOT_OF_TARGETS:
+            continue
+        value = table.quick_value(piece) if name in _TEXTS else None
+        if isinstance(value, (str, dict)):
+            texts[name] = value
+        else:
+            pieces[name] = piece.decode()
+    return table.names, texts, pieces
+
+
+class Remembered:
+    """The content of a file of which facts are known. It is read where they say too little.
+
+    Several sessions may share it. Raises FcstdError where the file that is read is another one by now.
+
+    document
+        the table of the document's own properties.
+    sound
+        names of the objects of which all that a walker asks can be read.
+    """
+
+    __slots__ = (
+        *("_contents", "_objects", "_path", "_tables", "changed_ns", "digest", "document", "read_ns"),
+        *("sound", "state"),
+    )
+
+    def __init__(self, path: str, facts: str, contents: Contents) -> None:
+        self._path, self._contents = path, contents
+        known = Facts(*json.loads(facts))
+        self.digest, self.changed_ns, self.read_ns = known.digest, known.changed_ns, known.read_ns
+        self.state = FileState(*known.state)
+        self._objects = dict(known.objects)
+        self._tables: dict[str, _Kept] = {}
+        self.document: Properties = _Kept(self, "", "", *known.document)
+        self.sound: set[str] = set()
+
+    @property
+    def known(self) -> Remembered:
+        """What spares reading the file."""
+        return self
+
+    def type_of(self, name: str) -> str | None:
+        """The type of an object, None where nothing is known of it."""
+        table = self.table(name)
+        return None if table is None else table.kind
+
+    def table(self, name: str) -> _Kept | None:
+        """The table of an object, made once; None where nothing is known of it."""
+        table = self._tables.get(name)
+        if table is None and (known := self._objects.pop(name, None)) is not None:
+            table = self._tables[name] = _Kept(self, name, *known)
+        return table
+
+    def _content(self) -> Content:
+        found = self._contents.read(self._path)
+        if found.digest != self.digest:
+            raise FcstdError(self._path, "it is being written just now; try again", state=self.state)
+        return found
+
+    @property
+    def xml(self) -> XmlText:
+        """The text."""
+        return self._content().xml
+
+    @property
+    def directory(self) -> Directory:
+        """The directory of the container."""
+        return self._content().directory
+
+
+class _Kept(Properties):
+    """The table of an object, "" for the document itself: what a walker asks of a target."""
+
+    __slots__ = ("_file", "_name", "_texts", "_values", "kind")
+
+    def __init__(
+        self,
+        file: Remembered,
+        name: str,
+        kind: str,
+        names: Sequence[str],
+        texts: Mapping[str, Text],
+        pieces: Mapping[str, str],
+    ) -> None:
+        self._file, self._name, self.kind = file, name, kind
+        self._careful, self._decode = False, _utf8
+        self._begin = self._end = 0
+        self._values: dict[str, Any] | None = None
+        self.names, self.numbers = _shared(tuple(names))
+        self._texts = texts
+        self.kept = {name: piece.encode() for name, piece in pieces.items()}
+
+    def _whole(self) -> Properties:
+        xml = self._file.xml
+        return (
+            table_of(xml, self._name, self.kind) if self._name else Properties(xml, xml.head.properties, "")
+        )
+
+    def piece(self, name: str) -> bytes:
+        piece = self.kept.get(name)
+        return self._whole().piece(name) if piece is None else piece
+
+    def value(self, name: str) -> Any:
+        if name not in self.numbers:
+            return ABSENT
+        if name in self._texts:
+            return self._texts[name]
+        if self._values is None:
+            self._values = {}
+        if name not in self._values:
+            value = self.quick_value(self.kept.get(name, b""))
+            if value is None:
+                return self._whole().value(name)
+            self._values[name] = value
+        return self._values[name]
+
+    @property
+    def texts(self) -> Mapping[str, Text]:
+        return self._texts
+
+
+@lru_cache(maxsize=4096)
+def _shared(names: tuple[str, ...]) -> tuple[tuple[str, ...], dict[str, int]]:
+    """Objects of one type mostly have the same properties."""
+    return names, dict.fromkeys(names, 0)
+
+
+def _utf8(raw: bytes) -> str:
+    return raw.decode()
+
 
 # Files of which facts are kept as values: as many as a large vault asks for at one time.
 _REMEMBERED_AT_MOST = 20_000
@@ -137,7 +320,7 @@ class Library:
     contents
         what was read before, by other sessions.
     facts
-        path → what :func:`~silo.fcstd.facts.facts_of` gave for a file as it is now; "" where none is known.
+        path → what :func:`~silo.fcstd.library.facts_of` gave for a file as it is now; "" where none is known.
     notes
         what was taken in another way than recorded (a file name in other case), in plain words.
     documents, lookups
@@ -223,6 +406,28 @@ class Library:
         if found.respelt:
             self._note_respelt(owner, ref, found)
         return target
+
+    def imported(self, owner: FcstdDocument, file: str) -> object:
+        """The part or assembly in a file that A2plus imported into ``owner``, or a LinkProblem.
+
+        As A2plus does, a file that is not where it was is looked for in the folder of the owner.
+        """
+        from silo.bom.roots import choose_assembly
+
+        for recorded in dict.fromkeys((file, os.path.basename(file))):
+            found = self.lookups[owner.folders, recorded] = self._locator.find(recorded, owner.folders)
+            if isinstance(found, Found):
+                break
+        if isinstance(found, NotFound):
+            return LinkProblem(found.code, file, "", found.detail)
+        try:
+            document = self._document(found)
+            document.complete()
+            return choose_assembly(document)
+        except FcstdError as error:
+            return LinkProblem(error.finding, file, "", error.reason)
+        except InputError as error:
+            return LinkProblem(FindingCode.BROKEN_LINK, file, "", str(error))
 
     def _document(self, found: Found) -> FcstdDocument:
         known = self.documents.get(found.real)

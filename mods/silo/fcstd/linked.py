@@ -6,22 +6,35 @@ its place. All links count, also those of components that are not in the BOM.
 
 FreeCAD has no way to mend a link whose target has moved but to make it anew, which loses placements and
 joints. Here only the recorded path changes: object, sub-names and the rest of the file stay as they are.
+
+Which file was meant, where one is missing: files move, and are renamed.
+
+The rules of this module, the surest first; each names a file only where exactly one fits:
+
+* it carries the Silo identity of the missing component, where the caller knows that (from the last sync);
+* it has the same name (but for case and normalisation) in another folder.
+
+In every case it must hold all the objects that the links want.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from silo.bom.errors import DocumentError, InputError
-from silo.bom.identity import document_identity, own_identity
-from silo.fcstd.careful import Malformed, as_utf8, start_tags
-from silo.fcstd.container import ContainerFile
-from silo.fcstd.edit import (
+from silo.bom.errors import DocumentError, InputError, listed
+from silo.bom.findings import Finding, FindingCode
+from silo.bom.links import file_item
+from silo.bom.model import Extraction, identity_of, walk_entries
+from silo.fcstd.container import ContainerFile, Limits
+from silo.fcstd.document import FcstdDocument
+from silo.fcstd.library import Library
+from silo.fcstd.locate import Found, Locator
+from silo.fcstd.stamp import (
     check_writable,
     document_xml,
     edited_xml,
@@ -29,10 +42,9 @@ from silo.fcstd.edit import (
     replace_file,
     replaced_entry,
 )
-from silo.fcstd.library import Library
-from silo.fcstd.limits import Limits
-from silo.fcstd.locate import Found, Locator
-from silo.files import content_hash
+from silo.fcstd.xmltext import Malformed, as_utf8, start_tags
+from silo.files import Project, content_hash
+from silo.platform import folded
 
 TAGS = frozenset({"XLink", "XLinkSub"})
 """The elements of Document.xml that record another file (``src/App/PropertyLinks.cpp``)."""
@@ -40,16 +52,19 @@ TAGS = frozenset({"XLink", "XLinkSub"})
 
 @dataclass(frozen=True)
 class Linked:
-    """A linked file: its path as recorded, with ``/``, the identity in it and its SHA-256 (or "")."""
+    """A linked file: its path as recorded, with ``/``, the identity in it and its SHA-256 (or ""), and the
+    UUID of its document, for a file that is no single item's."""
 
     path: str
     item: str = ""
     sha256: str = ""
+    document: str = ""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a file is, relative to the folder that holds it and all that it links to; and those links."""
+    """Where a file is, relative to its project or to the folder that holds it and all that it links to; and
+    those links."""
 
     path: str
     links: tuple[Linked, ...]
@@ -82,6 +97,16 @@ def place_of(content: Path | str, path: str) -> Place:
     folder = os.path.dirname(path)
     locator = Locator()
     found: list[Linked] = []
+    project = Project.of(path)
+    files = project.files() if project is not None else {}
+
+    def place(of: str) -> str:
+        return (project.place(of) if project is not None else None) or ""
+
+    def kept(of: str) -> str:
+        known = files.get(place(of))
+        return known.document if known is not None else ""
+
     reached = [os.path.abspath(path)]
     with Library() as library:
         for recorded in recorded_paths(content):
@@ -90,20 +115,17 @@ def place_of(content: Path | str, path: str) -> Place:
                 found.append(Linked(recorded))
                 continue
             reached.append(os.path.normpath(os.path.join(folder, recorded)))
-            found.append(Linked(recorded, identity_in(library, target.real), _hash(target.real)))
-    return Place(_below(reached), tuple(found))
+            item = identity_in(library, target.real)
+            found.append(Linked(recorded, item, _hash(target.real), "" if item else kept(target.real)))
+    return Place(place(path) or _below(reached), tuple(found))
 
 
 def identity_in(library: Library, path: str) -> str:
     """The identity of the item that a file belongs to; "" where it has none or several, or is unreadable."""
     try:
-        document = library.glance(path)
-        if found := document_identity(document):
-            return found
-        own = {identity for obj in document.Objects if (identity := own_identity(obj))}
+        return file_item(library.glance(path)) or ""
     except DocumentError:
         return ""
-    return own.pop() if len(own) == 1 else ""
 
 
 def _hash(path: str) -> str:
@@ -204,9 +226,7 @@ def _check_target(found: list[Relinked], old: str, target: str, limits: Limits) 
         lacking = [name for name in wanted if document.getObject(name) is None]
     if lacking:
         raise InputError(
-            f"{target} does not hold what the links to {old} want: {', '.join(lacking[:8])}"
-            + (f" and {len(lacking) - 8} more" if len(lacking) > 8 else "")
-            + "; nothing was changed"
+            f"{target} does not hold what the links to {old} want: {listed(lacking)}; nothing was changed"
         )
     if any(one.path == target for one in found):
         raise InputError(f"{target} would link to itself; nothing was changed")
@@ -249,3 +269,131 @@ def read_back(one: Relinked, copy: str, old: str, target: str, before: int) -> N
     now = sum(1 for _ in _records(text, copy, target, limits))
     if left or now != before + one.links:
         raise DocumentError(one.path, "the mended copy does not hold the new links; nothing was written")
+
+
+# A project has some hundreds of files; a home folder taken for one would have many more.
+_MOST_FILES = 2000
+_MOST_FOLDERS = 5000
+_DID_YOU_MEAN = " Did you mean"
+_CODES = (FindingCode.MISSING_FILE, FindingCode.MISSING_OBJECT)
+
+# (file, object) → the Silo UUID that it had in the last sync.
+Identities = Mapping[tuple[str, str], str]
+
+
+@dataclass
+class _Lost:
+    file: str
+    objects: set[str] = field(default_factory=set)
+
+
+def with_suggestions(
+    extraction: Extraction, identities: Identities | None = None, files: Iterable[str] | None = None
+) -> Extraction:
+    """The extraction, its findings of missing files with the file that was probably meant.
+
+    Reads the project's files, or those of ``files``; costs nothing where no file is missing.
+    """
+    lost = _lost(extraction)
+    if not lost or (files is not None and not (files := list(files))):
+        return extraction
+    with Library() as library:
+        files = _project_files(extraction) if files is None else files
+        project = _Project(library, list(files), identities or {})
+        meant = {file: found for file, one in lost.items() if (found := project.meant(one))}
+    findings = tuple(_told(finding, meant, extraction) for finding in extraction.findings)
+    return replace(extraction, findings=findings)
+
+
+def _told(finding: Finding, meant: Mapping[str, tuple[str, str]], extraction: Extraction) -> Finding:
+    if finding.code not in _CODES or finding.file not in meant:
+        return finding
+    file, why = meant[finding.file]
+    holder = finding.where[0].doc_path if finding.where else extraction.assembly.doc_path
+    top = os.path.basename(holder)
+    message = (
+        f"{finding.message.partition(_DID_YOU_MEAN)[0]}{_DID_YOU_MEAN} {file} ({why})? "
+        f"`silo-mod relink {top} --from {finding.file} --to {file}` mends the links."
+    )
+    return replace(finding, message=message, did_you_mean=file)
+
+
+def _lost(extraction: Extraction) -> dict[str, _Lost]:
+    told = {finding.file for finding in extraction.findings if finding.code in _CODES and finding.file}
+    lost: dict[str, _Lost] = {}
+    for entry in walk_entries(extraction.entries):
+        if entry.missing and entry.doc_path in told:
+            lost.setdefault(entry.doc_path, _Lost(entry.doc_path)).objects.add(entry.object_name)
+    return lost
+
+
+def _project_files(extraction: Extraction) -> Iterator[str]:
+    """The FreeCAD files of the folder that all files of the tree share."""
+    paths = [entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))]
+    folders = [os.path.dirname(path) for path in paths if path]
+    top = os.path.dirname(extraction.assembly.doc_path)
+    try:
+        root = os.path.commonpath(folders)
+    except ValueError:  # another Windows drive
+        root = top
+    # The root of the disk, or the home folder, is no project.
+    if root in (os.path.abspath(os.sep), os.path.expanduser("~")) or len(Path(root).parts) < 3:
+        root = top
+    left, folders_left = _MOST_FILES, _MOST_FOLDERS
+    for folder, inner, names in os.walk(root):
+        inner[:] = sorted(name for name in inner if not name.startswith("."))
+        folders_left -= 1
+        for name in sorted(names):
+            if name.lower().endswith(".fcstd") and not name.startswith(".") and left > 0:
+                left -= 1
+                yield os.path.join(folder, name)
+        if left <= 0 or folders_left <= 0:
+            return
+
+
+class _Project:
+    """The files that may have been meant."""
+
+    def __init__(self, library: Library, files: Sequence[str], identities: Identities) -> None:
+        self._library, self._files, self._identities = library, files, identities
+        self._opened: dict[str, FcstdDocument | None] = {}
+
+    def meant(self, lost: _Lost) -> tuple[str, str] | None:
+        """The file, and why it is the one."""
+        holding = [path for path in self._files if path != lost.file and self._holds(path, lost.objects)]
+        rules: list[tuple[str, list[str]]] = [
+            ("it carries the Silo identity", [path for path in holding if self._identified(path, lost)]),
+            ("a file of this name", [path for path in holding if _same_name(path, lost.file)]),
+        ]
+        for why, fitting in rules:
+            # Copies of one file share its identity; their names may still distinguish them.
+            exact = [path for path in fitting if _same_name(path, lost.file)] or fitting
+            if len(exact) == 1:
+                return exact[0], why
+        return None
+
+    def _document(self, path: str) -> FcstdDocument | None:
+        if path not in self._opened:
+            try:
+                self._opened[path] = self._library.open(path)
+            except DocumentError:
+                self._opened[path] = None
+        return self._opened[path]
+
+    def _holds(self, path: str, objects: Iterable[str]) -> bool:
+        document = self._document(path)
+        return document is not None and all(document.getObject(name) is not None for name in objects if name)
+
+    def _identified(self, path: str, lost: _Lost) -> bool:
+        document = self._document(path)
+        wanted = {name: self._identities.get((lost.file, name)) for name in lost.objects}
+        if document is None or not all(wanted.values()):
+            return False
+        return all(
+            (identity_of(document.getObject(name)) or "").lower() == (uuid or "").lower()
+            for name, uuid in wanted.items()
+        )
+
+
+def _same_name(one: str, other: str) -> bool:
+    return folded(os.path.basename(one)) == folded(os.path.basename(other.replace("\\", "/")))

@@ -12,14 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from silo.bom.errors import InputError
-from silo.inertia.bom.rows import BomTable
+from silo.inertia.bom.table import BomTable
 from silo.inertia.codes import MassCode
 from silo.inertia.core import Floats, MassProps, TensorProblem, combine_arrays, is_rigid
-from silo.inertia.doubts import Note
 from silo.inertia.links import ASSEMBLY_FRAME, Claims, FrameChoice, LinkFrame
-from silo.inertia.matching import Matching
+from silo.inertia.matching import Matching, plain
 from silo.inertia.model import Assembly, Product
-from silo.inertia.names import plain
 from silo.inertia.placed import Occurrence, Placed
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning, SubAssemblyResult
 
@@ -35,7 +33,7 @@ _TENSOR_WORDS = {
 
 
 def sum_up(placed: Placed, indices: Sequence[int]) -> MassProps:
-    """Mass properties of some instances together, in the assembly's frame."""
+    """Return the mass properties of some instances together, in the assembly's frame."""
     index = np.asarray(indices, np.intp)
     return combine_arrays(placed.mass[index], placed.com[index], placed.inertia(index))
 
@@ -61,7 +59,7 @@ def fill_links(
 
 
 def _sub_assemblies(assembly: Assembly, placed: Placed) -> Iterator[SubAssemblyResult]:
-    """One per BOM row, in the order of the rows."""
+    """Yield one mass per BOM row, in the order of the rows."""
     by_row: dict[int, list[Occurrence]] = {}
     for occurrence in placed.groups:
         by_row.setdefault(id(occurrence.match.row), []).append(occurrence)
@@ -88,7 +86,10 @@ def _sub_assemblies(assembly: Assembly, placed: Placed) -> Iterator[SubAssemblyR
 
 
 def _shape(assembly: Assembly, placed: Placed, occurrence: Occurrence) -> tuple[float, Floats | None]:
-    """Volume [m^3] and centre of mass (3,) [m] of a placed sub-assembly; the centre in its own axes."""
+    """Return the volume [m^3] and centre of mass (3,) [m] of a placed sub-assembly.
+
+    The centre in its own axes.
+    """
     volume = float(placed.volume[list(occurrence.below)].sum())
     frame = assembly.frames.get(occurrence.path)
     props = sum_up(placed, occurrence.below)
@@ -98,7 +99,7 @@ def _shape(assembly: Assembly, placed: Placed, occurrence: Occurrence) -> tuple[
 
 
 def chosen_frame(name: str, claims: Claims, choice: FrameChoice) -> LinkFrame:
-    """The frame a link's numbers are given in: the map's word, else the run's choice."""
+    """Return the frame a link's numbers are given in: the map's word, else the run's choice."""
     frame = claims.frame(name)
     if not frame.chosen and choice is FrameChoice.ASSEMBLY:
         return ASSEMBLY_FRAME
@@ -111,7 +112,7 @@ def chosen_frame(name: str, claims: Claims, choice: FrameChoice) -> LinkFrame:
 
 
 def _parts(assembly: Assembly, placed: Placed, indices: Iterable[int], link: str) -> Iterator[PartResult]:
-    """Pieces that are alike in name, size, mass and its source, together; products or not.
+    """Yield the pieces that are alike in name, size, mass and its source, together; products or not.
 
     A bearing's fourteen balls are fourteen products in many files, and one line for people.
     """
@@ -133,7 +134,7 @@ def _part(assembly: Assembly, placed: Placed, members: Sequence[int], link: str)
     mass, volume = float(placed.mass[members[0]]), float(placed.volume[members[0]])
     same_axes = all(np.allclose(p.com_m, product.com_m, rtol=1e-9, atol=1e-9) for p in products)
     implied = mass / volume if volume > 0 else None
-    notes = [*decision.notes, *(Note(problem.code, problem.message) for problem in product.problems)]
+    notes = (*decision.notes, *product.problems)
     return PartResult(
         name=product.name,
         paths=tuple(instance.name for instance in instances),
@@ -162,7 +163,7 @@ def _part_warnings(report: InertiaReport, parts: Iterable[PartResult]) -> None:
 
 
 def tell_tensors(report: InertiaReport) -> None:
-    """Links that a simulator would refuse, or take in silence and get wrong."""
+    """Return the links that a simulator would refuse, or take in silence and get wrong."""
     for link in report.links.values():
         if TensorProblem.ZERO_MASS in link.problems:
             words = "the link has no mass; physics engines refuse a moving link without one"
@@ -174,12 +175,12 @@ def tell_tensors(report: InertiaReport) -> None:
 
 
 def tensor_words(problems: Iterable[TensorProblem]) -> str:
-    """Why a tensor is no rigid body's, in words that end a sentence."""
+    """Return why a tensor is no rigid body's, in words that end a sentence."""
     return ", ".join(_TENSOR_WORDS[problem] for problem in problems)
 
 
 def tell_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> None:
-    """What the link map left open: unclaimed parts, overlaps, patterns without effect."""
+    """Return what the link map left open: unclaimed parts, overlaps, patterns without effect."""
     for part in report.unclaimed:
         many = f"{part.quantity} pieces, " if part.quantity > 1 else ""
         report.add_warning(
@@ -203,7 +204,7 @@ def tell_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> No
 
 
 def _tell_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> None:
-    """Parts that the root link got because no sub-assembly holds them: one warning per product."""
+    """Warn of parts that the root link got because no sub-assembly holds them: one warning per product."""
     if not claims.rooted:
         return
     root = next(name for name, ids in claims.members.items() if claims.rooted[0] in ids)
@@ -220,7 +221,7 @@ def _tell_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> N
 
 
 def tell_bom(report: InertiaReport, table: BomTable) -> None:
-    """What was noticed while the BOM was read."""
+    """Return what was noticed while the BOM was read."""
     for warning in table.warnings:
         report.add_warning("", warning.name, f"BOM {warning}", warning.code)
 
@@ -228,7 +229,7 @@ def tell_bom(report: InertiaReport, table: BomTable) -> None:
 def tell_rows(
     report: InertiaReport, leaves: Sequence[Product], groups: Sequence[Product], matching: Matching
 ) -> None:
-    """BOM rows that no part uses, and rows whose quantity is not the number of parts."""
+    """Warn of BOM rows that no part uses, and rows whose quantity is not the number of parts."""
     names = {plain(product.name) for product in (*leaves, *groups)}
     for row in matching.unused:
         quantity = f", quantity {row.quantity:g}" if row.quantity is not None else ""

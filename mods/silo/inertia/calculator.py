@@ -4,28 +4,42 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from silo.bom.errors import InputError
 from silo.inertia.aggregate import chosen_frame, fill_links, tell_bom, tell_claims, tell_rows, tell_tensors
 from silo.inertia.bom import BOMEntry, BOMParser, BomTable, as_table
+from silo.inertia.bom.masses import parse_mass
 from silo.inertia.codes import MassCode
 from silo.inertia.core import Floats, InertialProperties
-from silo.inertia.links import ROOT_LINK, Claims, FrameChoice, LinkFrame, LinkMap, apart, as_link_map, claim
-from silo.inertia.massrule import MassRule, Options
-from silo.inertia.matching import match
+from silo.inertia.links import (
+    ROOT_LINK,
+    Claims,
+    FrameChoice,
+    LinkFrame,
+    LinkMap,
+    apart,
+    as_link_map,
+    claim,
+    components,
+    word_of,
+)
+from silo.inertia.masses import MassRule, Options
+from silo.inertia.matching import Suggester, match
 from silo.inertia.materials import MaterialHit, MaterialTable, load_materials
 from silo.inertia.model import Assembly, Prototype, leaf_products, sub_assemblies
-from silo.inertia.names import Suggester
-from silo.inertia.placed import place_all
+from silo.inertia.placed import place_all, weighed
 from silo.inertia.report import InertiaReport
 
 if TYPE_CHECKING:
     from silo.inertia.geometry import ReadOptions
+    from silo.inertia.output.urdf import Urdf
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +48,13 @@ class Task:
 
     frame
         which frame the links' numbers are given in; a link map's own word wins.
-    urdf_frames
-        link → (4, 4) placement in the assembly's frame, where a URDF is to be filled; used where ``frame``
-        is URDF, else compared with.
-    urdf_doubts
-        what is odd about those, in sentences; each becomes a warning.
+    urdf
+        what is to be filled: ours are named after its links, and its frames are used if ``frame`` is URDF,
+        else compared with.
     loose_link
         a link that takes what no other claims; None: a map leaves such parts unclaimed.
-    root_link
-        without a map: the link of parts in no first-level sub-assembly, with a warning.
+    weights
+        link or pattern of components → what one weighs, as a text with its unit; a link map's own come after.
     simulated
         the links go to a simulator: warn of those that it would refuse.
     """
@@ -51,33 +63,71 @@ class Task:
     options: Options = field(default_factory=Options)
     links: LinkMap | Mapping[str, Any] | None = None
     frame: FrameChoice = FrameChoice.ASSEMBLY
-    urdf_frames: Mapping[str, Floats] | None = None
-    urdf_doubts: tuple[str, ...] = ()
+    urdf: Urdf | None = None
     loose_link: str | None = None
-    root_link: str = ROOT_LINK
     simulated: bool = True
+    weights: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.frame is FrameChoice.URDF and self.urdf is not None and self.urdf.problem:
+            raise InputError(self.urdf.problem)
+
+    @property
+    def urdf_frames(self) -> Mapping[str, Floats]:
+        """Return link → (4, 4) placement in the assembly's frame, by the URDF."""
+        return self.urdf.frames if self.urdf is not None else {}
 
 
 def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = None) -> InertiaReport:
-    """Mass properties of every link of an assembly. Pure: nothing is read or written."""
+    """Return the mass properties of every link of an assembly. Pure: nothing is read or written."""
     task = task or Task()
-    claims = claim(assembly, as_link_map(task.links), task.loose_link or task.root_link)
-    claims = _framed(_gathered(claims, task.loose_link), task)
+    urdf = task.urdf
+    root = urdf.root if urdf is not None else ROOT_LINK
+    claims = _gathered(claim(assembly, as_link_map(task.links), task.loose_link or root), task.loose_link)
+    claims = _framed(_named_alike(claims, urdf.names if urdf is not None else ()), task)
     report = InertiaReport()
     _tell_frames(report, claims, task)
     report = _run(assembly, table, task, claims, report)
     _tell_far_frames(report, claims, task)
+    if urdf is not None:
+        _tell_lost_links(report, urdf)
     return report
 
 
-def _tell_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
-    """A link map's frame wins, and so does --frame; a URDF would get numbers of another frame in silence."""
-    known = task.urdf_frames or {}
+def _tell_lost_links(report: InertiaReport, urdf: Urdf) -> None:
+    """Warn of links whose mass goes nowhere, or whose frame nobody knows."""
+    for name, link in report.links.items():
+        if name not in urdf.names and link.props.mass > 0:
+            words = f"the URDF has no link of this name; its {link.props.mass:.6g} kg go nowhere"
+            report.add_warning(name, "", words, MassCode.LINK_NOT_IN_URDF)
+        elif name in urdf.loose and not link.frame.chosen:
+            words = (
+                "no joints lead from it to the URDF's root: its frame is not known, and taken for the root's"
+            )
+            report.add_warning(name, "", words, MassCode.LINK_LOOSE)
+
+
+def _named_alike(claims: Claims, urdf_links: tuple[str, ...]) -> Claims:
+    """Name links as the URDF does if both mean the same word, as in a starting map ("Arm", "arm link")."""
+    free = {name: word_of(name) for name in urdf_links if name not in claims.members}
+    ours = Counter(word_of(name) for name in claims.members if name not in urdf_links)
+    new: dict[str, str] = {}
     for name in claims.members:
-        if name not in known:
+        same = [other for other, word in free.items() if word == word_of(name)]
+        if name not in urdf_links and len(same) == 1 and ours[word_of(name)] == 1:
+            new[name] = same[0]
+    members = {new.get(name, name): ids for name, ids in claims.members.items()}
+    frames = {new.get(name, name): frame for name, frame in (claims.frames or {}).items()}
+    return replace(claims, members=members, frames=frames)
+
+
+def _tell_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
+    """Warn if a link map's frame or --frame wins: a URDF would get numbers of another frame."""
+    for name in claims.members:
+        if name not in task.urdf_frames:
             continue
         frame = chosen_frame(name, claims, task.frame)
-        distance, angle = apart(frame.placement, known[name])
+        distance, angle = apart(frame.placement, task.urdf_frames[name])
         if distance > FRAME_DISTANCE or angle > FRAME_ANGLE:
             words = (
                 f"the numbers are in another frame ({frame.description}) than the link has by the URDF's "
@@ -87,15 +137,18 @@ def _tell_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
 
 
 def _tell_far_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
-    """Frames that a person wrote, far outside of the assembly: millimetres where metres are wanted."""
-    for words in task.urdf_doubts:
+    """Warn of frames that a person wrote, far outside of the assembly.
+
+    Millimetres where metres are wanted.
+    """
+    for words in task.urdf.doubts if task.urdf is not None else ():
         report.add_warning("", "", words, MassCode.FRAME_FAR)
     if report.total is None or report.total.mass <= 0:
         return
     size = 2 * math.sqrt(float(np.abs(report.total.inertia).max()) / report.total.mass)
     far = {}
     for name, link in report.links.items():
-        written = link.frame.chosen or (task.frame is FrameChoice.URDF and name in (task.urdf_frames or {}))
+        written = link.frame.chosen or (task.frame is FrameChoice.URDF and name in task.urdf_frames)
         distance = float(np.linalg.norm(link.props.com))
         if written and link.props.mass > 0 and distance > FAR * size:
             far[name] = distance
@@ -128,19 +181,42 @@ def _run(
 
     leaves, groups = leaf_products(assembly), sub_assemblies(assembly)
     matching = match(leaves, groups, rows, density)
-    placed = place_all(assembly, rule, matching)
+    placed, doubts = weighed(place_all(assembly, rule, matching), _weights(task, assembly, claims))
     report.assembly, report.source = assembly.name, assembly.source
     report.bom = rows.source
     report.default_density = task.options.default_density
     tell_bom(report, rows)
     for problem in assembly.problems:
         report.add_warning("", "", problem.message, problem.code)
+    for doubt in doubts:
+        report.add_warning("", "", doubt.message, doubt.code)
     fill_links(report, assembly, placed, claims, task.frame)
     if task.simulated:
         tell_tensors(report)
     tell_claims(report, assembly, claims)
     tell_rows(report, leaves, groups, matching)
     return report
+
+
+def _weights(task: Task, assembly: Assembly, claims: Claims) -> list[tuple[str, Sequence[int], float]]:
+    """What was weighed, components before the links around them. InputError for what is no mass."""
+    links = as_link_map(task.links)
+    given = {link.name: link.mass for link in (links.links if links else ()) if link.mass} | dict(
+        task.weights
+    )
+    of_links, of_parts, bad = [], [], []
+    for name, text in given.items():
+        cell = parse_mass(text, unit="kg")
+        if cell.kg is None or not cell.kg > 0:
+            bad.append(f"{name}: wanted a mass above zero such as 1.25 kg, got “{text}”")
+        elif name in claims.members:
+            of_links.append((name, claims.members[name], cell.kg))
+        else:
+            groups = components(name, assembly.instances) or [[]]
+            of_parts += [(name, group, cell.kg) for group in groups]
+    if bad:
+        raise InputError("; ".join(bad))
+    return [*sorted(of_parts, key=lambda group: len(group[1])), *of_links]
 
 
 def _gathered(claims: Claims, loose: str | None) -> Claims:
@@ -154,7 +230,7 @@ def _gathered(claims: Claims, loose: str | None) -> Claims:
 
 
 def _framed(claims: Claims, task: Task) -> Claims:
-    if task.frame is not FrameChoice.URDF or task.urdf_frames is None:
+    if task.frame is not FrameChoice.URDF:
         return claims
     frames = dict(claims.frames or {})
     for name in claims.members:
@@ -165,7 +241,7 @@ def _framed(claims: Claims, task: Task) -> Claims:
 
 
 def _with_stated_densities(assembly: Assembly, materials: MaterialTable) -> Assembly:
-    """A material that the geometry file names without a density gets that of the table."""
+    """Give a material that the geometry file names without a density that of the table."""
 
     def complete(prototype: Prototype) -> Prototype:
         if prototype.step_density is not None or not prototype.step_material:
@@ -178,6 +254,7 @@ def _with_stated_densities(assembly: Assembly, materials: MaterialTable) -> Asse
     return replace(assembly, prototypes={key: complete(p) for key, p in assembly.prototypes.items()})
 
 
+@dataclass(eq=False)
 class InertiaCalculator:
     """Mass properties of STEP (and mesh, and FCStd) files; spec bom-inertia, Task 4.
 
@@ -189,27 +266,20 @@ class InertiaCalculator:
         use densities that the geometry file states before the default.
     """
 
-    def __init__(
-        self,
-        default_density: float = 1000.0,
-        *,
-        materials: MaterialTable | None = None,
-        step_density: bool = False,
-        read_options: ReadOptions | None = None,
-    ) -> None:
-        self.default_density = default_density
-        self._materials = materials if materials is not None else load_materials()
-        self._step_density = step_density
-        self._read_options = read_options
+    default_density: float = 1000.0
+    _: KW_ONLY
+    materials: MaterialTable = field(default_factory=load_materials)
+    step_density: bool = False
+    read_options: ReadOptions | None = None
 
     @property
     def task(self) -> Task:
-        """The calculator's choices as a :class:`Task`."""
-        return Task(self._materials, Options(self.default_density, self._step_density))
+        """Return the calculator's choices as a :class:`Task`."""
+        return Task(self.materials, Options(self.default_density, self.step_density))
 
     def compute_from_step(self, step_path: Path | str) -> InertialProperties:
-        """The whole file as one body at the default density, in the file's frame."""
-        assembly = self._read(step_path)
+        """Return the whole file as one body at the default density, in the file's frame."""
+        assembly = read_geometry(step_path, self.read_options)
         name = assembly.name or "assembly"
         report = _run(assembly, None, self.task, _everything(assembly, name), InertiaReport())
         return report.link_properties[name]
@@ -221,11 +291,11 @@ class InertiaCalculator:
         link_name: str,
         report: InertiaReport,
     ) -> InertialProperties:
-        """The whole file as one link, masses by BOM; results and warnings go into ``report`` as well.
+        """Return the whole file as one link, masses by BOM; results and warnings go into ``report`` as well.
 
         ``bom_entries``: what :class:`BOMParser` gives (all rows are used then), or any mapping name → entry.
         """
-        assembly = self._read(step_path)
+        assembly = read_geometry(step_path, self.read_options)
         claims = _everything(assembly, link_name)
         one = _run(assembly, as_table(bom_entries), self.task, claims, InertiaReport())
         report.links.update(one.links)
@@ -233,9 +303,6 @@ class InertiaCalculator:
         for w in one.warnings:
             report.add_warning(w.link_name or link_name, w.part_name, w.message, w.code)
         return one.link_properties[link_name]
-
-    def _read(self, path: Path | str) -> Assembly:
-        return read_geometry(path, self._read_options)
 
 
 EnhancedInertiaCalculator = InertiaCalculator
@@ -253,7 +320,7 @@ def compute_link_inertials(
     frame: FrameChoice | str = FrameChoice.ASSEMBLY,
     read_options: ReadOptions | None = None,
 ) -> InertiaReport:
-    """Every link of an assembly file (spec bom-inertia, Task 5).
+    """Return every link of an assembly file (spec bom-inertia, Task 5).
 
     bom_path
         a file, or what :class:`BOMParser` made of one.
@@ -277,7 +344,7 @@ def compute_link_inertials(
 
 
 def read_geometry(path: Path | str, options: ReadOptions | None = None) -> Assembly:
-    """Geometry of a STEP, mesh or FCStd file; the kernel is imported only now."""
+    """Return the geometry of a STEP, mesh or FCStd file; the kernel is imported only now."""
     from silo.inertia import geometry
 
     return geometry.read(path) if options is None else geometry.read(path, options=options)

@@ -20,7 +20,7 @@ class MassCode(StrEnum):
     UNKNOWN_MATERIAL = "unknown_material"  # default density
     GUESSED_MATERIAL = "material_guessed"  # a word in the material's name is not understood
     DENSITY_VARIES = "density_varies"  # foam, wood, rubber: the density depends on the kind
-    ZERO_MASS = "bom_zero_mass"  # the BOM says 0 kg; the material's mass is used where it is known
+    ZERO_MASS = "bom_zero_mass"  # the BOM says 0 kg; the material's mass is used if it is known
     NO_VOLUME = "no_volume"  # a material, but no solid to take a volume from: zero
     POINT_MASS = "point_mass"  # a BOM mass without a solid: mass at one point, no inertia
     # a mass that other data contradict
@@ -29,6 +29,7 @@ class MassCode(StrEnum):
     ROW_TOTAL = "row_total"  # the BOM mass looks like that of the whole row
     IMPLAUSIBLE = "mass_implausible"  # denser than any metal, or lighter than any solid
     STEP_DENSITY = "step_density_differs"
+    TARGET_DIFFERS = "target_mass_differs"  # what was weighed contradicts what else was weighed
     SUB_ASSEMBLY = "sub_assembly_mass_differs"
     SUB_ASSEMBLY_SHARED = "sub_assembly_mass_shared"  # a sub-assembly's mass spread over its parts by volume
     # matching
@@ -42,6 +43,8 @@ class MassCode(StrEnum):
     PATTERN_UNUSED = "pattern_unused"
     FRAME_FAR = "frame_far"  # far outside of the assembly, or turned by 90 rad: another unit was meant
     FRAME_DIFFERS = "frame_differs"  # the numbers' frame is not that of the URDF's link
+    LINK_NOT_IN_URDF = "link_not_in_urdf"  # a link of ours that the URDF does not have: its mass goes nowhere
+    LINK_LOOSE = "link_loose"  # no joints lead from it to the URDF's root: its frame is not known
     ZERO_MASS_LINK = "zero_mass_link"
     BAD_TENSOR = "bad_tensor"
 
@@ -49,10 +52,11 @@ class MassCode(StrEnum):
 class Source(StrEnum):
     """Where a part's mass comes from, best first (spec bom-inertia, "Solution")."""
 
+    TARGET_MASS = "target_mass"  # a share of what the user weighed
     BOM_MASS = "bom_mass"
     MATERIAL = "material"
     SUB_ASSEMBLY_MASS = "sub_assembly_mass"  # the BOM has a mass for the sub-assembly around it only
-    STEP_DENSITY = "step_density"  # only where the user asks for it
+    STEP_DENSITY = "step_density"  # only if the user asks for it
     DEFAULT_DENSITY = "default_density"
     ZERO = "zero"
 

@@ -10,8 +10,7 @@ Rules of this module:
 
 from __future__ import annotations
 
-import html
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -74,7 +73,7 @@ class MassProps:
     mass : float [kg]
     com : (3,) float [m], in the frame
     inertia : (3, 3) float [kg m^2], about ``com``, axes of the frame
-    frame : which frame, in words; "" where nobody said. Bodies of two named frames cannot be added.
+    frame : which frame, in words; "" if nobody said. Bodies of two named frames cannot be added.
 
     ``center_mass``, ``moment_inertia`` and the principal ones are the same under the names that trimesh has.
     """
@@ -97,7 +96,7 @@ class MassProps:
         return self.mass, *self.com, *self.inertia.flat, self.frame
 
     def __eq__(self, other: object) -> bool:
-        """Equal to the last bit, in one frame; ``np.allclose`` compares with a tolerance."""
+        """Compare to the last bit, in one frame; ``np.allclose`` compares with a tolerance."""
         return self._values() == other._values() if isinstance(other, MassProps) else NotImplemented
 
     def __hash__(self) -> int:
@@ -105,55 +104,34 @@ class MassProps:
 
     @classmethod
     def nothing(cls) -> MassProps:
-        """No mass at all; the neutral element of :func:`combine`."""
+        """Return no mass at all; the neutral element of :func:`combine`."""
         return cls(0.0, np.zeros(3), np.zeros((3, 3)))
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> MassProps:
-        """From what :meth:`to_dict` gives. InputError with every key that lacks or does not fit."""
-        try:
-            mass, com, inertia = (values[name] for name in ("mass", "center_mass", "moment_inertia"))
-            unknown = sorted(set(values) - {"mass", "center_mass", "moment_inertia", "frame"})
-        except (KeyError, TypeError, IndexError) as error:
-            raise InputError(f"{_DICT_WANTED}; missing: {error}") from error
-        if unknown:
-            raise InputError(f"{_DICT_WANTED}; unknown: {', '.join(unknown)}")
-        try:
-            return cls(mass, com, inertia, str(values.get("frame", "")))
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{_DICT_WANTED} ({error})") from error
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, fit for JSON: ``mass``, ``center_mass``, ``moment_inertia``, ``frame``."""
-        return {
-            "mass": self.mass,
-            "center_mass": self.com.tolist(),
-            "moment_inertia": self.inertia.tolist(),
-            "frame": self.frame,
-        }
 
     @property
     def center_mass(self) -> Floats:
-        """(3,) centre of mass [m]."""
+        """Return (3,) centre of mass [m]."""
         return self.com
 
     @property
     def moment_inertia(self) -> Floats:
-        """(3, 3) tensor [kg m^2] about the centre of mass; off-diagonals are tensor elements (-∫xy dm)."""
+        """Return (3, 3) tensor [kg m^2] about the centre of mass.
+
+        Off-diagonals are tensor elements (-∫xy dm).
+        """
         return self.inertia
 
     @property
     def principal_inertia_components(self) -> Floats:
-        """(3,) principal moments [kg m^2], ascending."""
+        """Return (3,) principal moments [kg m^2], ascending."""
         return self.principal()[0]
 
     @property
     def principal_inertia_vectors(self) -> Floats:
-        """(3, 3): the unit axis of each principal moment, one a row, right-handed."""
+        """Return (3, 3): the unit axis of each principal moment, one a row, right-handed."""
         return self.principal()[1].T
 
     def __add__(self, other: object) -> MassProps:
-        """Both as one rigid body. InputError where their frames are known to differ."""
+        """Return both as one rigid body. InputError if their frames are known to differ."""
         if not isinstance(other, MassProps):
             return NotImplemented
         if self.frame and other.frame and self.frame != other.frame:
@@ -169,28 +147,14 @@ class MassProps:
 
     def __repr__(self) -> str:
         centre = ", ".join(f"{v:.6g}" for v in self.com)
-        moments = self._moments_words()
+        finite = np.isfinite(self.inertia).all()
+        moments = ", ".join(f"{v:.6g}" for v in self.principal()[0]) if finite else "not finite"
         where = f", frame={self.frame!r}" if self.frame else ""
         return f"MassProps(mass={self.mass:.6g} kg, com=[{centre}] m, principal=[{moments}] kg m²{where})"
 
-    def _moments_words(self) -> str:
-        if not np.isfinite(self.inertia).all():
-            return "not finite"
-        return ", ".join(f"{v:.6g}" for v in self.principal_inertia_components)
-
-    def _repr_html_(self) -> str:
-        """A table, where a notebook shows it."""
-        rows = [
-            ("mass", f"{self.mass:.6g} kg"),
-            ("centre of mass", ", ".join(f"{v:.6g}" for v in self.com) + " m"),
-            *(("inertia" if i == 0 else "", _html_row(row)) for i, row in enumerate(self.inertia)),
-            ("principal moments", f"{self._moments_words()} kg m²"),
-            *([("frame", html.escape(self.frame))] if self.frame else []),
-        ]
-        return "<table>" + "".join(f"<tr><th>{k}</th><td>{v}</td></tr>" for k, v in rows) + "</table>"
-
     def transformed(self, placement: ArrayLike, frame: str = "") -> MassProps:
-        """The same body after ``placement`` ((4, 4), rigid or mirrored); ``frame`` names the new frame.
+        """Return the same body after ``placement`` ((4, 4), rigid or mirrored); ``frame`` names the new
+        frame.
 
         A placement that scales is refused (InputError): a mass says nothing about what scaling does to it.
         Scaled *geometry* is handled exactly, by :func:`place`.
@@ -205,14 +169,16 @@ class MassProps:
         return MassProps(self.mass, turn @ self.com + matrix[:3, 3], turn @ self.inertia @ turn.T, frame)
 
     def principal(self) -> tuple[Floats, Floats]:
-        """Principal moments ((3,) [kg m^2], ascending) and axes ((3, 3), columns, right-handed)."""
+        """Return the principal moments ((3,) [kg m^2], ascending) and axes ((3, 3), columns,
+        right-handed).
+        """
         moments, axes = np.linalg.eigh((self.inertia + self.inertia.T) / 2)
         if np.linalg.det(axes) < 0:
             axes = axes * np.array([1.0, 1.0, -1.0])
         return moments, axes
 
     def check(self, tolerance: float = CHECK_TOLERANCE) -> tuple[TensorProblem, ...]:
-        """Everything that keeps this from being a rigid body; empty where all is well.
+        """Return everything that keeps this from being a rigid body; empty if all is well.
 
         On eigenvalues, never on the diagonal: diag(.02, .02, .02) with ixy = .015 looks right and is not.
         ``tolerance`` is relative to the largest principal moment; a flat plate (a + b = c) is fine.
@@ -235,37 +201,23 @@ class MassProps:
         return tuple(problems)
 
     def to_inertial(self) -> InertialProperties:
-        """As the spec's plain type, the tensor made exactly symmetric."""
-        t = (self.inertia + self.inertia.T) / 2
-        x, y, z = (float(c) for c in self.com)
-        return InertialProperties(
-            mass=self.mass,
-            com=(x, y, z),
-            ixx=float(t[0, 0]),
-            iyy=float(t[1, 1]),
-            izz=float(t[2, 2]),
-            ixy=float(t[0, 1]),
-            ixz=float(t[0, 2]),
-            iyz=float(t[1, 2]),
-        )
-
-
-_DICT_WANTED = "wanted mass [kg], center_mass (3 numbers) [m] and moment_inertia (3 × 3 numbers) [kg m^2]"
-
-
-def _html_row(values: Floats) -> str:
-    return "&nbsp;&nbsp;".join(f"{v:.6g}" for v in values) + " kg m²"
+        """Return the spec's plain type, the tensor made exactly symmetric."""
+        x, y, z = self.com.tolist()
+        (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = ((self.inertia + self.inertia.T) / 2).tolist()
+        return InertialProperties(self.mass, (x, y, z), ixx, iyy, izz, ixy, ixz, iyz)
 
 
 def parallel_axis(masses: Floats, offsets: Floats) -> Floats:
-    """(3, 3) tensor [kg m^2] of point masses ((N,) [kg]) at ``offsets`` ((N, 3) [m]) about the origin."""
+    """Return (3, 3) tensor [kg m^2] of point masses ((N,) [kg]) at ``offsets`` ((N, 3) [m]) about the
+    origin.
+    """
     second = np.einsum("n,ni,nj->ij", masses, offsets, offsets)
     result: Floats = np.trace(second) * _EYE3 - second
     return result
 
 
 def combine(bodies: Sequence[MassProps]) -> MassProps:
-    """All bodies as one rigid body, in their common frame."""
+    """Return all bodies as one rigid body, in their common frame."""
     if not bodies:
         return MassProps.nothing()
     return combine_arrays(
@@ -276,7 +228,7 @@ def combine(bodies: Sequence[MassProps]) -> MassProps:
 
 
 def combine_arrays(masses: ArrayLike, coms: ArrayLike, inertias: ArrayLike) -> MassProps:
-    """As :func:`combine`, from (N,) [kg], (N, 3) [m], (N, 3, 3) [kg m^2].
+    """Do as :func:`combine`, from (N,) [kg], (N, 3) [m], (N, 3, 3) [kg m^2].
 
     Without any mass the centre is the origin, since there is none.
     """
@@ -293,7 +245,7 @@ def combine_arrays(masses: ArrayLike, coms: ArrayLike, inertias: ArrayLike) -> M
 def place(
     volumes: ArrayLike, coms: ArrayLike, units: ArrayLike, placements: ArrayLike
 ) -> tuple[Floats, Floats, Floats]:
-    """Geometry of N instances after their placements.
+    """Return the geometry of N instances after their placements.
 
     volumes : (N,) [m^3]; coms : (N, 3) [m]; units : (N, 3, 3) [m^5], tensors per unit density about the coms
     placements : (N, 4, 4); rigid, mirrored, or any invertible affine map (then exact as well: the second
@@ -325,7 +277,7 @@ def _stretched(unit: Floats, turn: Floats, stretch: Floats) -> Floats:
 
 
 def rigid_mask(placements: Floats, tolerance: float = RIGID_TOLERANCE) -> NDArray[np.bool_]:
-    """(N,) bool: which of the (N, 4, 4) placements neither scale nor shear (a mirror is rigid)."""
+    """Return (N,) bool: which of the (N, 4, 4) placements neither scale nor shear (a mirror is rigid)."""
     turn = placements[:, :3, :3]
     off = np.abs(turn.transpose(0, 2, 1) @ turn - _EYE3)
     result: NDArray[np.bool_] = off.max(axis=(1, 2)) <= tolerance
@@ -333,12 +285,12 @@ def rigid_mask(placements: Floats, tolerance: float = RIGID_TOLERANCE) -> NDArra
 
 
 def is_rigid(placement: Floats, tolerance: float = RIGID_TOLERANCE) -> bool:
-    """True where a (4, 4) placement neither scales nor shears; a mirror is rigid."""
+    """Report whether a (4, 4) placement neither scales nor shears; a mirror is rigid."""
     return bool(rigid_mask(placement[None], tolerance)[0])
 
 
 def as_placement(value: ArrayLike) -> Floats:
-    """A (4, 4) placement, checked: finite, last row 0 0 0 1, invertible (InputError otherwise)."""
+    """Return a (4, 4) placement, checked: finite, last row 0 0 0 1, invertible (InputError otherwise)."""
     try:
         matrix = np.asarray(value, float)
     except (TypeError, ValueError) as error:

@@ -13,6 +13,10 @@ A map is a small YAML file::
 ``*`` stands for anything within one level, ``?`` for one character, ``**`` for any number of levels. A
 pattern is about instance names; after ``product:`` about product names; after ``path:`` it has no
 wildcards. The first link that matches an instance has it.
+
+A map to start from has every instance in one link, for a person to move lines about: by the links of a URDF
+if there is one (names of links and of their meshes), else by first-level sub-assemblies, else, for exports
+without any, by where the parts are.
 """
 
 from __future__ import annotations
@@ -20,16 +24,19 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import lru_cache
-from pathlib import Path
+from itertools import count, islice
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from silo.bom.errors import ConfigError
+from silo.bom.errors import ConfigError, counted, listed
 from silo.inertia.core import Floats
+from silo.inertia.matching import bare
 from silo.inertia.model import Assembly, Instance
 
 
@@ -50,7 +57,7 @@ class LinkFrame:
     chosen: bool = False
 
     def inverse(self) -> Floats:
-        """(4, 4): assembly's frame → this frame."""
+        """Return (4, 4): assembly's frame → this frame."""
         turn = self.placement[:3, :3].T
         result = np.eye(4)
         result[:3, :3] = turn
@@ -59,7 +66,7 @@ class LinkFrame:
 
 
 def apart(left: Floats, right: Floats) -> tuple[float, float]:
-    """Distance of two placements' origins [m] and the angle between their axes [rad]."""
+    """Return the distance of two placements' origins [m] and the angle between their axes [rad]."""
     turn = left[:3, :3].T @ right[:3, :3]
     cosine = np.clip((np.trace(turn) - 1) / 2, -1.0, 1.0)
     return float(np.linalg.norm(left[:3, 3] - right[:3, 3])), float(np.arccos(cosine))
@@ -69,7 +76,10 @@ ASSEMBLY_FRAME = LinkFrame(np.eye(4), "assembly frame")
 
 
 def origin_frame(xyz: Sequence[float], rpy: Sequence[float]) -> Floats:
-    """(4, 4) placement of a URDF origin: xyz [m], rpy [rad] about fixed axes (R = Rz(y) Ry(p) Rx(r))."""
+    """Return (4, 4) placement of a URDF origin.
+
+    Xyz [m], rpy [rad] about fixed axes (R = Rz(y) Ry(p) Rx(r)).
+    """
     (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
     result = np.eye(4)
     result[:3, :3] = [
@@ -91,12 +101,13 @@ ROOT_LINK = "base_link"
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """One link of a map: its patterns, and its frame as the map asks for it (None: the run's choice)."""
+    """One link of a map: its patterns, its frame as the map asks for it (None: the run's), its weight."""
 
     name: str
     patterns: tuple[str, ...]
     frame_of: str | None = None
     origin: Floats | None = None
+    mass: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +144,12 @@ class Claims:
     rooted: tuple[int, ...] = ()
 
     def frame(self, link: str) -> LinkFrame:
-        """The link's frame; the assembly's where none was set."""
+        """Return the link's frame; the assembly's if none was set."""
         return (self.frames or {}).get(link, ASSEMBLY_FRAME)
 
 
 def read_link_map(path: Path | str) -> LinkMap:
-    """A YAML map. ConfigError with every problem of the file at once."""
+    """Return a YAML map. ConfigError with every problem of the file at once."""
     try:
         text = Path(path).read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -147,7 +158,7 @@ def read_link_map(path: Path | str) -> LinkMap:
 
 
 def _yaml(text: str, source: str) -> Any:
-    """Plain values: texts, lists and dicts, for a link may be called ``on`` or ``1.10``.
+    """Return plain values: texts, lists and dicts, for a link may be called ``on`` or ``1.10``.
 
     YAML lets the last of two equal keys win, which would lose a link's parts in silence.
     """
@@ -174,7 +185,8 @@ def _yaml(text: str, source: str) -> Any:
 
 
 def as_link_map(links: LinkMap | Mapping[str, Any] | Path | str | None) -> LinkMap | None:
-    """What a caller may give for links: a map, its file, or plain values, with or without ``links:`` around.
+    """Return what a caller may give for links: a map, its file, or plain values, with or without
+    ``links:`` around.
 
     ``{"base": ["base*", "plate"]}`` is link → patterns. ConfigError says what was wanted otherwise.
     """
@@ -192,7 +204,7 @@ def as_link_map(links: LinkMap | Mapping[str, Any] | Path | str | None) -> LinkM
 
 
 def link_map(data: Any, source: str = "the link map") -> LinkMap:
-    """As :func:`read_link_map`, from plain values."""
+    """Do as :func:`read_link_map`, from plain values."""
     links = data.get("links") if isinstance(data, dict) else None
     if not isinstance(links, dict) or not links:
         raise ConfigError(f"{source}: wanted “links:” with a list of patterns for each link")
@@ -216,10 +228,10 @@ def _link(name: Any, value: Any, problems: list[str]) -> Link:
     ):
         problems.append(f"{name}: wanted a list of patterns, got {parts!r}")
         patterns = []
-    for key in sorted(set(given) - {"parts", "frame", "origin"}, key=str):
-        problems.append(f"{name}: unknown key “{key}”; known are parts, frame, origin")
+    for key in sorted(set(given) - {"parts", "frame", "origin", "mass"}, key=str):
+        problems.append(f"{name}: unknown key “{key}”; known are parts, frame, origin, mass")
     if "frame" in given and "origin" in given:
-        problems.append(f"{name}: has both a frame and an origin; one of them")
+        problems.append(f"{name}: has both a frame and an origin; give one of them")
     origin: Floats | None = None
     if "origin" in given:
         try:
@@ -231,7 +243,11 @@ def _link(name: Any, value: Any, problems: list[str]) -> Link:
     frame = given.get("frame")
     if frame is not None and not isinstance(frame, str):
         problems.append(f"{name}: frame: wanted the name of a part or sub-assembly, got {frame!r}")
-    return Link(str(name), tuple(patterns), None if frame is None else str(frame), origin)
+    mass = given.get("mass")
+    if mass is not None and not isinstance(mass, str | int | float):
+        problems.append(f"{name}: mass: wanted a mass such as 1.25 kg, got {mass!r}")
+    weight = None if mass is None else str(mass)
+    return Link(str(name), tuple(patterns), None if frame is None else str(frame), origin, weight)
 
 
 def _origin(value: Mapping[str, Any]) -> Floats:
@@ -250,7 +266,7 @@ def claim(assembly: Assembly, links: LinkMap | None = None, root: str = ROOT_LIN
 
 
 def _by_first_level(assembly: Assembly, root: str) -> Claims:
-    """Each first-level sub-assembly is a link; parts that lie beside them belong to the root link.
+    """Make each first-level sub-assembly a link; parts beside them belong to the root link.
 
     Without any sub-assembly the whole is one link, named after the assembly.
     """
@@ -323,7 +339,7 @@ def _frame_of(assembly: Assembly, name: str) -> Floats | None:
 
 
 def matches(pattern: str, instance: Instance) -> bool:
-    """True where a pattern means this instance or a sub-assembly above it."""
+    """Report whether a pattern means this instance or a sub-assembly above it."""
     if pattern.startswith(PATH):
         exact = pattern.removeprefix(PATH)
         return any("/".join(instance.path[:end]) == exact for end in range(1, len(instance.path) + 1))
@@ -340,6 +356,18 @@ def matches(pattern: str, instance: Instance) -> bool:
     return any(regex.fullmatch("/".join(names[:end])) for end in range(1, len(names) + 1))
 
 
+def components(pattern: str, instances: Sequence[Instance]) -> list[list[int]]:
+    """Return the instances of each placed part or sub-assembly that a pattern means, highest level first."""
+    found: dict[tuple[str, ...], list[int]] = {}
+    for index, one in enumerate(instances):
+        levels = (replace(one, path=one.path[:n], product_path=one.product_path[:n]) for n in count(1))
+        for level in islice(levels, len(one.path)):
+            if matches(pattern, level):
+                found.setdefault(level.path, []).append(index)
+                break
+    return list(found.values())
+
+
 @lru_cache(maxsize=1024)
 def _regex(pattern: str) -> re.Pattern[str]:
     text = "/".join(_level(level) for level in pattern.strip("/").split("/"))
@@ -352,7 +380,7 @@ _ANY = "\x00"
 
 
 def _level(level: str) -> str:
-    """One level as a regular expression: ``*`` and ``?`` never cross a slash."""
+    """Return one level as a regular expression: ``*`` and ``?`` never cross a slash."""
     if level == "**":
         return _ANY
     first, *others = (
@@ -361,3 +389,244 @@ def _level(level: str) -> str:
     # The first place that fits a piece is as good as any later one, so no ``*`` is tried twice.
     between = "".join(f"(?>[^/]*?{piece})" for piece in others[:-1])
     return first + between + "".join(f"[^/]*{piece}" for piece in others[-1:])
+
+
+Labels = NDArray[np.intp]
+
+MOST_CLUSTERS = 8
+"""As many links are tried for an export without sub-assemblies, unless the user says how many."""
+
+
+@dataclass(frozen=True)
+class StartingMap:
+    """Links in order, each with the indices of its instances; links of a URDF that nothing is called like.
+
+    how
+        in words, how the instances were given to links.
+    """
+
+    members: Mapping[str, tuple[int, ...]]
+    how: str
+    empty: tuple[str, ...] = ()
+
+
+def starting_map(
+    assembly: Assembly,
+    urdf_links: Mapping[str, Sequence[str]] | None = None,
+    *,
+    root: str = ROOT_LINK,
+    clusters: int | None = None,
+) -> StartingMap:
+    """Give every instance to a link.
+
+    urdf_links
+        link → mesh file names, as a URDF has them. Parts that are called like none go to ``root``.
+    clusters
+        how many links to make of a file without sub-assemblies; None: as many as fit the positions best.
+    """
+    if urdf_links:
+        return _by_urdf(assembly, urdf_links, root)
+    if clusters is None and any(len(instance.path) > 1 for instance in assembly.instances):
+        how = f"each first-level sub-assembly is a link; parts beside them are in {root}"
+        return StartingMap(claim(assembly, root=root).members, how)
+    return _by_position(assembly, clusters)
+
+
+def _by_urdf(assembly: Assembly, urdf_links: Mapping[str, Sequence[str]], root: str) -> StartingMap:
+    owner_of: dict[str, str] = {}
+    for said in (_said_by_links(urdf_links), _said_by_meshes(urdf_links)):
+        for word, name in said.items():
+            owner_of.setdefault(word, name)
+    members: dict[str, list[int]] = {name: [] for name in urdf_links}
+    members.setdefault(root, [])
+    named = 0
+    for index, instance in enumerate(assembly.instances):
+        owner = _owner(instance, owner_of)
+        named += owner is not None
+        members[owner or root].append(index)
+    how = f"{named} of {counted(len(assembly.instances), 'part')} by names of the URDF's links and meshes" + (
+        f"; the others are in {root}" if named < len(assembly.instances) else ""
+    )
+    empty = tuple(name for name, ids in members.items() if not ids)
+    return StartingMap({name: tuple(ids) for name, ids in members.items() if ids}, how, empty)
+
+
+def _said_by_links(urdf_links: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    return _only({word_of(name): name for name in urdf_links}, [word_of(name) for name in urdf_links])
+
+
+def _said_by_meshes(urdf_links: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    pairs = {
+        (word_of(PurePosixPath(mesh.replace("\\", "/")).stem), name)
+        for name, meshes in urdf_links.items()
+        for mesh in meshes
+    }
+    return _only(dict(pairs), [word for word, _ in pairs])
+
+
+def _only(owners: dict[str, str], words: Sequence[str]) -> dict[str, str]:
+    """Leave out words that two links have: a mesh of a wheel that four links share says nothing."""
+    times = Counter(words)
+    return {word: name for word, name in owners.items() if word and times[word] == 1}
+
+
+def word_of(name: str) -> str:
+    """Return the word that "base_link", "Link base" and "base <1>" have in common."""
+    return re.sub(r"^link | link$", "", bare(name))
+
+
+def _owner(instance: Instance, owner_of: Mapping[str, str]) -> str | None:
+    """Find the owner by the innermost level named like a link: a forearm inside an arm is the forearm."""
+    for name, product in reversed([*zip(instance.path, instance.product_path, strict=False)]):
+        for word in (word_of(name), word_of(product)):
+            if word in owner_of:
+                return owner_of[word]
+    return None
+
+
+def _by_position(assembly: Assembly, clusters: int | None) -> StartingMap:
+    points = np.array([_centre(assembly, instance) for instance in assembly.instances]).reshape(-1, 3)
+    labels = _clustered(points, clusters)
+    order = sorted(
+        set(labels.tolist()), key=lambda n: float(np.linalg.norm(points[labels == n].mean(axis=0)))
+    )
+    names = {number: f"link_{place}" for place, number in enumerate(order, start=1)}
+    members = {names[n]: tuple(np.flatnonzero(labels == n).tolist()) for n in order}
+    how = "the file has no sub-assemblies, so parts that lie together are together; a guess by position alone"
+    if len(members) < 2:
+        members = {assembly.name or ROOT_LINK: tuple(range(len(points)))} if len(points) else {}
+        how = "the file has no sub-assemblies, and its parts lie together; --clusters N makes N links"
+    return StartingMap(members, how)
+
+
+def _centre(assembly: Assembly, instance: Instance) -> Floats:
+    turn, shift = instance.transform[:3, :3], instance.transform[:3, 3]
+    result: Floats = turn @ assembly.prototypes[instance.prototype].com_m + shift
+    return result
+
+
+def _clustered(points: Floats, count: int | None) -> Labels:
+    """Return (n,) cluster of each point; the count with the best silhouette, if none is given."""
+    different = len(np.unique(points.round(9), axis=0)) if len(points) else 0
+    if count is not None:
+        return _lloyd(points, max(1, min(count, different)))
+    best: Labels = np.zeros(len(points), np.intp)
+    best_score = 0.6
+    for tried in range(2, min(MOST_CLUSTERS, different // 3) + 1):
+        labels = _lloyd(points, tried)
+        score = _silhouette(points, labels)
+        # A link more must be worth it.
+        if score > best_score + 0.02:
+            best, best_score = labels, score
+    return best
+
+
+def _lloyd(points: Floats, count: int) -> Labels:
+    """Run k-means from the points that lie farthest from each other; the same for the same points."""
+    if not len(points):
+        return np.zeros(0, np.intp)
+    start = int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmax())
+    centres = [points[start]]
+    for _ in range(count - 1):
+        near = np.min([np.linalg.norm(points - centre, axis=1) for centre in centres], axis=0)
+        centres.append(points[int(near.argmax())])
+    labels: Labels = np.full(len(points), -1, np.intp)
+    for _ in range(100):
+        distance = np.array([np.linalg.norm(points - centre, axis=1) for centre in centres])
+        new: Labels = distance.argmin(axis=0)
+        if np.array_equal(new, labels):
+            break
+        labels = new
+        centres = [
+            points[labels == n].mean(axis=0) if (labels == n).any() else centres[n] for n in range(count)
+        ]
+    return labels
+
+
+def _silhouette(points: Floats, labels: Labels) -> float:
+    """Rate clusters from -1 to 1, by distances to the centres of clusters: 1 is tight clusters far apart."""
+    numbers = np.unique(labels)
+    if len(numbers) < 2:
+        return -1.0
+    centres = np.array([points[labels == n].mean(axis=0) for n in numbers])
+    distance = np.linalg.norm(points[:, None] - centres[None], axis=2)
+    own = distance[np.arange(len(points)), np.searchsorted(numbers, labels)]
+    distance[np.arange(len(points)), np.searchsorted(numbers, labels)] = np.inf
+    other = distance.min(axis=1)
+    return float(np.mean((other - own) / np.maximum(np.maximum(other, own), 1e-12)))
+
+
+def as_yaml(start: StartingMap, assembly: Assembly) -> str:
+    """Return the map as YAML, commented; :func:`silo.inertia.links.read_link_map` reads it."""
+    lines = [
+        f"# Link map for {_comment(assembly.source or assembly.name)}, made by `silo-mod links`.",
+        f"# {_comment(start.how[:1].upper() + start.how[1:])}.",
+        "# Each line is a part, or a sub-assembly with all below it. Move lines between links, rename links",
+        "# as your robot calls them, then: silo-mod inertia FILE --links THIS_FILE",
+        "# * is anything within one level, ** any number of levels, product:NAME all uses of a product.",
+        "# `silo-mod links FILE --clusters N` makes N links of parts that lie together; on the page of",
+        "# `silo-mod inertia FILE --html PAGE` clicks give parts to links, and it saves the map.",
+        "links:",
+    ]
+    for name, ids in start.members.items():
+        lines += [f"  {_quoted(name)}:", "    parts:"]
+        for path, below in _lines_of(assembly, start.members, ids):
+            lines.append(f"      - {_quoted(_pattern(path))}  # {_comment(_content(assembly, below))}")
+        frame = ids and assembly.instances[ids[0]].path[:1]
+        if frame and frame in assembly.frames and frame[0] == name:
+            lines.append(f"    # frame: {_quoted(name)}  # numbers in this sub-assembly's own axes")
+    if start.empty:
+        lines.append("# Links of the URDF that nothing in the file is called like; move parts to them:")
+        lines += [f"#  {_quoted(name)}:\n#    parts: []" for name in start.empty]
+    return "\n".join(lines) + "\n"
+
+
+def _lines_of(
+    assembly: Assembly, members: Mapping[str, Sequence[int]], ids: Sequence[int]
+) -> list[tuple[tuple[str, ...], list[int]]]:
+    """Return (path, instances below it), each as high up as everything below belongs to this one link."""
+    owner = {index: name for name, indices in members.items() for index in indices}
+    owners: dict[tuple[str, ...], set[str]] = {}
+    below: dict[tuple[str, ...], list[int]] = {}
+    for index, instance in enumerate(assembly.instances):
+        for end in range(1, len(instance.path) + 1):
+            owners.setdefault(instance.path[:end], set()).add(owner[index])
+            below.setdefault(instance.path[:end], []).append(index)
+    lines: dict[tuple[str, ...], list[int]] = {}
+    for index in ids:
+        path = assembly.instances[index].path
+        end = next((n for n in range(1, len(path) + 1) if len(owners[path[:n]]) == 1), len(path))
+        lines[path[:end]] = below[path[:end]]
+    return list(lines.items())
+
+
+def _pattern(path: tuple[str, ...]) -> str:
+    text = "/".join(path)
+    special = "*" in text or "?" in text or text.startswith((PRODUCT, PATH)) or text.strip("/") != text
+    return PATH + text if special else text
+
+
+def _content(assembly: Assembly, ids: Sequence[int]) -> str:
+    names = Counter(assembly.prototypes[assembly.instances[index].prototype].name for index in ids)
+    return listed([f"{name} ×{count}" if count > 1 else name for name, count in names.most_common()], 4)
+
+
+def _comment(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def _quoted(text: str) -> str:
+    # JSON writes characters above U+FFFF as two halves, which are two characters to YAML.
+    return '"' + "".join(c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08X}" for c in text) + '"'
+
+
+def as_map(start: StartingMap, assembly: Assembly) -> LinkMap:
+    """Return what the YAML says, without writing it."""
+    return link_map(
+        {
+            "links": {
+                name: [_pattern(path) for path, _ in _lines_of(assembly, start.members, ids)]
+                for name, ids in start.members.items()
+            }
+        }
+    )

@@ -1,33 +1,149 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Products ↔ BOM rows, tier by tier. By product and whole name, never by substring, never by likeness. Pure.
+"""Products ↔ BOM rows, tier by tier. By product and whole name, never by substring, never by likeness.
+Pure.
 
 Tiers: the same text; the same but for case, separators and an occurrence mark; the same but for lost
 characters; the same part number. A row that an earlier tier used up is not offered to a later one.
 
-Parts and rows that share a name are told apart by parent, quantity and mass; else in order, with a warning.
+Parts and rows that share a name are distinguished by parent, quantity and mass; else by their order, with a
+warning.
 Rows with equal data are one :class:`Bundle`: nobody needs to distinguish them.
+
+Two names mean the same part if they are equal, equal but for writing, or equal but for lost characters. A
+name inside another never counts ("arm" in "forearm"), nor does likeness: M3x10 and M3x12 are alike to 0.8,
+bracket_2 and bracket_3 to 0.89. Likeness only proposes, and only if all digits agree.
 """
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import SequenceMatcher
 from enum import StrEnum
+from functools import lru_cache
 from itertools import count
 
-from silo.inertia.bom.rows import BOMEntry, BomTable
+from silo.bom.errors import counted, listed
+from silo.inertia.bom.table import BOMEntry, BomTable
 from silo.inertia.codes import Decided, Rule
 from silo.inertia.model import Product
-from silo.inertia.names import bare, could_be, is_lossy, plain
-from silo.inertia.wording import counted, listed
+
+SUGGEST_FROM = 0.84
+"""difflib's ratio from which a name is proposed to the person; docs/decisions has what it was chosen by."""
+
+LOST = "\ufffd"
+"""What stands for an unreadable character; a plain question mark may as well."""
+
+_SEPARATORS = re.compile(r"[\s_\-‐‑–]+")
+_OCCURRENCE = re.compile(r"(?:\s*<\d+>|\s+\(\d+\)|:\d+)$")
+_LOST_RUN = re.compile(rf"[?{LOST}]+")
+
+
+_INVISIBLE = dict.fromkeys(map(ord, "\u00ad\u200b\u200c\u200d\u2060\ufeff"))
+
+
+def plain(name: str) -> str:
+    """Return the name in NFKC, case-folded, without unseen characters.
+
+    Underscores, hyphens, runs of spaces are one space.
+    """
+    return _separated(unicodedata.normalize("NFKC", name.translate(_INVISIBLE)).casefold())
+
+
+def bare(name: str) -> str:
+    """Do as :func:`plain`, without one occurrence mark at the end: ``<2>``, `` (1)``, ``:3``.
+
+    ``_10`` stays: it is part of real part names ("BALL_JHA17.step_10").
+    """
+    return plain(_OCCURRENCE.sub("", name.strip()))
+
+
+def is_lossy(name: str) -> bool:
+    """Report whether characters were lost on the way: "?" or U+FFFD."""
+    return _LOST_RUN.search(name) is not None
+
+
+def could_be(lossy: str, intact: str) -> bool:
+    """Report whether ``lossy`` is ``intact`` with characters lost.
+
+    Only characters outside ASCII get lost, so that "M?" is never "M3". A run of k marks stands for one to k
+    of them (é may become one mark or two). Both compositions of accents are tried.
+    """
+    pattern = _lossy_pattern(lossy)
+    return any(pattern.fullmatch(_fold(intact, form)) is not None for form in ("NFC", "NFD"))
+
+
+@lru_cache(maxsize=4096)
+def _lossy_pattern(lossy: str) -> re.Pattern[str]:
+    text = _fold(lossy, "NFC")
+    pattern = ""
+    end = 0
+    for run in _LOST_RUN.finditer(text):
+        pattern += re.escape(text[end : run.start()]) + rf"[^\x00-\x7f]{{1,{len(run[0])}}}"
+        end = run.end()
+    return re.compile(pattern + re.escape(text[end:]))
+
+
+def _fold(name: str, form: str) -> str:
+    # NFKC would turn ™ into the letters TM, which no mark stands for.
+    normal = unicodedata.normalize("NFC" if form == "NFC" else "NFD", name)
+    return _separated(normal.lower())
+
+
+def _separated(text: str) -> str:
+    return _SEPARATORS.sub(" ", text).strip()
+
+
+def digits(name: str) -> tuple[str, ...]:
+    """Return all runs of digits in a name, in order."""
+    return tuple(re.findall(r"\d+", name))
+
+
+class Suggester:
+    """Names a person may have meant: alike by difflib, all digits equal. For messages only.
+
+    ``budget``: comparisons before it falls silent; proposals are a courtesy, and must not take minutes for a
+    BOM of thousands that fits nothing.
+    """
+
+    def __init__(self, candidates: Iterable[str], budget: int = 100_000) -> None:
+        self._by_digits: dict[tuple[str, ...], dict[str, str]] = {}
+        for name in candidates:
+            self._by_digits.setdefault(digits(name), {}).setdefault(plain(name), name)
+        self._budget = budget
+
+    def near(self, name: str, limit: int = 3) -> tuple[str, ...]:
+        """Return up to ``limit`` names, the nearest first."""
+        fitting = self._by_digits.get(digits(name), {})
+        self._budget -= len(fitting)
+        if not fitting or self._budget < 0:
+            return ()
+        wanted = plain(name)
+        turned = " ".join(sorted(wanted.split()))
+        found = []
+        for candidate in fitting:
+            ratio = max(_alike(wanted, candidate), _alike(turned, " ".join(sorted(candidate.split()))))
+            if ratio >= SUGGEST_FROM:
+                found.append((-ratio, candidate))
+        return tuple(fitting[candidate] for _, candidate in sorted(found)[:limit])
+
+
+def _alike(left: str, right: str) -> float:
+    """Rate likeness from 0 to 1; 0 at once if it cannot reach the limit."""
+    matcher = SequenceMatcher(None, left, right, autojunk=False)
+    if matcher.real_quick_ratio() < SUGGEST_FROM or matcher.quick_ratio() < SUGGEST_FROM:
+        return 0.0
+    return matcher.ratio()
+
 
 MASS_TOLERANCE = 0.02
 """Relative: how well density times volume must fit a mass to decide between rows (quantum apart)."""
 
 DensityOf = Callable[[BOMEntry, Product], float | None]
-"""[kg/m^3] of a row's material (or the part's own density); None where unknown."""
+"""[kg/m^3] of a row's material (or the part's own density); None if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +151,7 @@ class Bundle:
     """Rows of one name that say the same.
 
     quantities
-        pieces in the product by each way of reading structured quantities; empty where unknown.
+        pieces in the product by each way of reading structured quantities; empty if unknown.
     parents
         normalised names of the rows' parent rows ("" = top).
     """
@@ -46,13 +162,13 @@ class Bundle:
 
     @property
     def row(self) -> BOMEntry:
-        """The first row; the others say the same."""
+        """Return the first row; the others say the same."""
         return self.rows[0]
 
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """How a product found its row. ``doubt``: what keeps this from being certain, "" where nothing does."""
+    """How a product found its row. ``doubt``: what keeps this from being certain, "" if nothing does."""
 
     bundle: Bundle
     rule: Rule
@@ -61,7 +177,7 @@ class Match:
 
     @property
     def row(self) -> BOMEntry:
-        """The row (the first of several that say the same)."""
+        """Return the row (the first of several that say the same)."""
         return self.bundle.row
 
 
@@ -80,7 +196,7 @@ def match(
     """Match leaf products first, then sub-assemblies with the rows that no leaf used."""
     matcher = _Matcher(table, _readings(parts, table))
     leaves = {plain(row.name) for row in table.rows if not row.has_children}
-    # A row with children is a part's only where no other row has its name.
+    # A row with children is a part's only if no other row has its name.
     rows = [row for row in table.rows if not row.has_children or plain(row.name) not in leaves]
     by_part = matcher.run(parts, rows, density)
     by_group = matcher.run(groups, table.rows, lambda row, product: None)
@@ -106,7 +222,7 @@ class _Reading(StrEnum):
 
 
 def _readings(products: Sequence[Product], table: BomTable) -> frozenset[_Reading]:
-    """Which reading of the quantities the parts that nothing can be mistaken for agree on; else both.
+    """Return which reading of the quantities the parts that nothing can be mistaken for agree on; else both.
 
     Only rows count on which the readings differ, of a name that one row and one product have.
     """
@@ -138,7 +254,7 @@ class _Matcher:
     def run(
         self, products: Sequence[Product], rows: Sequence[BOMEntry], density: DensityOf
     ) -> dict[str, Match]:
-        """Matches by the products' keys."""
+        """Return the matches by the products' keys."""
         found: dict[str, Match] = {}
         for rule, candidates in _finders(rows):
             wanted = [product for product in products if product.key not in found]
@@ -155,14 +271,14 @@ class _Matcher:
         return _with_doubtful_shapes(products, found)
 
     def _is_open(self, row: BOMEntry, product: Product) -> bool:
-        """A used row still takes a product where its quantity leaves room for all of its instances."""
+        """Let a used row take a product if its quantity leaves room for all of its instances."""
         if not self.taken[id(row)]:
             return True
         total = self._table.total_quantity(row) if _Reading.PER_PARENT in self._read else row.quantity
         return total is not None and self.taken[id(row)] + product.count <= total
 
     def _bundled(self, rows: Sequence[BOMEntry]) -> list[Bundle]:
-        """Rows with equal data together, in the order of their first row."""
+        """Return rows with equal data together, in the order of their first row."""
         groups: dict[tuple[str | None, float | None], list[BOMEntry]] = {}
         for row in rows:
             groups.setdefault(row.data, []).append(row)
@@ -190,7 +306,7 @@ class _Contest:
     found: dict[str, Match] = field(default_factory=dict)
 
     def decide(self) -> None:
-        """A product that is not in ``found`` afterwards has no row."""
+        """Match the products; one that is not in ``found`` afterwards has no row."""
         if len(self.bundles) == 1:
             self._share_one(self.bundles[0])
             return
@@ -208,7 +324,7 @@ class _Contest:
         self.found[product.key] = Match(bundle, self.rule, decided, doubt)
 
     def _share_one(self, bundle: Bundle) -> None:
-        """All products have the one bundle, unless its quantity or mass is that of one of them only."""
+        """Give all products the one bundle, unless its quantity or mass is that of one of them only."""
         decided = Decided.SAME_DATA if len(bundle.rows) > 1 else Decided.ONLY
         takers = self.products
         if len(takers) > 1 and bundle.quantities and sum(p.count for p in takers) not in bundle.quantities:
@@ -237,8 +353,8 @@ class _Contest:
         for product, bundle in list(zip(self.products, self.bundles, strict=False)):
             lines = ", ".join(str(row.line) for row in bundle.rows)
             doubt = (
-                f"{left} named “{product.name}” cannot be told apart by parent, quantity or mass; "
-                f"in order of appearance this one got line {lines}"
+                f"{left} named “{product.name}” cannot be distinguished by parent, quantity or mass; "
+                f"by the order of appearance, this one got line {lines}"
             )
             self._pair(product, bundle, Decided.ORDER, doubt)
 
@@ -252,7 +368,7 @@ class _Contest:
 
 
 def _same_parent(product: Product, bundle: Bundle) -> bool:
-    # Only where the BOM is structured: else every row stands at the top and proves nothing.
+    # Only if the BOM is structured: else every row stands at the top and proves nothing.
     return any(bundle.parents) and {plain(name) for name in product.parents} <= bundle.parents
 
 
@@ -261,7 +377,7 @@ def _may_count(product: Product, bundle: Bundle) -> bool:
 
 
 def _with_doubtful_shapes(products: Sequence[Product], found: dict[str, Match]) -> dict[str, Match]:
-    """A row has one mass; of the different shapes that got it, one at most can weigh that."""
+    """Warn of different shapes that got one row: one of them at most can weigh its mass."""
     by_row: dict[int, list[Product]] = defaultdict(list)
     for product in products:
         if product.key in found and found[product.key].row.has_mass and product.volume_m3 > 0:
@@ -269,7 +385,7 @@ def _with_doubtful_shapes(products: Sequence[Product], found: dict[str, Match]) 
     for same in by_row.values():
         volumes = [product.volume_m3 for product in same]
         if max(volumes) - min(volumes) > 0.01 * max(volumes):
-            names = listed(list(dict.fromkeys(product.name for product in same)))
+            names = listed(list(dict.fromkeys(f"“{product.name}”" for product in same)), 4)
             words = (
                 f"{len(same)} different shapes are named {names} and the BOM has one mass for all of them; "
                 "each got it"
@@ -313,12 +429,12 @@ def _finders(rows: Sequence[BOMEntry]) -> Iterator[tuple[Rule, Finder]]:
 
 
 def _tells_apart(number: str) -> bool:
-    """Exporters number products 1, 2, 3, and so do BOMs; that both count says nothing about a part."""
+    """Report whether a number names a part: exporters and BOMs both count 1, 2, 3."""
     return bool(number.strip()) and not re.fullmatch(r"\s*\d{1,3}\s*", number)
 
 
 def _index(pairs: Iterable[tuple[str, BOMEntry]]) -> Mapping[str, Sequence[BOMEntry]]:
-    """Key → its rows, each once."""
+    """Return key → its rows, each once."""
     index: dict[str, dict[int, BOMEntry]] = defaultdict(dict)
     for key, row in pairs:
         if key:
@@ -329,7 +445,9 @@ def _index(pairs: Iterable[tuple[str, BOMEntry]]) -> Mapping[str, Sequence[BOMEn
 def _components(
     products: Sequence[Product], options: Mapping[str, Sequence[BOMEntry]]
 ) -> list[tuple[list[Product], list[BOMEntry]]]:
-    """Products that compete for the same rows, together with those rows, in order of appearance."""
+    """Return the products that compete for the same rows, together with those rows, in order of
+    appearance.
+    """
     group_of: dict[int, int] = {}
     groups: dict[int, tuple[list[Product], list[BOMEntry]]] = {}
     fresh = count()

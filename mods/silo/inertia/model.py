@@ -33,6 +33,9 @@ class GeometryCode(StrEnum):
     COINCIDENT_SOLIDS = "coincident_solids"  # a solid that lies exactly on another one: counted once
     OVERLAPPING_SOLIDS = "overlapping_solids"  # solids of one product that share space
     COINCIDENT_PARTS = "coincident_parts"  # a part that is placed twice at one place: both are counted
+    BODY_MISSING = "body_missing"  # the file names a body that could not be read as a solid
+    NOT_COUNTED = "not_counted"  # in the file, and not the part: supports, modifiers, what is not built
+    HIDDEN = "hidden"  # the file does not show a body, and it is counted
     NO_SOLID = "no_solid"  # surfaces or wires only
     NO_GEOMETRY = "no_geometry"  # nothing at all: an unresolved external file, an empty product
     EXTERNAL_FILE = "external_file"  # a split assembly's file was found, or was not
@@ -46,8 +49,9 @@ class GeometryCode(StrEnum):
 
 
 @dataclass(frozen=True)
-class GeometryProblem:
-    """One thing a reader noticed. ``code`` is one of :class:`GeometryCode` (or a reader's own word)."""
+class Note:
+    """One thing that was noticed: a sentence, and one of :class:`GeometryCode`, of the other codes, or a
+    reader's own word."""
 
     code: str
     message: str
@@ -86,9 +90,9 @@ class Prototype:
     has_solid
         False: surfaces, wires, or nothing; then the volume is 0.
     step_density, step_material, stated_volume_m3
-        what the file says itself; [kg/m^3], name, [m^3]; None where it says nothing.
+        what the file says itself; [kg/m^3], name, [m^3]; None if it says nothing.
     part_number
-        where the file has one besides the name.
+        if the file has one besides the name.
     mesh
         a handle for preview and cross-check; nothing here looks into it.
     """
@@ -99,7 +103,7 @@ class Prototype:
     com_m: Floats = field(default_factory=lambda: np.zeros(3))
     inertia_unit: Floats = field(default_factory=lambda: np.zeros((3, 3)))
     has_solid: bool = True
-    problems: tuple[GeometryProblem, ...] = ()
+    problems: tuple[Note, ...] = ()
     step_density: float | None = None
     step_material: str | None = None
     stated_volume_m3: float | None = None
@@ -137,7 +141,7 @@ class Instance:
 
     @property
     def name(self) -> str:
-        """The path as people write it: ``arm/forearm/bolt``."""
+        """Return the path as people write it: ``arm/forearm/bolt``."""
         return "/".join(self.path)
 
 
@@ -148,15 +152,15 @@ class Assembly:
     problems
         of the file as a whole; those of one product are on its prototype.
     source, unit
-        the file's path as given, and the length unit it states ("mm", "inch", …; "" where none).
+        the file's path as given, and the length unit it states ("mm", "inch", …; "" if none).
     frames
-        placements ((4, 4), m) of sub-assemblies by instance path, where the reader knows them.
+        placements ((4, 4), m) of sub-assemblies by instance path, if the reader knows them.
     """
 
     name: str
     prototypes: Mapping[str, Prototype]
     instances: tuple[Instance, ...]
-    problems: tuple[GeometryProblem, ...] = ()
+    problems: tuple[Note, ...] = ()
     source: str = ""
     unit: str = ""
     frames: Mapping[tuple[str, ...], Floats] = field(default_factory=dict)
@@ -179,7 +183,7 @@ class Product:
     volume_m3
         of one [m^3]; 0 for sub-assemblies and for products without a solid.
     density
-        that the geometry file states [kg/m^3], None where it states none.
+        that the geometry file states [kg/m^3], None if it states none.
     parents
         product names directly around its instances ("" = the top assembly).
     """
@@ -194,7 +198,9 @@ class Product:
 
 
 def leaf_products(assembly: Assembly) -> tuple[Product, ...]:
-    """Placed prototypes in order of appearance, without companions of a solid (see :func:`companions`)."""
+    """Return the placed prototypes in order of appearance, without companions of a solid (see
+    :func:`companions`).
+    """
     beside = companions(assembly)
     counts: dict[str, int] = defaultdict(int)
     parents: dict[str, set[str]] = defaultdict(set)
@@ -218,7 +224,7 @@ def leaf_products(assembly: Assembly) -> tuple[Product, ...]:
 
 
 def companions(assembly: Assembly) -> frozenset[str]:
-    """Prototypes without a solid that only ever stand beside a solid of the same product.
+    """Return the prototypes without a solid that only ever stand beside a solid of the same product.
 
     Pro/E writes a SOLID and a wire COMPOUND for one product: that is one part, not two of one name.
     """
@@ -237,7 +243,10 @@ def companions(assembly: Assembly) -> frozenset[str]:
 
 
 def sub_assemblies(assembly: Assembly) -> tuple[Product, ...]:
-    """Products that contain others, by name, in order of appearance; ``count`` is that of their instances."""
+    """Return the products that contain others, by name, in order of appearance.
+
+    ``count`` is that of their instances.
+    """
     paths: dict[str, set[tuple[str, ...]]] = {}
     parents: dict[str, set[str]] = defaultdict(set)
     for instance in assembly.instances:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Masses of all instances: a decision per product, then one mass per instance, then sub-assembly rows. Pure.
 
-Rows of sub-assemblies never add mass to that of their parts. A row's mass is used where its parts have no
+Rows of sub-assemblies never add mass to that of their parts. A row's mass is used if its parts have no
 data of their own: a bought motor is one row of the BOM and twelve parts of the STEP file. Where they have,
 the two are compared. A row without children stands for all below it, so that what its mass leaves after the
 parts that are listed elsewhere belongs to the others.
@@ -18,17 +18,18 @@ from numpy.typing import NDArray
 
 from silo.inertia.codes import MassCode, Rule, Source
 from silo.inertia.core import Floats, place, rigid_mask
-from silo.inertia.doubts import (
+from silo.inertia.masses import (
     MISMATCH_LIMIT,
     TOTAL_BY_OTHERS,
+    Decision,
     GivenMass,
-    Note,
+    MassRule,
     implausible,
     looks_like_totals,
+    two_ways,
 )
-from silo.inertia.massrule import Decision, MassRule, two_ways
 from silo.inertia.matching import Match, Matching
-from silo.inertia.model import Assembly, GeometryCode, companions
+from silo.inertia.model import Assembly, GeometryCode, Note, companions
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class Groups:
     def _occurrences(
         self, matches: Mapping[str, Match]
     ) -> Iterator[tuple[Match, tuple[str, ...], list[int]]]:
-        """Each placed sub-assembly that has a row, deepest first, with its instances."""
+        """Yield each placed sub-assembly that has a row, deepest first, with its instances."""
         if not matches:
             return
         below: dict[tuple[str, ...], list[int]] = defaultdict(list)
@@ -106,7 +107,7 @@ class Groups:
             yield matches[product[path]], path, below[path]
 
     def _share(self, match: Match, gaps: list[int], mass: float, *, partly: bool) -> None:
-        """Spread a mass over parts without data by volume, or evenly where none has one."""
+        """Spread a mass over parts without data by volume, or evenly if none has a volume."""
         row = match.row
         weights = self.volume[gaps]
         solid = bool(weights.sum() > 0)
@@ -156,7 +157,7 @@ class Groups:
         return False
 
     def _cover(self, match: Match, gaps: list[int]) -> None:
-        """A row without children and mass stands for the parts that the BOM does not have themselves."""
+        """Let a row without children and mass stand for the parts that the BOM does not list."""
         for index in gaps:
             prototype = self.assembly.prototypes[self.assembly.instances[index].prototype]
             if self.decisions[index].rule is Rule.NONE:
@@ -164,7 +165,7 @@ class Groups:
                 self.mass[index] = (self.decisions[index].density or 0.0) * self.volume[index]
 
     def _set(self, index: int, match: Match, new: Decision) -> None:
-        """One decision per (row, product): instances of one product stay one part in the report."""
+        """Return one decision per (row, product): instances of one product stay one part in the report."""
         key = (match, self.decisions[index], self.assembly.instances[index].prototype)
         self.decisions[index] = self._made.setdefault(key, new)
 
@@ -199,7 +200,7 @@ class Placed:
     groups: Sequence[Occurrence] = ()
 
     def inertia(self, index: NDArray[np.intp]) -> Floats:
-        """(n, 3, 3) [kg m^2] of some instances, about their own centres of mass."""
+        """Return (n, 3, 3) [kg m^2] of some instances, about their own centres of mass."""
         volume = self.volume[index]
         density = np.divide(self.mass[index], volume, out=np.zeros(len(index)), where=volume > 0)
         result: Floats = self.unit[index] * density[:, None, None]
@@ -230,6 +231,37 @@ def place_all(assembly: Assembly, rule: MassRule, matching: Matching) -> Placed:
     return Placed(volume, com, unit, mass, decisions, counted, groups)
 
 
+def weighed(placed: Placed, groups: Sequence[tuple[str, Sequence[int], float]]) -> tuple[Placed, list[Note]]:
+    """Return the instances scaled so that each group weighs what a scale says; notes on what cannot be.
+
+    groups
+        (name, indices, kg), those inside of others first. What has a weight of its own already keeps it, and
+        the rest of its group shares what is left: by its masses, by volume where it has none.
+    """
+    mass, decisions = placed.mass.copy(), list(placed.decisions)
+    notes: list[Note] = []
+    for name, indices, kg in groups:
+        members = [index for index in indices if placed.counted[index]]
+        rest = [index for index in members if decisions[index].source is not Source.TARGET_MASS]
+        left = kg - float(mass[members].sum() - mass[rest].sum())
+        weights = next((w for w in (mass[rest], placed.volume[rest]) if w.sum() > 0), np.ones(len(rest)))
+        if not members or not (left > 0 if rest else abs(left) <= MISMATCH_LIMIT * kg):
+            why = f"its weighed parts sum up to {kg - left:.6g} kg" if members else "nothing is called so"
+            words = f"{name} shall weigh {kg:.6g} kg, but {why}: that was not used"
+            notes.append(Note(MassCode.TARGET_DIFFERS, words))
+            continue
+        words = f"weighed: {name} is {kg:.6g} kg"
+        mass[rest] = left * weights / weights.sum() if rest else []
+        made: dict[Decision, Decision] = {}
+        for index in rest:
+            old = decisions[index]
+            if old not in made:
+                new = replace(old, source=Source.TARGET_MASS, mass_kg=None, density=None, quantum_kg=0.0)
+                made[old] = replace(new, density_source=words)
+            decisions[index] = made[old]
+    return replace(placed, mass=mass, decisions=decisions), notes
+
+
 def _geometry(assembly: Assembly) -> tuple[Floats, Floats, Floats]:
     keys = list(assembly.prototypes)
     at = {key: index for index, key in enumerate(keys)}
@@ -243,7 +275,7 @@ def _geometry(assembly: Assembly) -> tuple[Floats, Floats, Floats]:
 
 
 def _note_totals(decisions: dict[str, Decision]) -> None:
-    """Where the masses that can be checked are row totals, those that cannot are doubtful as well."""
+    """Mark the masses that cannot be checked as doubtful if those that can be are row totals."""
     given = {key: decision for key, decision in decisions.items() if decision.source is Source.BOM_MASS}
     totals = {key: any(note.code == MassCode.ROW_TOTAL for note in d.notes) for key, d in given.items()}
     if not looks_like_totals((d.compared, d.pieces, totals[key]) for key, d in given.items()):

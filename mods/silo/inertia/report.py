@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import html
 import logging
+from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from silo.bom.errors import counted
 from silo.inertia.codes import Decided, Rule, Source
-from silo.inertia.wording import counted
 
 if TYPE_CHECKING:
     from silo.inertia.core import InertialProperties, MassProps, TensorProblem
@@ -20,7 +20,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class PartWarning:
-    """A warning about one part of one link; ``link_name`` or ``part_name`` is "" where it is about none."""
+    """A warning about one part of one link; ``link_name`` or ``part_name`` is "" if it is about none."""
 
     link_name: str
     part_name: str
@@ -35,7 +35,7 @@ class PartResult:
     mass, total_mass
         of one piece and of all [kg].
     volume, com
-        of one piece [m^3]; its centre of mass in the part's own axes [m], None where the pieces have
+        of one piece [m^3]; its centre of mass in the part's own axes [m], None if the pieces have
         axes of their own each (equal shapes that a file holds one by one).
     paths
         instance paths of the pieces, ``/`` between levels.
@@ -44,9 +44,9 @@ class PartResult:
     density
         [kg/m^3] that was used, or that the given mass amounts to; None without a volume.
     quantum
-        the BOM mass is ``mass`` ± this [kg]; 0 where the mass is no rounded figure.
+        the BOM mass is ``mass`` ± this [kg]; 0 if the mass is no rounded figure.
     part_number
-        by the BOM, else by the geometry file; "" where neither has one.
+        by the BOM, else by the geometry file; "" if neither has one.
     lines
         BOM lines it came from.
     products
@@ -73,12 +73,12 @@ class PartResult:
 
     @property
     def quantity(self) -> int:
-        """How many pieces."""
+        """Return how many pieces."""
         return len(self.paths)
 
     @property
     def total_mass(self) -> float:
-        """[kg] of all pieces."""
+        """Return [kg] of all pieces."""
         return self.mass * self.quantity
 
 
@@ -89,7 +89,7 @@ class SubAssemblyResult:
     mass, quantum
         by the BOM, of one [kg] ± this.
     volume, com
-        of one: all its parts [m^3], and their centre of mass in its own axes [m]; None where its occurrences
+        of one: all its parts [m^3], and their centre of mass in its own axes [m]; None if its occurrences
         differ or the file does not say where they are.
     agrees
         its parts sum up to this mass, or got theirs from it.
@@ -118,6 +118,15 @@ class LinkResult:
     frame: LinkFrame
     parts: tuple[PartResult, ...] = ()
     problems: tuple[TensorProblem, ...] = ()
+
+
+@dataclass(frozen=True)
+class Cause:
+    """All warnings of one code, the heaviest part's first; ``mass`` [kg] of the parts and links concerned."""
+
+    code: str
+    mass: float
+    warnings: tuple[PartWarning, ...]
 
 
 @dataclass(repr=False)
@@ -157,8 +166,25 @@ class InertiaReport:
             self._told.add(warning)
             self.warnings.append(warning)
 
+    def causes(self) -> list[Cause]:
+        """Return the warnings by their effect: one cause for each code, those of the most mass first."""
+        masses: dict[tuple[str, str], float] = defaultdict(float)
+        for link in self.links.values():
+            masses[link.name, ""] = link.props.mass
+        for name, part in self.parts():
+            masses[name, part.name] += part.total_mass
+        groups: dict[str, list[PartWarning]] = defaultdict(list)
+        for one in sorted(self.warnings, key=lambda w: -masses.get((w.link_name, w.part_name), 0.0)):
+            groups[str(one.code)].append(one)
+        causes = []
+        for code, warnings in groups.items():
+            places = {(w.link_name, w.part_name) for w in warnings}
+            at_stake = sum(masses.get(place, 0.0) for place in places)
+            causes.append(Cause(code, at_stake, tuple(warnings)))
+        return sorted(causes, key=lambda cause: -cause.mass)
+
     def get_summary(self) -> str:
-        """All warnings by link, in words."""
+        """Return all warnings by link, in words."""
         if not self.warnings:
             return "No warnings."
         lines = [f"{counted(len(self.warnings), 'warning')}:"]
@@ -173,7 +199,7 @@ class InertiaReport:
         return "\n".join(lines)
 
     def print_summary(self) -> None:
-        """Send the summary to the log: as a warning where there are any."""
+        """Send the summary to the log: as a warning if there are any."""
         if self.warnings:
             logger.warning(self.get_summary())
         else:
@@ -181,7 +207,7 @@ class InertiaReport:
 
     @property
     def bodies(self) -> dict[str, MassProps]:
-        """Link → mass properties in the link's frame: numpy arrays, sums, moves, principal axes."""
+        """Return link → mass properties in the link's frame: numpy arrays, sums, moves, principal axes."""
         return {name: link.props for name, link in self.links.items()}
 
     def __repr__(self) -> str:
@@ -189,22 +215,7 @@ class InertiaReport:
         words = f"{counted(len(self.links), 'link')}{mass}, {counted(len(self.warnings), 'warning')}"
         return f"InertiaReport({self.assembly!r}: {words})"
 
-    def _repr_html_(self) -> str:
-        """The links as a table, where a notebook shows it."""
-        head = "".join(
-            f"<th>{w}</th>" for w in ("link", "mass [kg]", "centre of mass [m]", "pieces", "frame")
-        )
-        rows = "".join(
-            f"<tr><td>{html.escape(name)}</td><td>{link.props.mass:.6g}</td>"
-            f"<td>{', '.join(f'{v:.5g}' for v in link.props.com)}</td>"
-            f"<td>{sum(part.quantity for part in link.parts)}</td>"
-            f"<td>{html.escape(link.frame.description)}</td></tr>"
-            for name, link in self.links.items()
-        )
-        said = html.escape(self.get_summary())
-        return f"<table><tr>{head}</tr>{rows}</table><pre>{said}</pre>"
-
     def parts(self) -> tuple[tuple[str, PartResult], ...]:
-        """(link, part) of everything, links first, then the unclaimed ones under ""."""
+        """Return (link, part) of everything, links first, then the unclaimed ones under ""."""
         rows = [(link.name, part) for link in self.links.values() for part in link.parts]
         return (*rows, *(("", part) for part in self.unclaimed))

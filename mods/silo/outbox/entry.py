@@ -19,15 +19,20 @@ moment that ``stage`` returns. ``key`` names it for ever: it is the idempotency 
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 from uuid import uuid4
 
+from silo.api.config import Pause
+from silo.bom.errors import Translate, duration, english
 from silo.bom.model import Extraction
-from silo.durable import Stamp
+from silo.platform import Stamp
 
 
 class State(StrEnum):
@@ -79,6 +84,10 @@ class Commit:
         a colleague's newer revision is there (a file that has only just got its item).
     on_top_of
         the newest revision that a person saw and sends this one on top of (:func:`silo.outbox.store.seen`).
+    document
+        what is in a file that a project sends (:class:`InFile` as JSON); "" for the file of one item.
+    renamed
+        :data:`SAME_PART` where a person saw that the file has a new name.
     """
 
     path: str
@@ -97,6 +106,36 @@ class Commit:
     remark: str = ""
     origin: str = ""
     on_top_of: str = ""
+    document: str = ""
+    renamed: str = ""
+
+
+@dataclass(frozen=True)
+class InFile:
+    """What is in the file of a commit.
+
+    items
+        (identity, object) of each item in it, the main part first.
+    own
+        the commit's identity is the UUID of the document: it holds several items or none. Else its item's.
+    user
+        the identity of the assembly that needs it: a Silo that knows no documents keeps a file without items
+        as an attachment of that.
+    """
+
+    items: tuple[tuple[str, str], ...] = ()
+    own: bool = False
+    user: str = ""
+
+    def to_json(self) -> str:
+        """Return it as text, for :attr:`Commit.document`."""
+        return json.dumps([[list(one) for one in self.items], self.own, self.user])
+
+    @classmethod
+    def of(cls, text: str) -> InFile:
+        """Return what :meth:`to_json` wrote; nothing for ""."""
+        items, own, user = json.loads(text) if text else ((), False, "")
+        return cls(tuple((str(identity), str(name)) for identity, name in items), bool(own), str(user))
 
 
 @dataclass(frozen=True)
@@ -104,7 +143,7 @@ class Entry:
     """A row of the outbox.
 
     server
-        the server that it is meant for, in :func:`silo.api.address.canonical` form; "" until it is first
+        the server that it is meant for, in :func:`silo.api.config.canonical` form; "" until it is first
         tried.
     file_left, bom_left
         what is still to be sent.
@@ -127,6 +166,8 @@ class Entry:
         word that it is :data:`SAME_PART`.
     stamp
         of its file at the commit, as JSON; "" where it was not looked at.
+    document
+        see :class:`Commit`.
     superseded
         a newer file or BOM of the same item has arrived, so that this one would undo it.
     """
@@ -150,8 +191,6 @@ class Entry:
     allow_missing: bool
     remark: str
     reason: str = ""
-    attempts: int = 0
-    next_attempt: float = 0.0
     base_revision: int | None = None
     revision: int | None = None
     origin: str = ""
@@ -161,6 +200,7 @@ class Entry:
     links: str = ""
     renamed: str = ""
     stamp: str = ""
+    document: str = ""
     superseded: bool = False
 
     @property
@@ -177,3 +217,60 @@ class Entry:
     def has_file(self) -> bool:
         """True where a file belongs to the commit, sent or not."""
         return bool(self.copy)
+
+    def is_away(self, here: str) -> bool:
+        """True where it is meant for another server than the one in use; ``here`` may be ""."""
+        return bool(here) and self.server not in ("", here)
+
+
+@dataclass(frozen=True)
+class Words:
+    """How an entry stands, in words: its state, and why. ``urgent``: a person decides."""
+
+    state: str
+    reason: str
+    urgent: bool
+
+
+def words(entry: Entry, here: str, *, is_paused: bool, translate: Translate = english) -> Words:
+    """How an entry stands, for the pane and the command line. ``here``: the address in use, "" for none."""
+    reason, urgent = entry.reason, entry.state is State.HELD or entry.is_away(here)
+    if entry.is_away(here):
+        meant = translate("Silo", "It is meant for {there}, which is not the server in use.")
+        reason = "\n".join(filter(None, (meant.replace("{there}", host_of(entry.server)), reason)))
+        state = translate("Silo", "for another server")
+    elif entry.superseded:
+        state = translate("Silo", "out of date")
+        reason = translate("Silo", "A newer commit of it has arrived since; this one would undo it.")
+    elif entry.state is State.HELD:
+        state = translate("Silo", "held for your choice")
+    elif entry.state is State.KEEPING:
+        state = translate("Silo", "being copied")
+        reason = reason or translate("Silo", "Its file is being copied.")
+    elif is_paused:
+        state = translate("Silo", "paused")
+    else:
+        state = translate("Silo", "tried again later") if reason else translate("Silo", "waiting")
+    return Words(state, reason, urgent)
+
+
+def parts(entry: Entry, translate: Translate = english) -> str:
+    """What of an entry is not in Silo yet."""
+    if entry.file_left and entry.bom_left:
+        return translate("Silo", "file and BOM")
+    return translate("Silo", "BOM") if entry.bom_left else translate("Silo", "file")
+
+
+def pause_text(pause: Pause, server: str, now: float, translate: Translate = english) -> str:
+    """Why nothing is sent to a server now, and until when."""
+    text = translate("Silo", "Nothing is sent to {host} before you retry: {reason}")
+    if not math.isinf(left := pause.left(now)):
+        text = translate("Silo", "Nothing is sent to {host} for {time}: {reason}")
+    for name, value in (("host", host_of(server)), ("time", duration(left)), ("reason", pause.reason)):
+        text = text.replace(f"{{{name}}}", value)
+    return text
+
+
+def host_of(address: str) -> str:
+    """An address as people read it."""
+    return urlsplit(address).netloc or address

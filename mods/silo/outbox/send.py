@@ -4,6 +4,8 @@
 For each entry: look the item up, send the file, compare the BOM, merge it. What has arrived is noted at
 once, so that a run which dies is continued by the next one. What an error means is :mod:`silo.api.policy`'s
 to say.
+
+What became of commits that were sent.
 """
 
 from __future__ import annotations
@@ -17,12 +19,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from silo.api.address import canonical
-from silo.api.client import SendApi
-from silo.api.files import Origin
-from silo.api.policy import Backoff, Scope, Then, judge
-from silo.api.revisions import (
+from silo.api.client import SiloClient
+from silo.api.config import Pause, canonical
+from silo.api.files import (
+    DocumentId,
     MayHaveArrivedError,
+    Origin,
     SentFile,
     Standing,
     checksum_of,
@@ -33,8 +35,10 @@ from silo.api.revisions import (
     other_name,
     standing,
 )
+from silo.api.policy import Backoff, Scope, Then, is_certain, judge, pause_after
 from silo.api.transport import Cancel, stop_if
-from silo.api.wire import LinkedFile, MergeRequest, Revision, SourceDocument
+from silo.api.wire import HeldItem, LinkedFile, MergeRequest, MergeResult, Revision, SourceDocument
+from silo.bom.compare import MergePlan
 from silo.bom.errors import (
     CancelledError,
     ConflictError,
@@ -43,22 +47,86 @@ from silo.bom.errors import (
     MissingRevisionError,
     NewerRevisionError,
     NotFoundError,
+    ReadOnlyError,
     RouteMissingError,
     SiloError,
 )
 from silo.bom.report import from_plain, project_folder
 from silo.bom_sync import Resolved, Status, decide, merge_request, resolve, server_lines
-from silo.outbox.database import OutboxError
-from silo.outbox.entry import ASKED, SAME_PART, Entry, State
-from silo.outbox.report import Report, Sent, went_alone
-from silo.outbox.store import Store
+from silo.outbox.entry import ASKED, SAME_PART, Entry, InFile, State, new_key
+from silo.outbox.store import OutboxError, Store
+
+
+@dataclass(frozen=True)
+class Sent:
+    """What became of one commit.
+
+    status
+        of the BOM; None where there was none to sync.
+    plan
+        what was compared; None where the request was made by an earlier run.
+    revision
+        the file's new revision; None where it had none, or the server had this very file already.
+    sync_id
+        names the BOM's merge; "" where there was none to sync.
+    """
+
+    entry: Entry
+    part_number: str
+    status: Status | None = None
+    resolved: Resolved | None = None
+    plan: MergePlan | None = None
+    result: MergeResult | None = None
+    revision: int | None = None
+    sync_id: str = ""
+
+    @property
+    def number(self) -> str:
+        """The item's part number; "" for a document without one."""
+        return "" if isinstance(self.part_number, DocumentId) else self.part_number
+
+    @property
+    def page(self) -> str:
+        """Where a person looks at it on the server."""
+        return f"/items/{self.number}/bom" if self.number else f"/documents/{self.part_number}"
+
+
+@dataclass
+class Report:
+    """What became of a run.
+
+    sent, held, failed
+        commits that arrived; entries that a person must look at; entries that failed in passing.
+    stopped_by
+        why the run ended early: nothing answers, read-only, a wrong token, or a person's stop.
+    pause
+        why nothing is sent to this server now; None where all went well.
+    busy
+        another process or thread is sending.
+    """
+
+    sent: list[Sent] = field(default_factory=list)
+    held: list[Entry] = field(default_factory=list)
+    failed: list[Entry] = field(default_factory=list)
+    stopped_by: SiloError | None = None
+    pause: Pause | None = None
+    busy: bool = False
+
+
+def went_alone(entry: Entry) -> list[str]:
+    """Says which half of a commit with file and BOM the server has, where the other one was refused."""
+    if not entry.has_file or entry.file_left == entry.bom_left:
+        return []
+    there, left = ("BOM", "file") if entry.file_left else ("file", "BOM")
+    return [f"Its {there} is in Silo; only the {left} is not"]
+
 
 PAUSES = Backoff(first=5.0, longest=900.0)
 
 
 def send_all(
     store: Store,
-    client: SendApi,
+    client: SiloClient,
     *,
     cancelled: Cancel | None = None,
     on_progress: Callable[[Entry, int, int], object] | None = None,
@@ -67,19 +135,26 @@ def send_all(
     backoff: Backoff = PAUSES,
     chance: Callable[[], float] = random.random,
 ) -> Report:
-    """Send what waits for this client's server and is due, oldest first, in order per item.
+    """Send what waits for this client's server, oldest first, in order per item; nothing in a pause.
 
-    Never raises for what the server or the network does: the report says it, entry by entry.
+    Never raises for what the server or the network does: the report says it. An error of all is a pause of
+    the server and touches no entry; an error in passing of one item is a pause of that item.
 
     force
-        also what is to be tried later only (a person pressed the button, the connection came back).
+        end all pauses of this server first: a person pressed the button.
     """
     with store.send_lock() as mine:
         if not mine:
             return Report(busy=True)
         store.sweep()
+        if force:
+            store.resume(client.base_url)
+            for entry in store.entries():
+                if entry.newer.get("set_back") and entry.server == canonical(client.base_url):
+                    store.retry(entry.id)
         run = _Run(store, client, cancelled, on_progress, on_sent, backoff, chance)
-        run.all(force=force)
+        run.all()
+        run.report.pause = store.pause(client.base_url)
         return run.report
 
 
@@ -94,7 +169,7 @@ class _PassingError(SiloError):
 @dataclass
 class _Run:
     store: Store
-    client: SendApi
+    client: SiloClient
     cancelled: Cancel | None
     on_progress: Callable[[Entry, int, int], object] | None
     on_sent: Callable[[Sent], object] | None
@@ -102,8 +177,11 @@ class _Run:
     chance: Callable[[], float]
     report: Report = field(default_factory=Report)
     behind: set[str] = field(default_factory=set)  # items whose older entry has to go first
+    _documents: bool | None = None  # whether the server knows documents; None: not asked yet
 
-    def all(self, *, force: bool) -> None:
+    def all(self) -> None:
+        if self._is_paused():
+            return
         last = 0
         # Read anew each time: what is added or discarded meanwhile counts.
         while self.report.stopped_by is None and (found := self.store.next_due(self.client.base_url, last)):
@@ -113,33 +191,46 @@ class _Run:
                 self.store.finish(found.key)
             if (entry := self.store.entry(found.id)) is None:
                 continue
-            if (
-                entry.state is not State.WAITING
-                or entry.keys & self.behind
-                or not (force or self._is_due(entry))
-            ):
+            is_ready = entry.state is State.WAITING and not entry.keys & self.behind
+            if not is_ready or self._is_paused(entry.item):
                 self.behind |= entry.keys
                 continue
             self._try(entry)
 
-    def _is_due(self, entry: Entry) -> bool:
-        # A pause that is longer than any that we make was noted before the clock was set back.
-        return not 0 < entry.next_attempt - self.store.clock() <= 4 * self.backoff.longest
+    def _is_paused(self, item: str = "") -> bool:
+        pause = self.store.pause(self.client.base_url, item)
+        return pause is not None and pause.left(self.store.clock()) > 0
+
+    def _pause(self, error: SiloError, item: str = "") -> None:
+        server = self.client.base_url
+        before, now = self.store.pause(server, item), self.store.clock()
+        failures = (before.failures if before is not None else 0) + 1
+        self.store.set_pause(server, pause_after(error, failures, now, self.backoff, self.chance()), item)
+
+    def _go_well(self, item: str) -> None:
+        for one in ("", item):
+            if self.store.pause(self.client.base_url, one) is not None:
+                self.store.set_pause(self.client.base_url, None, one)
 
     def _try(self, entry: Entry) -> None:
         refused: list[SiloError] = []
         try:
             stop_if(self.cancelled)
-            # On disk before a byte is sent: whoever comes after a crash knows that it may have arrived.
             server = entry.server or canonical(self.client.base_url)
-            self.store.update(entry.id, attempts=entry.attempts + 1, server=server)
-            sent = self._send(replace(entry, attempts=entry.attempts + 1, server=server), refused)
+            if server != entry.server:
+                # On disk before a byte is sent: whoever comes after a crash knows that it may have arrived.
+                self.store.update(entry.id, server=server)
+            sent = self._send(replace(entry, server=server), refused)
         except SiloError as error:
             self._failed(entry, error)
             return
-        if refused:
+        waits = [error for error in refused if _waits(error)]
+        if len(waits) < len(refused):
             self._hold(entry, refused)
+        elif waits:
+            self._later(entry, refused[0], self._reasons(entry, refused))
         elif sent is not None:
+            self._go_well(entry.item)
             self.report.sent.append(sent)
             if self.on_sent is not None:
                 self.on_sent(sent)
@@ -150,23 +241,32 @@ class _Run:
         if isinstance(error, CancelledError):
             self.report.stopped_by = error
             return
-        passing = isinstance(error, _PassingError)
-        verdict = judge(error, self.client.ready)
-        if not passing and verdict.then is Then.PERSON and verdict.scope is not Scope.ALL:
-            self._hold(entry, [error])
+        if isinstance(error, _PassingError):
+            self._later(entry, error, str(error))
             return
-        pause = self.backoff.pause(entry.attempts + 1, self.chance(), verdict.wait)
-        self.store.update(entry.id, reason=str(error), next_attempt=self.store.clock() + pause)
+        verdict = judge(error, self.client.ready)
+        if verdict.scope is Scope.ALL:
+            self.report.stopped_by = error
+            self._pause(error)
+        elif verdict.then is Then.PERSON:
+            self._hold(entry, [error])
+        else:
+            self._later(entry, error, str(error))
+
+    def _later(self, entry: Entry, error: SiloError, reason: str) -> None:
+        """Let an entry that failed alone, in passing, wait with its reason; later ones of its item too."""
+        self._pause(error, entry.item)
+        self.store.update(entry.id, reason=reason)
         now = self.store.entry(entry.id) or entry
         self.report.failed.append(now)
         self.behind |= now.keys
-        if not passing and verdict.scope is Scope.ALL:
-            self.report.stopped_by = error
+
+    def _reasons(self, entry: Entry, errors: Sequence[SiloError]) -> str:
+        now = self.store.entry(entry.id) or entry
+        return "\n".join([*map(str, errors), *(went_alone(now) if any(self.store.bom(entry.id)) else ())])
 
     def _hold(self, entry: Entry, errors: Sequence[SiloError]) -> None:
-        now = self.store.entry(entry.id) or entry
-        reasons = [*map(str, errors), *(went_alone(now) if any(self.store.bom(entry.id)) else ())]
-        self.store.update(entry.id, state=State.HELD, reason="\n".join(reasons))
+        self.store.update(entry.id, state=State.HELD, reason=self._reasons(entry, errors))
         self.report.held.append(self.store.entry(entry.id) or entry)
 
     # -- one entry --------------------------------------------------------------------------------------
@@ -182,8 +282,11 @@ class _Run:
         if number.casefold() in self.behind:
             self.behind.add(entry.item)
             return None
-        entry = replace(entry, part_number=number)
-        self.store.update(entry.id, part_number=number)
+        known, entry = entry.part_number, replace(entry, part_number=number)
+        if not number:
+            return self._attach(entry)
+        if number != known and not isinstance(number, DocumentId):
+            self.store.update(entry.id, part_number=number)
         if entry.has_file and not entry.file_left and not self._is_there(entry):
             entry = self._again(entry)
         sent = Sent(entry, number, resolved=resolved, revision=entry.revision)
@@ -192,7 +295,8 @@ class _Run:
                 sent = self._send_file(sent)
                 entry = replace(sent.entry, file_left=False)
             except SiloError as error:
-                _refuse(error, refused)
+                # An upload whose answer was lost may have arrived, so it keeps its BOM back.
+                _refuse(error, refused, alone=is_certain(error))
                 if isinstance(error, MayHaveArrivedError):
                     # A person who presses Retry has looked at these revisions.
                     self.store.update(entry.id, base_revision=error.newest)
@@ -205,7 +309,7 @@ class _Run:
             try:
                 return self._send_bom(replace(sent, entry=entry), request)
             except SiloError as error:
-                _refuse(error, refused)
+                _refuse(error, refused, alone=not _waits(error) and is_certain(error))
         return sent
 
     def _is_there(self, entry: Entry) -> bool:
@@ -214,6 +318,8 @@ class _Run:
             known = self.client.revisions(entry.part_number)
         except RouteMissingError:
             return True
+        except NotFoundError:
+            return False
         return is_there(known, entry.file_name, entry.sha256, entry.revision)
 
     def _again(self, entry: Entry) -> Entry:
@@ -228,15 +334,49 @@ class _Run:
             raise InputError(f"{entry.label}: its BOM cannot be read any more; commit it again") from error
 
     def _number(self, entry: Entry) -> str:
+        """The item or document that the file goes to; "" for an attachment of the assembly that needs it."""
+        within = InFile.of(entry.document)
+        if within.own and self._knows_documents():
+            return DocumentId(entry.identity)
         if entry.part_number and not entry.identity:
             return entry.part_number
-        item: Any = self.client.get_item_by_uuid(entry.identity) if entry.identity else None
+        if within.own and not within.items:
+            return ""
+        identity = within.items[0][0] if within.own else entry.identity
+        if not identity:
+            raise InputError(
+                f"{entry.file_name}: it is not known which item it belongs to. Save a copy of it"
+            )
+        item: Any = self.client.get_item_by_uuid(identity) if identity else None
         if item is None:
             raise NotFoundError(
                 f"Silo does not know {entry.label or entry.path}; register it, or check that this is the "
                 "right server"
             )
         return str(item["part_number"])
+
+    def _knows_documents(self) -> bool:
+        if self._documents is None:
+            try:
+                self.client.get_documents(["00000000-0000-0000-0000-000000000000"])
+                self._documents = True
+            except RouteMissingError:
+                self._documents = False
+        return self._documents
+
+    def _attach(self, entry: Entry) -> Sent:
+        """Send a file without an item to a Silo that knows no documents: it becomes an attachment."""
+        user: Any = self.client.get_item_by_uuid(InFile.of(entry.document).user)
+        if user is None:
+            raise NotFoundError(
+                f"{entry.label or entry.path}: this Silo keeps a file without a part number as an attachment "
+                "of the assembly that links to it, and that assembly has none; register it"
+            )
+        number = str(user["part_number"])
+        self.client.attach_file(number, self._copy(entry), entry.file_name, cancelled=self.cancelled)
+        self.store.arrived(entry, "file")
+        told = f"This Silo keeps it as an attachment of {number}, without revisions"
+        return Sent(replace(entry, remark=told), number)
 
     def _send_file(self, sent: Sent) -> Sent:
         entry = sent.entry
@@ -253,7 +393,7 @@ class _Run:
             self._check_name(entry, known)
             base = self._base(entry, known)
             # What the server had before us. Without this note, a file that equals an older revision could
-            # not be told from our own that had already arrived.
+            # not be distinguished from our own that had already arrived.
             self.store.update(entry.id, base_revision=newest_number(known))
         else:
             known = self._revisions(sent.part_number, after=entry.base_revision)
@@ -281,8 +421,27 @@ class _Run:
         if not entry.origin:
             return None
         stands = self._standing(entry, known, entry.origin)
+        self._check_set_back(entry, stands)
         stands.check(entry.part_number)
         return max(stands.base_number, 0)
+
+    def _check_set_back(self, entry: Entry, stands: Standing) -> None:
+        """Say so where the server has lost the revision that the file was made from, and its newest one is an
+        older one that is known here: nothing of a colleague would be undone."""
+        newest, made_from = stands.newer, entry.origin
+        if newest is None or not checksum_of(newest):
+            return
+        base, older = (
+            self.store.known_revision(entry.server, content, entry.identity)
+            for content in (made_from, checksum_of(newest))
+        )
+        before = any(one.newer.get("set_back") and one.item == entry.item for one in self.store.entries())
+        if older == newest.revision_number and (before or (base is not None and base > older)):
+            raise NewerRevisionError(
+                f"The server was set back: it has revision {older} of {entry.part_number}, and this is newer "
+                "and came after what it has lost. Retry all sends it again",
+                {**newest.model_dump(mode="json", exclude={"properties", "links"}), "set_back": True},
+            )
 
     def _standing(self, entry: Entry, known: Sequence[Revision], content: str) -> Standing:
         number = self.store.known_revision(entry.server, content, entry.identity)
@@ -291,24 +450,35 @@ class _Run:
     def _upload(self, entry: Entry, base: int | None) -> Revision:
         progress = self.on_progress
         links = [LinkedFile.model_validate(one) for one in json.loads(entry.links)] if entry.links else None
+        held = [HeldItem(item=item, object=name) for item, name in InFile.of(entry.document).items]
         try:
             return self.client.upload_file(
                 entry.part_number,
-                self.store.verified(entry),
+                self._copy(entry),
                 entry.comment,
                 on_progress=None if progress is None else lambda done, total: progress(entry, done, total),
                 file_name=entry.file_name,
                 idempotency_key=entry.key,
                 sha256=entry.sha256,
-                origin=Origin(base_revision=base, file_path=entry.place, links=links),
+                origin=Origin(base_revision=base, file_path=entry.place, links=links, items=held or None),
                 cancelled=self.cancelled,
             )
-        except (OSError, DocumentError) as error:
-            # This is the disk, and not damage: the hash of a damaged copy differs. People know their own
-            # file, not our copy.
-            reason = error.reason if isinstance(error, DocumentError) else error.strerror or str(error)
-            told = f"the copy kept for sending cannot be read ({reason})"
-            raise _PassingError(f"{entry.path or entry.file_name}: {told}") from error
+        except DocumentError as error:  # people know their own file, not our copy
+            raise self._unreadable(entry, error.reason) from error
+
+    def _copy(self, entry: Entry) -> Path:
+        try:
+            return self.store.verified(entry)
+        except FileNotFoundError as error:
+            text = "the copy kept for sending is gone, so it was not sent. Commit the document again, then "
+            raise InputError(f"{entry.path or entry.file_name}: {text}discard this") from error
+        except OSError as error:
+            raise self._unreadable(entry, error.strerror or str(error)) from error
+
+    def _unreadable(self, entry: Entry, reason: str) -> _PassingError:
+        # This is the disk, and not damage: the hash of a damaged copy differs.
+        told = f"the copy kept for sending cannot be read ({reason})"
+        return _PassingError(f"{entry.path or entry.file_name}: {told}")
 
     def _revisions(
         self, part_number: str, *, newest: int | None = None, after: int = 0
@@ -317,6 +487,10 @@ class _Run:
             return self.client.revisions(part_number, newest=newest, after=after)
         except RouteMissingError:
             return ()
+        except NotFoundError:
+            if not isinstance(part_number, DocumentId):
+                raise
+            return ()  # its first upload makes it
 
     def _check_name(self, entry: Entry, known: Sequence[Revision]) -> None:
         """Refuse a file that has another name than the item's: "Save As" copies the identity along.
@@ -346,6 +520,10 @@ class _Run:
             request = merge_request(resolved, entry.key).model_dump_json(by_alias=True, exclude_none=True)
         try:
             wanted = self._named(self._at_revision(entry), request)
+            before = MergeRequest.model_validate_json(request).document
+            if before is not None and before != wanted.document:
+                # It was sent so; the server knows that name with another content.
+                wanted = wanted.model_copy(update={"sync_id": new_key()})
             # As it is sent now it is sent again: the server knows a merge by its sync_id and its content.
             self.store.update(entry.id, request=wanted.model_dump_json(by_alias=True, exclude_none=True))
             result = self.client.merge_bom(sent.part_number, wanted, cancelled=self.cancelled)
@@ -393,13 +571,13 @@ class _Run:
         return wanted.model_copy(update={"sync_id": wanted.sync_id or entry.key, "document": document})
 
 
-def _refuse(error: SiloError, refused: list[SiloError]) -> None:
-    """Note an error that a person must look at; any other ends the entry's turn."""
-    verdict = judge(error, lambda: None)
-    if (
-        isinstance(error, (_PassingError, OutboxError))
-        or verdict.then is not Then.PERSON
-        or verdict.scope is Scope.ALL
-    ):
+def _refuse(error: SiloError, refused: list[SiloError], *, alone: bool) -> None:
+    """Note an error that concerns one half of a commit ``alone``; any other ends the entry's turn."""
+    if not alone or isinstance(error, _PassingError | OutboxError | CancelledError):
         raise error
     refused.append(error)
+
+
+def _waits(error: SiloError) -> bool:
+    """True for the refusal of one half that may be over by itself."""
+    return isinstance(error, ReadOnlyError) or judge(error, lambda: None).then is Then.RETRY

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The outbox on disk: a row for each commit (:mod:`silo.outbox.database`), beside it the copies of their
-files.
+"""The outbox on disk: the copy of each commit's file, its description beside it, and an index of both.
 
 The rules of this module:
 
-* a row is there before any file of it, and gone before they are: a file whose row is gone may be removed at
-  once, and nothing else may;
+* ``KEY.json`` beside the copy describes a commit whole: item, document, hash, base revision, comment, server,
+  time. It is written before its row is committed, and a commit ends when it is renamed to ``KEY.gone``;
+* the SQLite file is an index. Where it is missing, damaged, foreign or of another format it is made anew from
+  the descriptions, and the old file is kept aside. Nothing that was not sent is deleted here;
 * a copy has its name only when it is whole and on disk, and its row the copy's hash;
-* several processes may share the file; who sends holds the send lock, which ends with its process;
+* several processes may share the folder; who sends, and who still has to copy a file, holds a lock, which
+  ends with its process;
 * a disk error leaves things as they are. Damage is a hash that differs or a BOM that cannot be parsed.
 
-Standard library only: the first commit of a session must not wait for imports.
+Every transaction is on disk when it returns. Methods open the file for themselves, so any thread and process
+may call them. Standard library only: the first commit of a session must not wait for imports.
 """
 
 from __future__ import annotations
@@ -20,25 +23,432 @@ import json
 import os
 import shutil
 import sqlite3
+import threading
 import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager, nullcontext, suppress
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from silo.api.address import canonical
+from silo.api.config import Pause, canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError
 from silo.bom.report import to_plain
-from silo.durable import remove_patiently, replacing, stamp_of
 from silo.files import content_hash, seen_as
-from silo.folders import data_folder
-from silo.outbox.database import Origins, OutboxError
 from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
+from silo.platform import (
+    data_folder,
+    hold_lock,
+    private_file,
+    read_memory,
+    remove_patiently,
+    replace_patiently,
+    replacing,
+    stamp_of,
+    sync_folder,
+)
+
+VERSION = 8
+# What a saved file was made from is forgotten after two years.
+_REMEMBERED = 2 * 366 * 86400.0
+# A copy of a file that was replaced is kept for so long, or until a person deletes it.
+KEPT_ASIDE_DAYS = 90
+_NEWEST_DAYS = 3
+
+_TABLES = """
+CREATE TABLE entry (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    key TEXT NOT NULL UNIQUE,
+    server TEXT NOT NULL DEFAULT '',
+    state TEXT NOT NULL CHECK (state IN ('keeping', 'waiting', 'held')),
+    path TEXT NOT NULL,
+    label TEXT NOT NULL DEFAULT '',
+    identity TEXT NOT NULL DEFAULT '',
+    part_number TEXT NOT NULL DEFAULT '',
+    taken_at REAL NOT NULL,
+    comment TEXT NOT NULL DEFAULT '',
+    file_left INTEGER NOT NULL DEFAULT 0,
+    file_name TEXT NOT NULL DEFAULT '',
+    copy TEXT NOT NULL DEFAULT '',
+    sha256 TEXT NOT NULL DEFAULT '',
+    size INTEGER NOT NULL DEFAULT 0,
+    stamp TEXT NOT NULL DEFAULT '',        -- JSON; of the file at the commit
+    bom_left INTEGER NOT NULL DEFAULT 0,
+    allow_missing INTEGER NOT NULL DEFAULT 0,
+    remark TEXT NOT NULL DEFAULT '',
+    reason TEXT NOT NULL DEFAULT '',
+    base_revision INTEGER,
+    revision INTEGER,
+    origin TEXT NOT NULL DEFAULT '',
+    on_top_of TEXT NOT NULL DEFAULT '',    -- number and SHA-256
+    newer TEXT NOT NULL DEFAULT '',        -- JSON; "" where there is none
+    place TEXT NOT NULL DEFAULT '',
+    links TEXT NOT NULL DEFAULT '',        -- JSON; "" where nobody looked
+    renamed TEXT NOT NULL DEFAULT '',      -- '', 'asked', 'same part'
+    document TEXT NOT NULL DEFAULT '',     -- JSON; "" for the file of one item
+    extraction TEXT NOT NULL DEFAULT '',   -- JSON; "" where there is none
+    request TEXT NOT NULL DEFAULT ''       -- JSON; written before it is sent, and then sent again unchanged
+);
+CREATE TABLE sent (
+    server TEXT NOT NULL,
+    item TEXT NOT NULL COLLATE NOCASE,     -- a part number or an identity
+    kind TEXT NOT NULL CHECK (kind IN ('file', 'bom')),
+    entry_id INTEGER NOT NULL,             -- the newest entry that arrived
+    PRIMARY KEY (server, item, kind)
+);
+CREATE TABLE pause (
+    server TEXT NOT NULL,
+    item TEXT NOT NULL DEFAULT '',         -- '': of the whole server
+    until REAL NOT NULL,
+    reason TEXT NOT NULL,
+    code TEXT NOT NULL,
+    failures INTEGER NOT NULL,
+    told INTEGER NOT NULL,
+    PRIMARY KEY (server, item)
+);
+CREATE TABLE derived (
+    sha256 TEXT PRIMARY KEY,               -- a file that was saved, and not committed
+    origin TEXT NOT NULL,                  -- the committed file that it was made from
+    at REAL NOT NULL
+);
+CREATE TABLE known (
+    server TEXT NOT NULL,
+    sha256 TEXT NOT NULL,
+    item TEXT NOT NULL COLLATE NOCASE,     -- its identity
+    revision INTEGER NOT NULL,
+    PRIMARY KEY (server, sha256, item)
+);
+"""
+
+
+_TABLE_NAMES = ("entry", "sent", "pause", "derived", "known")
+# Another process may be making the database; it takes no longer.
+_PATIENCE_S = 20.0
+
+_LOST = "what belonged to it is lost: only {} is left. Save a copy and commit it again, then discard this"
+
+
+class OutboxError(InputError):
+    """The outbox cannot be used now: its disk is full, its database is locked, or nobody may write there."""
+
+
+class Database:
+    """The file, and the folder of copies beside it; made where they are missing, for their owner only."""
+
+    def __init__(self, path: Path, clock: Callable[[], float] = time.time) -> None:
+        self.path = path
+        self.clock = clock
+        self.copies = path.parent / f"{path.stem}-files"
+        self._lock = threading.Lock()
+        self._is_ready = False
+
+    @contextmanager
+    def transaction(self) -> Iterator[sqlite3.Connection]:
+        """All or nothing, on disk when it returns."""
+        with self._open() as db, _transaction(db):
+            yield db
+
+    @contextmanager
+    def send_lock(self) -> Iterator[bool]:
+        """True for the one process and thread that may send now; the lock ends with its process."""
+        self._make_ready()
+        with self._translated():
+            lock = hold_lock(self.path.with_suffix(".lock"))
+        with lock or nullcontext():
+            yield lock is not None
+
+    @contextmanager
+    def _open(self) -> Iterator[sqlite3.Connection]:
+        self._make_ready()
+        with self._translated(), ExitStack() as stack:
+            db = stack.enter_context(closing(self._connect()))
+            if not self._is_ours(db):  # it was deleted or replaced while we run
+                stack.pop_all().close()
+                self._is_ready = False
+                self._make_ready()
+                db = stack.enter_context(closing(self._connect()))
+            db.execute("PRAGMA synchronous = FULL")
+            yield db
+
+    def _connect(self) -> sqlite3.Connection:
+        db = sqlite3.connect(self.path, timeout=_PATIENCE_S, isolation_level=None)
+        db.row_factory = sqlite3.Row
+        return db
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        try:
+            yield
+        except (sqlite3.Error, OSError) as error:
+            self._is_ready = False  # if it is damaged, the next call makes it anew
+            raise OutboxError(
+                f"{self.path}: the outbox cannot be used now ({error}). What waits in it is still there. "
+                "Make room on the disk or mend its permissions, then try again"
+            ) from error
+
+    def _make_ready(self) -> None:
+        """Make folders and file when they are first needed: not where FreeCAD has only just started."""
+        with self._lock:
+            if not self._is_ready:
+                self._prepare()
+                self._is_ready = True
+
+    def _prepare(self) -> None:
+        try:
+            self.copies.mkdir(mode=0o700, parents=True, exist_ok=True)
+            # Made for its owner only before SQLite opens it; the -wal and -shm files take over its mode.
+            for path in (self.path, self.path.with_suffix(".lock"), self.path.with_suffix(".making")):
+                private_file(path)
+            sync_folder(self.path.parent)
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: the outbox cannot be made ({error.strerror or error}). Nothing was kept for "
+                "sending; make room or mend the permissions, then commit again"
+            ) from error
+        with self._translated():
+            if not self._is_whole():
+                with self._alone():
+                    if not self._is_whole():  # another process was quicker
+                        self._make_anew()
+
+    def _is_ours(self, db: sqlite3.Connection) -> bool:
+        try:
+            return bool(db.execute("PRAGMA user_version").fetchone()[0] == VERSION)
+        except sqlite3.OperationalError:
+            raise
+        except sqlite3.DatabaseError:  # no database at all
+            return False
+
+    def _is_whole(self) -> bool:
+        """True where the file is our database in this format, and no page of it is damaged."""
+        with closing(self._connect()) as db:
+            if not self._is_ours(db):
+                return False
+            try:
+                for name in _TABLE_NAMES:
+                    db.execute(f"SELECT * FROM {name} LIMIT 0")  # noqa: S608
+                db.execute(f"{_SELECT} LIMIT 0")
+                return bool(db.execute("PRAGMA quick_check(1)").fetchone()[0] == "ok")
+            except sqlite3.DatabaseError as error:
+                if isinstance(error, sqlite3.OperationalError) and "no such" not in str(error):
+                    raise
+                return False
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Held while the database is made: two processes may begin in the same moment."""
+        until = time.monotonic() + _PATIENCE_S
+        while (lock := hold_lock(self.path.with_suffix(".making"))) is None:
+            if time.monotonic() > until:
+                raise OutboxError(f"{self.path}: another program makes this outbox and does not end")
+            time.sleep(0.02)
+        with lock:
+            yield
+
+    def _make_anew(self) -> None:
+        """Make the database from the descriptions and what can be read of the old file, which is kept."""
+        old = {name: self._readable(name) for name in _TABLE_NAMES}
+        for end in ("", "-wal", "-shm"):
+            file = self.path.with_name(self.path.name + end)
+            if file.exists() and file.stat().st_size:
+                replace_patiently(file, self.aside(file.name))
+        private_file(self.path)
+        with closing(self._connect()) as db:
+            with suppress(sqlite3.OperationalError):  # SQLite does not wait for others here
+                db.execute("PRAGMA journal_mode = WAL")
+            db.execute("PRAGMA synchronous = FULL")
+            with _transaction(db):
+                for statement in filter(None, map(str.strip, _TABLES.split(";\n"))):
+                    db.execute(statement)
+                self._reconcile(db, old)
+                db.execute(f"PRAGMA user_version = {VERSION}")
+
+    def _readable(self, table: str) -> list[dict[str, Any]]:
+        found: list[dict[str, Any]] = []
+        with suppress(sqlite3.DatabaseError), closing(self._connect()) as db:
+            for row in db.execute(f"SELECT * FROM {table}"):  # noqa: S608
+                found.append(dict(row))  # what comes before the damage counts
+        return found
+
+    def aside(self, path: str) -> Path:
+        """A new place for a copy of a file; its folder is there. DocumentError where it cannot be made."""
+        folder = self._kept_aside / time.strftime("%Y-%m-%d")
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        except OSError as error:
+            raise DocumentError(str(folder), f"cannot be made ({error.strerror or error})") from error
+        return folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
+
+    @property
+    def _kept_aside(self) -> Path:
+        return self.path.parent / "kept-aside"
+
+    # -- descriptions -----------------------------------------------------------------------------------
+
+    def _described(self, key: str) -> Path:
+        return self.copies / f"{key}.json"
+
+    def _describe(self, db: sqlite3.Connection, key: str) -> None:
+        """Write a row beside its copy; called before the transaction ends."""
+        row = db.execute("SELECT * FROM entry WHERE key = ?", (key,)).fetchone()
+        with replacing(self._described(key)) as file:
+            file.write(json.dumps(dict(row)).encode())
+
+    def _end(self, db: sqlite3.Connection, entry: Entry) -> None:
+        """Forget a commit; its files go once the transaction is on disk."""
+        db.execute("DELETE FROM entry WHERE id = ?", (entry.id,))
+        with suppress(FileNotFoundError):
+            replace_patiently(self._described(entry.key), self.copies / f"{entry.key}.gone")
+        sync_folder(self.copies)
+
+    def _reconcile(
+        self, db: sqlite3.Connection, old: Mapping[str, Iterable[Mapping[str, Any]]] | None = None
+    ) -> None:
+        """Make rows and descriptions agree: whichever a crash or a lost database has left out is made.
+
+        old
+            table → rows of a database that is given up; a description is newer than a row.
+        """
+        names = sorted(name for name in os.listdir(self.copies) if not name.startswith("."))
+        gone = {_key_of(name) for name in names if name.endswith(".gone")}
+        db.executemany("DELETE FROM entry WHERE key = ?", [(key,) for key in gone])
+        known = _keys(db)
+        lost = {_key_of(name): name for name in names if not name.endswith((".json", ".gone"))}
+        found = []
+        for name in names:
+            key = _key_of(name)
+            if name == f"{key}.json" and key not in known | gone:
+                if (row := read_memory(self.copies / name)).get("key") == key:
+                    found.append(row)
+                elif not self._described(key).exists():
+                    gone.add(key)  # it ended in this moment, by a program that still has the old database
+                else:
+                    replace_patiently(self.copies / name, self.aside(name))
+                    lost.setdefault(key, "")
+        for one in sorted(found, key=lambda one: int(one["id"])):
+            _insert(db, "entry", one)
+        for table, rows in (old or {}).items():
+            for before in rows:
+                if table != "entry" or before.get("key") not in {None, *gone}:
+                    _insert(db, table, before)
+        for key in lost.keys() - _keys(db) - gone:
+            _insert(db, "entry", self._found(key, lost[key]))
+        for key in _keys(db):
+            if not self._described(key).exists():
+                self._describe(db, key)
+
+    def _found(self, key: str, copy: str) -> dict[str, Any]:
+        """The row of a commit whose description is lost, so that a person sees it."""
+        reason = _LOST.format("a copy of its file" if copy else "its name")
+        row = {"key": key, "state": State.HELD, "path": "", "taken_at": self.clock(), "reason": reason}
+        return {**row, "file_name": copy, "copy": copy, "file_left": bool(copy)}
+
+
+def _keys(db: sqlite3.Connection) -> set[str]:
+    return {str(row[0]) for row in db.execute("SELECT key FROM entry")}
+
+
+def _insert(db: sqlite3.Connection, table: str, values: Mapping[str, Any]) -> None:
+    """Insert what this format knows of a row, unless it is there."""
+    columns = {str(row["name"]) for row in db.execute(f"PRAGMA table_info({table})")}
+    row = {name: value for name, value in values.items() if name in columns}
+    if "id" in row and db.execute("SELECT 1 FROM entry WHERE id = ?", (row["id"],)).fetchone():
+        del row["id"]
+    db.execute(
+        f"INSERT OR IGNORE INTO {table} ({', '.join(row)}) VALUES (:{', :'.join(row)})",  # noqa: S608
+        row,
+    )
+
+
+class Origins(Database):
+    """What files were made from, as far as it is known here."""
+
+    def origin_of(self, sha256: str) -> str:
+        """SHA-256 of the committed file that a file with this content was made from, as far as is known here;
+        the content itself where it was never saved over.
+
+        A file that was saved first and committed then is a committed one itself, also while it waits.
+        """
+        with self._open() as db:
+            row = db.execute(
+                "SELECT origin FROM derived WHERE sha256 = :sha256"
+                " AND NOT EXISTS (SELECT 1 FROM known WHERE sha256 = :sha256)"
+                " AND NOT EXISTS (SELECT 1 FROM entry WHERE sha256 = :sha256)",
+                {"sha256": sha256},
+            ).fetchone()
+        return str(row[0]) if row else sha256
+
+    def derived(self, sha256: str, origin: str) -> None:
+        """A file was saved without being committed; it was made from ``origin``."""
+        if not sha256 or sha256 == origin:
+            return
+        with self.transaction() as db:
+            db.execute("INSERT OR REPLACE INTO derived VALUES (?, ?, ?)", (sha256, origin, self.clock()))
+            db.execute("DELETE FROM derived WHERE at < ?", (self.clock() - _REMEMBERED,))
+
+    def known_revision(self, server: str, sha256: str, item: str) -> int | None:
+        """The revision that a file is, for servers that keep no checksums; None where that is not known."""
+        with self._open() as db:
+            row = db.execute(
+                "SELECT revision FROM known WHERE server = ? AND sha256 = ? AND item = ?",
+                (canonical(server), sha256, item),
+            ).fetchone()
+        return int(row[0]) if row else None
+
+    def learn(self, server: str, sha256: str, item: str, revision: int) -> None:
+        """This file is that revision of an item."""
+        if not (sha256 and item):
+            return
+        with self.transaction() as db:
+            row = (canonical(server), sha256, item, revision)
+            db.execute("INSERT OR REPLACE INTO known VALUES (?, ?, ?, ?)", row)
+
+    def forget_aside(self) -> None:
+        """Remove the copies of the days that are over :data:`KEPT_ASIDE_DAYS` ago; nothing else in there.
+
+        The newest days that have copies stay: the clock may be months ahead.
+        """
+        limit = self.clock() - KEPT_ASIDE_DAYS * 86400.0
+        oldest = time.strftime("%Y-%m-%d", time.localtime(limit))
+        days = sorted(self._kept_aside.glob("[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]"))
+        for folder in days[:-_NEWEST_DAYS]:
+            with suppress(OSError):
+                if folder.name < oldest and folder.stat().st_mtime < limit and not folder.is_symlink():
+                    shutil.rmtree(folder, ignore_errors=True)
+
+    def keep_aside(self, path: str) -> Path | None:
+        """Keep a copy of a file that is about to be replaced; where it is, None where there is no file.
+
+        Raises DocumentError where the disk does not take it.
+        """
+        target = self.aside(path)
+        try:
+            shutil.copy2(path, target)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            told = f"no copy of it could be kept ({error.strerror or error}); it was not replaced"
+            raise DocumentError(path, told) from error
+        return target
+
+
+@contextmanager
+def _transaction(db: sqlite3.Connection) -> Iterator[None]:
+    db.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+    except BaseException:
+        db.execute("ROLLBACK")
+        raise
+    db.execute("COMMIT")
+
 
 _BLOCK = 1 << 20
 # A second name that no row has is one for which a commit may just be coming.
 _HELD_AGE = 3600.0
+
+# The folder of a second name that is a copy, where the disk has no second names.
+_COPIED = "copied"
 
 # All but what may be large.
 _COLUMNS = ", ".join(one.name for one in fields(Entry) if one.name != "superseded")
@@ -50,8 +460,11 @@ _SELECT = f"""SELECT {_COLUMNS}, EXISTS (
 # What of a commit goes into its row as it is.
 _AS_GIVEN = (
     *("key", "path", "label", "identity", "part_number", "taken_at", "comment", "allow_missing", "remark"),
-    *("sha256", "request", "origin", "on_top_of"),
+    *("sha256", "request", "origin", "on_top_of", "document", "renamed"),
 )
+
+
+_PAUSE = "until, reason, code, failures, told"
 
 
 class _WrittenError(OSError):
@@ -68,28 +481,37 @@ class Store(Origins):
     def __init__(self, path: Path | None = None, *, clock: Callable[[], float] = time.time) -> None:
         super().__init__(path or data_folder() / "outbox.sqlite3", clock)
         self._held = self.path.parent / f"{self.path.stem}-held"
-        self._coming: set[str] = set()
+        self._coming: dict[str, BinaryIO | None] = {}
 
     # -- a commit comes in ------------------------------------------------------------------------------
 
     def hold(self, path: str, key: str) -> Path | None:
-        """Keep a file's present content by a second name, which takes no time; None where it cannot.
+        """Keep a file's present content, by a second name, which takes no time, else by a copy; None where
+        the disk takes neither.
 
         FreeCAD writes a new file at each save and renames it, so the old content lives on under this name.
         """
         held = self._held / key / os.path.basename(path)
         try:
             held.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            os.link(path, held)
+            with suppress(OSError):  # exFAT, many shares, another disk
+                os.link(path, held)
+                if stamp_of(held) == stamp_of(path):
+                    return held
+                # Some network disks give each name of a file a number of its own: a later look at the second
+                # name would take it for another file.
+                remove_patiently(held)
+            stamp, held = stamp_of(path), held.parent / _COPIED / held.name
+            held.parent.mkdir(mode=0o700)
+            self._copied(Path(path), held, json.dumps(stamp))
         except OSError:
             return None
-        if stamp_of(held) != stamp_of(path):
-            # Some network disks give each name of a file a number of its own: a later look at the second name
-            # would take it for another file.
-            with suppress(OSError):
-                remove_patiently(held)
-            return None
         return held
+
+    def _second(self, key: str) -> Path | None:
+        """What :meth:`hold` has kept for a commit."""
+        found = (path for path in (self._held / key).rglob("*") if path.is_file())
+        return next((path for path in found if not path.name.endswith(".part")), None)
 
     def stage(self, commit: Commit, server: str = "") -> None:
         """Put a commit's row on disk, which takes no time; the caller then calls :meth:`finish`."""
@@ -101,22 +523,45 @@ class Store(Origins):
             "stamp": json.dumps(commit.stamp) if commit.stamp else "",
             "file_left": commit.file is not None,
             "file_name": os.path.basename(commit.path) or (commit.file.name if commit.file else ""),
-            "copy": f"{commit.key}{commit.file.suffix[:20]}" if commit.file is not None else "",
+            "copy": f"{commit.key}{_ending(commit.file)}" if commit.file is not None else "",
             "bom_left": bool(commit.extraction is not None or commit.request),
             "extraction": json.dumps(to_plain(commit.extraction)) if commit.extraction is not None else "",
         }
-        if commit.file is not None:
-            self._coming.add(commit.key)
         try:
             with self.transaction() as db:
+                if commit.file is not None:
+                    # What has a second name may be copied by any program, even if this one does not end.
+                    self._coming[commit.key] = None
+                    if self._held not in commit.file.parents:
+                        self._held.mkdir(mode=0o700, exist_ok=True)
+                        self._coming[commit.key] = hold_lock(self._coming_lock(commit.key))
                 db.execute(f"INSERT INTO entry ({', '.join(row)}) VALUES (:{', :'.join(row)})", row)  # noqa: S608
+                self._describe(db, commit.key)
         except BaseException:
-            self._coming.discard(commit.key)
+            self._has_come(commit.key)
             raise
 
+    def _coming_lock(self, key: str) -> Path:
+        return self._held / f"{key}.lock"
+
+    def _has_come(self, key: str) -> None:
+        if lock := self._coming.pop(key, None):
+            lock.close()
+            with suppress(OSError):
+                remove_patiently(self._coming_lock(key))
+
     def is_coming(self, key: str) -> bool:
-        """True where this program staged a commit and is about to copy its file: nobody else does it then."""
-        return key in self._coming
+        """True where a living program is about to copy a commit's file: nobody else does it then."""
+        if key in self._coming:
+            return True
+        path = self._coming_lock(key)
+        with self._translated():
+            lock = hold_lock(path) if path.exists() else None
+            if lock is None:
+                return path.exists()
+            with lock, suppress(OSError):
+                remove_patiently(path)
+        return False
 
     def finish(self, key: str, source: Path | None = None, origin: str = "") -> str:
         """Make the copy of a staged commit's file, from its second name rather than from ``source``.
@@ -131,7 +576,7 @@ class Store(Origins):
         try:
             self._finish(key, source, origin)
         finally:
-            self._coming.discard(key)
+            self._has_come(key)
         entry = self.by_key(key)
         return entry.sha256 if entry is not None else ""
 
@@ -139,7 +584,7 @@ class Store(Origins):
         entry = self.by_key(key)
         if entry is None or not entry.file_left or entry.sha256:
             return
-        held, copy = next(iter((self._held / key).glob("*")), None), self.copies / entry.copy
+        held, copy = self._second(key), self.copies / entry.copy
         # A copy that has its name is whole: only its row was not written any more.
         content = copy if copy.exists() else held or source
         if content is None:
@@ -147,7 +592,8 @@ class Store(Origins):
             self.update(entry.id, state=State.HELD, reason=text)
             return
         try:
-            sha256, size = self._copied(content, copy, entry.stamp)
+            is_copied = content.parent.name == _COPIED and content is held
+            sha256, size = self._copied(content, copy, "" if is_copied else entry.stamp)
         except _WrittenError as error:
             if held is not None:
                 told = f"{entry.path or entry.file_name}: {error}; commit it again, then discard this"
@@ -164,6 +610,8 @@ class Store(Origins):
         place = _place(copy, entry.path)
         self.update(entry.id, state=State.WAITING, sha256=sha256, size=size, reason="", **place, **known)
         shutil.rmtree(self._held / key, ignore_errors=True)
+        if self.by_key(key) is None:  # discarded meanwhile
+            self._drop_files(entry)
 
     def _lost(self, entry: Entry, content: Path, reason: str) -> DocumentError:
         with suppress(OutboxError):  # a row that stays has no file: the next sending holds it and says so
@@ -194,11 +642,12 @@ class Store(Origins):
                 "would undo it. Discard it"
             )
         ready = State.WAITING if entry.sha256 or not entry.file_left else State.KEEPING
-        changed: dict[str, Any] = {"state": ready, "reason": "", "next_attempt": 0.0}
+        changed: dict[str, Any] = {"state": ready, "reason": ""}
         changed["renamed"] = SAME_PART if entry.renamed == ASKED else entry.renamed
         if entry.newer:
             changed |= {"on_top_of": seen(entry.newer), "newer": ""}
-            changed["comment"] = on_top(entry.comment, entry.newer)
+            if not entry.newer.get("set_back"):
+                changed["comment"] = on_top(entry.comment, entry.newer)
         if server is not None and canonical(server) != entry.server:
             # What was seen of the old server says nothing of the new one.
             changed |= {"server": canonical(server), "base_revision": None, "on_top_of": ""}
@@ -207,6 +656,7 @@ class Store(Origins):
             # What was refused is made anew: the missing part may have its number now.
             changed["request"] = ""
         self.update(entry_id, **changed)
+        self.set_pause(changed.get("server", entry.server), None, entry.item)
 
     def discard(self, entry_id: int, *, keep: bool = False) -> None:
         """Forget an entry and its copy; the document itself is not touched.
@@ -217,18 +667,43 @@ class Store(Origins):
         if keep and entry.file_left:
             self.save_copy(entry_id, self.aside(entry.file_name))
         with self.transaction() as db:
-            db.execute("DELETE FROM entry WHERE id = ?", (entry_id,))
+            self._end(db, entry)
+            db.execute("DELETE FROM pause WHERE item = ?", (entry.item,))
+        self._has_come(entry.key)
         self._drop_files(entry)
 
     def save_copy(self, entry_id: int, target: Path) -> None:
         """Write an entry's file somewhere else, as it is, also where it is damaged."""
         entry = self._known(entry_id)
-        held = next(iter((self._held / entry.key).glob("*")), None)
+        held = self._second(entry.key)
         try:
             with open(held or self.copies / entry.copy, "rb") as read, replacing(target, mode=0o644) as out:
                 shutil.copyfileobj(read, out, _BLOCK)
         except OSError as error:
             raise DocumentError(str(target), f"cannot be written ({error.strerror or error})") from error
+
+    # -- pauses -----------------------------------------------------------------------------------------
+
+    def pause(self, server: str, item: str = "") -> Pause | None:
+        """The last pause of a server, or of one item there; None where all went well since."""
+        where = (canonical(server), item)
+        with self._open() as db:
+            row = db.execute(f"SELECT {_PAUSE} FROM pause WHERE server = ? AND item = ?", where).fetchone()  # noqa: S608
+        return Pause(**dict(row) | {"told": bool(row["told"])}) if row else None
+
+    def set_pause(self, server: str, pause: Pause | None, item: str = "") -> None:
+        """Note a pause, or that there is none."""
+        where = (canonical(server), item)
+        with self.transaction() as db:
+            db.execute("DELETE FROM pause WHERE server = ? AND item = ?", where)
+            if pause is not None:
+                row = (*where, *(getattr(pause, name) for name in _PAUSE.split(", ")))
+                db.execute(f"INSERT INTO pause (server, item, {_PAUSE}) VALUES (?, ?, ?, ?, ?, ?, ?)", row)  # noqa: S608
+
+    def resume(self, server: str, *, told: bool = True) -> None:
+        """End all pauses of a server; ``told``: also those that the server named."""
+        with self.transaction() as db:
+            db.execute("DELETE FROM pause WHERE server = ? AND told <= ?", (canonical(server), told))
 
     # -- reading and changing ---------------------------------------------------------------------------
 
@@ -260,7 +735,9 @@ class Store(Origins):
         """Set columns of an entry."""
         columns = ", ".join(f"{name} = :{name}" for name in values)
         with self.transaction() as db:
-            db.execute(f"UPDATE entry SET {columns} WHERE id = :id", {**values, "id": entry_id})  # noqa: S608
+            row = {**values, "id": entry_id}
+            for found in db.execute(f"UPDATE entry SET {columns} WHERE id = :id RETURNING key", row):  # noqa: S608
+                self._describe(db, found[0])
 
     def arrived(
         self,
@@ -286,14 +763,17 @@ class Store(Origins):
                 changes = "file_left = 0, revision = ?" if kind == "file" else "bom_left = 0, revision = ?"
                 number = revision if kind == "file" else entry.revision
                 db.execute(f"UPDATE entry SET {changes} WHERE id = ?", (number, entry.id))  # noqa: S608
+                self._describe(db, entry.key)
             else:
-                db.execute("DELETE FROM entry WHERE id = ?", (entry.id,))
+                self._end(db, entry)
             if base is not None:
-                db.execute(
+                changed = db.execute(
                     "UPDATE entry SET revision = ? WHERE server = ? AND identity = ? AND revision = ?"
-                    " AND NOT file_left",
+                    " AND NOT file_left RETURNING key",
                     (revision, entry.server, entry.identity, base),
-                )
+                ).fetchall()
+                for row in changed:
+                    self._describe(db, row[0])
             for item in filter(None, {entry.identity, entry.part_number} if note else ()):
                 db.execute(
                     "INSERT INTO sent VALUES (?, ?, ?, ?) ON CONFLICT (server, item, kind)"
@@ -317,21 +797,23 @@ class Store(Origins):
         return path
 
     def sweep(self) -> None:
-        """Remove files whose row is gone, second names without a commit, and what was kept aside long ago."""
-        self._make_ready()
+        """Make rows and descriptions agree, and remove what ended and what was kept aside long ago."""
+        with self.transaction() as db:
+            self._reconcile(db)
+            keys = _keys(db)
+            # Listed before others may write again: what comes later is a commit.
+            ended = {_key_of(name) for name in os.listdir(self.copies)} - keys
         self.forget_aside()
+        for key in ended:
+            self._drop(key)
         with suppress(OSError):
-            # Files first, then rows: a file's row was there before it.
-            files = [*self.copies.iterdir()]
-            held = [*self._held.iterdir()] if self._held.is_dir() else []
-            keys = {entry.key for entry in self.entries()}
-            for file in files:
-                if _key_of(file.name) not in keys:
-                    with suppress(OSError):
-                        remove_patiently(file)
-            for folder in held:
-                if folder.name not in keys and self.clock() - folder.stat().st_mtime > _HELD_AGE:
-                    shutil.rmtree(folder, ignore_errors=True)
+            for folder in [*self._held.iterdir()] if self._held.is_dir() else []:
+                is_old = self.clock() - folder.stat().st_mtime > _HELD_AGE
+                if _key_of(folder.name) not in keys and is_old:
+                    with suppress(OSError, DocumentError):
+                        for file in [path for path in folder.rglob("*") if path.is_file()]:
+                            replace_patiently(file, self.aside(file.name))
+                        shutil.rmtree(folder)
 
     def _copied(self, source: Path, copy: Path, stamp: str) -> tuple[str, int]:
         if source == copy:
@@ -348,11 +830,15 @@ class Store(Origins):
 
     def _drop_files(self, entry: Entry) -> None:
         """Remove what the row had; what cannot be removed now is swept up later."""
-        with suppress(OSError):
-            for name in os.listdir(self.copies):
-                if _key_of(name) == entry.key:
-                    remove_patiently(self.copies / name)
+        self._drop(entry.key)
         shutil.rmtree(self._held / entry.key, ignore_errors=True)
+
+    def _drop(self, key: str) -> None:
+        with suppress(OSError):
+            # The mark that it has ended goes last: a copy alone would be taken for a lost commit.
+            names = [name for name in os.listdir(self.copies) if _key_of(name) == key]
+            for name in sorted(names, key=lambda one: one.endswith(".gone")):
+                remove_patiently(self.copies / name)
 
     def _one(self, where: str, *values: Any) -> Entry | None:
         with self._open() as db:
@@ -404,3 +890,9 @@ def _entry(row: sqlite3.Row) -> Entry:
 def _key_of(copy: str) -> str:
     """Whose copy it is; one that is being made, or was cut off, has a point before its name."""
     return copy.lstrip(".").split(".")[0]
+
+
+def _ending(file: Path) -> str:
+    """The ending of a copy; never that of a description."""
+    ending = file.suffix[:20]
+    return f".copy{ending}" if ending.casefold() in (".json", ".gone") else ending

@@ -27,7 +27,7 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.bom.model import BomEntry
-from silo.bom.naming import Proposal
+from silo.bom.resolve import Proposal
 from silo.registering.journal import Journal, Record
 from silo.standard_items import Memory, by_description, server_of
 
@@ -132,7 +132,7 @@ def register(
     component = component_key(proposal.entry)
     try:
         check(proposal.entry)
-        with journal.turn():
+        with journal.turn(str(getattr(api, "base_url", ""))):
             uid = document_uid(proposal.entry)
             item, found = _lost(api, journal, component, uid), True
             if item is None:

@@ -8,6 +8,7 @@ must be found again then.
 
 from __future__ import annotations
 
+import hashlib
 import sqlite3
 import time
 import uuid
@@ -17,8 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from silo.bom.errors import InputError
-from silo.durable import private_file, private_folder
-from silo.folders import data_folder
+from silo.platform import data_folder, private_file, private_folder
 
 _TABLE = """
 CREATE TABLE IF NOT EXISTS registrations (
@@ -125,17 +125,19 @@ class Journal:
             return frozenset(row[0] for row in db.execute("SELECT item_id FROM registrations"))
 
     @contextmanager
-    def turn(self) -> Iterator[None]:
-        """Held while one component is registered, so that two processes never make an item for the same one.
+    def turn(self, server: str = "") -> Iterator[None]:
+        """Hold while one component is registered at a server: two processes never make an item for the same
+        one, and a slow server holds nobody up at another.
 
         A transaction on a database of its own: the system ends it with the process, however that dies.
         """
-        with closing(self._locked()):
+        name = hashlib.sha256(server.encode()).hexdigest()[:16]
+        with closing(self._locked(self.path.with_name(f"{self.path.stem}-{name}.lock"))):
             yield
 
-    def _locked(self) -> sqlite3.Connection:
+    def _locked(self, path: Path) -> sqlite3.Connection:
         with self._translated():
-            db = self._connect(self.path.with_suffix(".lock"), self._patience)
+            db = self._connect(path, self._patience)
             try:
                 db.execute("BEGIN EXCLUSIVE")
             except sqlite3.OperationalError as error:

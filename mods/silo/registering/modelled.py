@@ -3,9 +3,8 @@
 
 Nothing here counts: an identity on the object does, and a person gives it. The rules of this module:
 
-* an inline part that holds geometry and no component is offered as a whole, not piece by piece;
-* equal copies are proposed as one article: the same shape, or the same label but for FreeCAD's number;
-* what another feature consumes is no part.
+* what is shown, how often, and what is used up, the count says (:mod:`silo.bom.walk.roles`);
+* equal copies are proposed as one article: the same shape, or the same label but for FreeCAD's number.
 """
 
 from __future__ import annotations
@@ -18,14 +17,11 @@ from typing import Any
 
 from silo.bom.document import label_of, located, object_name, own
 from silo.bom.errors import DocumentError, InputError, SiloError
-from silo.bom.identity import document_identity, own_identity
-from silo.bom.model import BomEntry
-from silo.bom.naming import is_generic
+from silo.bom.model import BomEntry, document_identity, own_identity
+from silo.bom.resolve import is_generic
 from silo.bom.roots import choose_assembly, silent_reader
-from silo.bom.walk.consumed import consumed
-from silo.bom.walk.kinds import Kind, flattened
 from silo.fcstd import Library
-from silo.fcstd.objects import FcstdObject
+from silo.fcstd.document import FcstdObject
 
 # FreeCAD numbers copies with three digits.
 _NUMBER = re.compile(r"\d{3}$")
@@ -111,17 +107,20 @@ def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
     shape_of
         something equal for equal shapes wherever they are placed; "" where that is not known.
     """
-    document = top.Document
-    found = _offered(top)
-    counts = _counts(top, found)
-    articles = []
-    for objects, alike in _alike(found, shape_of):
-        articles.append(_article(objects, alike, sum(counts[object_name(obj)] for obj in objects)))
-    reader = silent_reader()
+    contents = silent_reader().contents(top)
+    shown: dict[str, tuple[Any, int]] = {}
+    for count in () if contents.is_part else contents.own:
+        name = object_name(count.target)
+        shown[name] = (count.target, count.quantity + (shown[name][1] if name in shown else 0))
+    articles = [
+        _article(objects, alike, sum(shown[object_name(obj)][1] for obj in objects))
+        for objects, alike in _alike([obj for obj, _ in shown.values()], shape_of)
+    ]
     declared: dict[str, tuple[list[Any], int]] = {}
-    for count in reader.contents(top).counts:
+    for count in contents.counts:
         target = count.target
-        if getattr(target, "Document", None) is document and (identity := own_identity(target)):
+        is_here = getattr(target, "Document", None) is top.Document
+        if is_here and (identity := own_identity(target)):
             objects, before = declared.get(identity, ([], 0))
             objects += [] if target in objects else [target]
             declared[identity] = (objects, before + count.quantity)
@@ -129,40 +128,6 @@ def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
         article = _article(objects, "", quantity)
         articles.append(replace(article, entry=replace(article.entry, silo_uuid=identity)))
     return articles
-
-
-def _offered(top: Any) -> list[Any]:
-    """What could be declared, in the order of the tree."""
-    reader = silent_reader()
-    local = {object_name(obj): obj for obj in reader.contents(top).local}
-    eaten = consumed(local.values(), object_name)
-    members = [(obj, kind) for _, obj, kind in flattened(top, object_name)]
-    inside: set[str] = set()
-    found = []
-    for obj, kind in members:
-        name = object_name(obj)
-        if name in inside:
-            continue
-        if kind is Kind.CONTAINER and not reader.brings(obj):
-            held = [one for _, one, _ in flattened(obj, object_name)]
-            if any(object_name(one) in local for one in held):
-                inside.update(map(object_name, held))
-                found.append(obj)
-        elif (name in local and name not in eaten) or (kind is Kind.FOREIGN and not own_identity(obj)):
-            found.append(obj)
-    return found
-
-
-def _counts(top: Any, offered: Sequence[Any]) -> dict[str, int]:
-    """How often the BOM would count each, were it declared: links and arrays in the file included."""
-    names = {object_name(obj) for obj in offered}
-    reader = silent_reader(declare=names)
-    counts = dict.fromkeys(names, 0)
-    for count in reader.contents(top).counts:
-        name = object_name(count.target)
-        if name in counts and getattr(count.target, "Document", None) is top.Document:
-            counts[name] += count.quantity
-    return {name: count or 1 for name, count in counts.items()}
 
 
 def label_stem(label: str, labels: Set[str]) -> str:

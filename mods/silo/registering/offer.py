@@ -15,12 +15,11 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Protocol
 
-from silo.api.revisions import other_name
+from silo.api.files import other_name
 from silo.bom.errors import CancelledError, NotFoundError, ServerFaultError, SiloError
 from silo.bom.findings import FindingCode
-from silo.bom.identity import meta_key, walk_entries
-from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Proposal, propose, propose_all
+from silo.bom.model import BomEntry, Extraction, meta_key, walk_entries
+from silo.bom.resolve import Proposal, propose, propose_all
 from silo.files import content_hash
 from silo.registering.items import component_key
 from silo.registering.modelled import Modelled, modelled
@@ -87,8 +86,8 @@ class Candidate:
 
     same_as
         part number whose identity the file carries although another file has it too ("copied identity").
-    twins
-        labels of other rows whose files have the very same content.
+    twin
+        label of another row whose file has the very same content; "" if there is none.
     article
         what is modelled in the assembly's own file: counted once it has an identity.
     """
@@ -96,7 +95,7 @@ class Candidate:
     proposal: Proposal
     state: State
     similar: tuple[Similar, ...] = ()
-    twins: tuple[str, ...] = ()
+    twin: str = ""
     same_as: str = ""
     sha256: str = field(default="", repr=False)
     article: Modelled | None = None
@@ -121,6 +120,24 @@ class Candidate:
         if self.proposal.is_guess or self.article is not None:
             return False
         return fine and not self.same_as and not any(s.same_file for s in self.similar)
+
+
+class Contents:
+    """The files of candidates by their content; two of each are enough to know another file."""
+
+    def __init__(self) -> None:
+        self._by_sha256: dict[str, list[Candidate]] = {}
+
+    def add(self, candidate: Candidate) -> None:
+        """Remember the file of a candidate."""
+        same = self._by_sha256.setdefault(candidate.sha256, [])
+        if not same or (len(same) == 1 and same[0].entry.doc_path != candidate.entry.doc_path):
+            same.append(candidate)
+
+    def twin(self, candidate: Candidate) -> Candidate | None:
+        """Return the first candidate with the same content in another file."""
+        same = self._by_sha256.get(candidate.sha256, ()) if candidate.sha256 else ()
+        return next((one for one in same if one.entry.doc_path != candidate.entry.doc_path), None)
 
 
 @dataclass(frozen=True)
@@ -206,7 +223,12 @@ def offer(
         if entry.silo_uuid and entry.silo_uuid.lower() in numbers
     }
     numbers_next = _next_numbers(looked, api, schema)
-    return Offer(_with_twins(looked), categories, numbers_next, registered, unsearched)
+    contents = Contents()
+    for candidate in looked:
+        contents.add(candidate)
+    twins = [(candidate, contents.twin(candidate)) for candidate in looked]
+    found = tuple(replace(one, twin=twin.proposal.name) if twin else one for one, twin in twins)
+    return Offer(found, categories, numbers_next, registered, unsearched)
 
 
 def _perhaps_copies(extraction: Extraction, numbers: Mapping[str, str], api: Any) -> tuple[BomEntry, ...]:
@@ -330,21 +352,6 @@ def _with_look_alikes(
 
 def _searched(candidate: Candidate) -> tuple[str, str]:
     return candidate.proposal.name, candidate.sha256
-
-
-def _with_twins(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
-    listed = list(candidates)
-    by_content: dict[str, list[Candidate]] = {}
-    for candidate in listed:
-        if candidate.sha256:
-            by_content.setdefault(candidate.sha256, []).append(candidate)
-    told = []
-    for candidate in listed:
-        others = [
-            c for c in by_content.get(candidate.sha256, ()) if c.entry.doc_path != candidate.entry.doc_path
-        ]
-        told.append(replace(candidate, twins=tuple(c.proposal.name for c in others)))
-    return tuple(told)
 
 
 def _next_numbers(candidates: Iterable[Candidate], api: Any, schema: str) -> dict[str, str]:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Proposal, propose_all
+from silo.bom.resolve import Proposal, propose_all
 from silo.bom_sync import resolve
 from silo.fcstd import check_stampable, stamp
-from silo.open_in_freecad import OpenInFreecad, open_in_any
+from silo.freecads import OpenInFreecad, open_in_any
 from silo.registering.items import Ask, Registration, component_key, document_uid, unclear
 from silo.registering.journal import Journal
 from silo.registering.offer import Candidate, Control, Seen, State
@@ -48,7 +48,7 @@ def whole_folder(
     plan: Plan, reading: Reading, base: str, *, hardware: bool = True
 ) -> tuple[Extraction, frozenset[str]]:
     """All components of a folder's assemblies, and the files that no assembly uses."""
-    from silo.vault.session import Question
+    from silo.vault.reading import Question
 
     entries: dict[tuple[str, str], BomEntry] = {}
     findings: list[Finding] = []
@@ -57,13 +57,13 @@ def whole_folder(
         findings += found.findings
         for entry in (*found.entries, found.assembly):
             entries.setdefault(entry.key, replace(entry, children=()))
-    used = {path for path, _ in entries}
+    used = {entry.doc_path for entry in entries.values()}  # a standard part's key has no file
     alone = [top for top in plan.tops if os.path.realpath(top) not in used and top not in plan.errors]
     for answer in reading.ask_many(Question(top, None, hardware) for top in alone):
         if isinstance(part := answer.found, Extraction):
             head = part.assembly
             entries.setdefault(head.key, replace(head, children=(), is_assembly=False))
-    unused = frozenset(path for path, _ in entries) - used
+    unused = frozenset(entry.doc_path for entry in entries.values()) - used
     head = BomEntry(base, object_name="", is_assembly=True, level=0)
     return Extraction(head, tuple(entries.values()), tuple(dict.fromkeys(findings))), unused
 

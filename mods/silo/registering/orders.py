@@ -13,7 +13,7 @@ from typing import Any
 
 from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry
-from silo.bom.naming import Proposal, proposed_category
+from silo.bom.resolve import Proposal, proposed_category
 from silo.registering.items import Registration, RegistrationApi, register, register_standard, unclear
 from silo.registering.journal import Journal
 from silo.registering.modelled import Modelled, source_identity

@@ -11,14 +11,14 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from silo.bom.document import relative
 from silo.bom.errors import InputError, NotFoundError
 from silo.bom.headers import plain_cell, safe_cell
-from silo.registering.offer import ITEM_TYPES, Candidate, Offer, Similar, State, fingerprint
+from silo.registering.offer import ITEM_TYPES, Candidate, Contents, Offer, Similar, State, fingerprint
 from silo.registering.orders import Order
 
 COLUMNS = (
@@ -57,7 +57,7 @@ def key_of(candidate: Candidate, base: str) -> Key:
     return ("", entry.standard) if entry.standard else (relative(entry.doc_path, base), entry.object_name)
 
 
-def doubts(candidate: Candidate, earlier: Iterable[Candidate] = ()) -> list[str]:
+def doubts(candidate: Candidate, earlier: Contents) -> list[str]:
     """Why it may be an item already; ``earlier``: the candidates before it, which get theirs first."""
     told = [
         f"Silo has this very file as {one.part_number}"
@@ -65,17 +65,14 @@ def doubts(candidate: Candidate, earlier: Iterable[Candidate] = ()) -> list[str]
         else f"Silo has {one.part_number} with the same name"
         for one in candidate.similar
     ]
-    if candidate.twins:
-        for one in earlier:
-            if one.sha256 == candidate.sha256 and one.entry.doc_path != candidate.entry.doc_path:
-                told.append(f"the same content as {one.proposal.name}")
-                break
+    if twin := earlier.twin(candidate):
+        told.append(f"the same content as {twin.proposal.name}")
     if candidate.same_as:
         told.append(f"carries the identity of {candidate.same_as}, as another file does")
     return told
 
 
-def remarks(candidate: Candidate, earlier: Iterable[Candidate] = ()) -> list[str]:
+def remarks(candidate: Candidate, earlier: Contents) -> list[str]:
     """What a person should know of a row."""
     told = doubts(candidate, earlier)
     if candidate.proposal.is_guess:
@@ -92,7 +89,9 @@ def write_table(offer: Offer, wanted: Callable[[Candidate], bool], base: str) ->
     out = io.StringIO()
     writer = csv.DictWriter(out, COLUMNS)
     writer.writeheader()
-    for number, candidate in enumerate(offer.candidates):
+    earlier = Contents()
+    for candidate in offer.candidates:
+        earlier.add(candidate)
         if candidate.declared:
             continue
         proposal, entry = candidate.proposal, candidate.entry
@@ -105,7 +104,7 @@ def write_table(offer: Offer, wanted: Callable[[Candidate], bool], base: str) ->
             "type": proposal.item_type,
             "category": proposal.category,
             "part_number": "",
-            "note": "; ".join(remarks(candidate, offer.candidates[:number])),
+            "note": "; ".join(remarks(candidate, earlier)),
             "fingerprint": _fingerprint(candidate),
         }
         writer.writerow({column: _as_text(text) for column, text in row.items()})

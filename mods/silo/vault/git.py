@@ -20,10 +20,9 @@ from io import BytesIO
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
-from silo.bom.errors import InputError
-from silo.durable import remove_patiently
+from silo.bom.errors import DocumentError, InputError
 from silo.files import IGNORE_FILE
-from silo.platform import WINDOWS, child_options
+from silo.platform import WINDOWS, child_options, remove_patiently
 
 _CHUNK = 1 << 20
 _POINTER = re.compile(rb"version https://git-lfs\.github\.com/spec/v1\n(?:.*\n)*?oid sha256:([0-9a-f]{64})\n")
@@ -103,14 +102,22 @@ def lay_out(
                 lost += _submodule(common, Path(repository, name), name, blob, path, laid)
                 continue
             if kind == _LINK:
-                links.append((path, os.fsdecode(_content(ask, answer, blob, name))))
+                try:
+                    links.append((path, os.fsdecode(_content(ask, answer, blob, name))))
+                except DocumentError as error:
+                    lost.append((name, error.reason))
                 continue
             path.parent.mkdir(parents=True, exist_ok=True)
             if blob in laid:
                 _link_or_copy(laid[blob], path)
                 continue
-            with path.open("wb") as file:
-                _copy(ask, answer, blob, name, file)
+            try:
+                with path.open("wb") as file:
+                    _copy(ask, answer, blob, name, file)
+            except DocumentError as error:
+                lost.append((name, error.reason))
+                remove_patiently(path)
+                continue
             _take_from_lfs(common / "lfs" / "objects", path)
             laid[blob] = path
     for path, to in links:  # last, so that nothing is written through one
@@ -200,13 +207,15 @@ def _content(ask: BinaryIO, answer: BinaryIO, blob: str, name: str) -> bytes:
 
 
 def _copy(ask: BinaryIO, answer: BinaryIO, blob: str, name: str, file: BinaryIO) -> None:
-    """What git has of an object. Raises InputError."""
+    """Write what git has of an object. DocumentError if it lacks that one, InputError if git ended."""
     try:
         ask.write(blob.encode() + b"\n")
         ask.flush()
         head = answer.readline().split()
     except BrokenPipeError:
         head = [b"git ended"]
+    if head[1:] == [b"missing"]:
+        raise DocumentError(name, "this clone of the repository lacks its content (git fetch)")
     if len(head) != 3:
         raise InputError(f"git has no content of {name}: {b' '.join(head).decode(errors='replace')}")
     left = int(head[2])

@@ -4,25 +4,141 @@
 Every file is asked for its assembly, then for the sub-assemblies that others use and nobody has asked for.
 The plan keeps how the assemblies hang together, not what they hold; that is asked for again, from the index,
 when an assembly's turn comes. So memory grows with the number of files, and little.
+
+All assemblies of a folder, each once, read without FreeCAD.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
+from pathlib import Path
 from typing import Any
 
-from silo.bom.errors import SiloError
+from silo.bom.compare import Assembly
+from silo.bom.document import relative
+from silo.bom.errors import InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.links import MAX_LEVELS
+from silo.bom.links import MAX_LEVELS, extract
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import whole_row
+from silo.bom.report import shorten, whole_row
+from silo.bom.roots import choose_assembly, find_assemblies
 from silo.bom.walk.rings import Rings
 from silo.bom.walk.standard import standard_uuid
-from silo.fcstd.suggest import with_suggestions
-from silo.vault.reading import Answer, Reading
-from silo.vault.session import Question, collecting_seldom
+from silo.fcstd import Library
+from silo.fcstd.linked import with_suggestions
+from silo.files import documents_in
+from silo.vault.reading import Answer, Question, Reading, collecting_seldom
+
+
+@dataclass(frozen=True, slots=True)
+class FolderBoms:
+    """What the files of a folder say. Paths are relative to it.
+
+    unreadable
+        file and reason, for files that could not be read.
+    findings
+        what keeps a BOM from being complete (severity error), each once.
+    """
+
+    base: str
+    assemblies: tuple[Assembly, ...] = ()
+    unreadable: tuple[tuple[str, str], ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def complete(self) -> bool:
+        """True where every file was read and every BOM is whole."""
+        return not self.unreadable and not self.findings
+
+
+def read_folder(
+    folder: Path | str, *, root: Path | str | None = None, lost: Sequence[tuple[str, str]] = ()
+) -> FolderBoms:
+    """Read all assemblies below a folder. ``root``: no file outside of it is read.
+
+    lost
+        file and reason of what is known not to be there.
+
+    Raises InputError where there is no such folder. A file that cannot be read is reported in the result.
+    """
+    base = os.path.realpath(folder)
+    if not os.path.isdir(base):
+        raise InputError(f"{folder} is no folder. Name a folder of FreeCAD files.")
+    assemblies: dict[tuple[str, str], Assembly] = {}
+    unreadable = [(relative(os.path.join(root or base, path), base), why) for path, why in lost]
+    findings: dict[Finding, None] = {}
+    with Library(root) as library:
+        for path in _users_first(documents_in([base]), library):
+            try:
+                for found in _extractions(library, path, assemblies):
+                    findings.update(dict.fromkeys(f for f in found.findings if f.severity is Severity.ERROR))
+                    for assembly in _assemblies(found):
+                        assemblies.setdefault(assembly.head.key, assembly)
+            except SiloError as error:
+                unreadable.append((relative(path, base), _without(str(error), base, root)))
+    ordered = sorted(assemblies.values(), key=lambda assembly: assembly.head.key)
+    return FolderBoms(
+        base,
+        tuple(_relative(assembly, base) for assembly in ordered),
+        tuple(unreadable),
+        tuple(replace(finding, message=_without(finding.message, base, root)) for finding in findings),
+    )
+
+
+def _without(message: str, base: str, root: Path | str | None) -> str:
+    """A message whose paths begin at the folder, also those beside it: the root may be a temporary one."""
+    message = shorten(message, base)
+    if root is None or (top := os.path.realpath(root)) == base:
+        return message
+    return message.replace(top + os.sep, f"{relative(top, base)}/")
+
+
+def _users_first(paths: Sequence[str], library: Library) -> list[str]:
+    """Files that no other links to come first, so that what they use is walked once, as part of them."""
+    used: set[str] = set()
+    for path in paths:
+        with suppress(SiloError):  # reported where it is read
+            used.update(os.path.basename(recorded).lower() for recorded in library.open(path).linked())
+    return sorted(paths, key=lambda path: os.path.basename(path).lower() in used)
+
+
+def _extractions(library: Library, path: str, known: dict[tuple[str, str], Assembly]) -> Iterator[Extraction]:
+    """The BOMs of a file's assemblies, without those that were read as part of another one."""
+    document = library.open(path)
+    for top in _tops(document):
+        if (document.FileName, top.Name) not in known:
+            yield extract(top)
+
+
+def _tops(document: Any) -> Iterable[Any]:
+    try:
+        return (choose_assembly(document),)
+    except InputError:  # several are equally likely: here all of them count
+        return find_assemblies(document)
+
+
+def _assemblies(found: Extraction) -> Iterator[Assembly]:
+    """The assembly itself and every sub-assembly below it that has lines."""
+    seen: set[int] = set()
+    stack = [(found.assembly, found.entries)]
+    while stack:
+        head, lines = stack.pop()
+        if lines and id(lines) not in seen:
+            seen.add(id(lines))
+            yield Assembly(replace(head, children=(), quantity=1, level=0), tuple(lines))
+            stack += [(line, line.children) for line in lines]
+
+
+def _relative(assembly: Assembly, base: str) -> Assembly:
+    def moved(entry: BomEntry) -> BomEntry:
+        return replace(entry, doc_path=relative(entry.doc_path, base), children=())
+
+    return Assembly(moved(assembly.head), tuple(moved(line) for line in assembly.lines))
+
 
 Key = tuple[str, str]
 
@@ -108,23 +224,32 @@ def make_plan(
     *,
     assembly: str | None = None,
     hardware: bool = True,
+    each: bool = True,
     recursive: bool = True,
     skip_parts: bool = True,
     progress: Callable[[str], None] = lambda _top: None,
 ) -> Plan:
     """Read all files and put their assemblies in order.
 
+    each
+        the assemblies of a file that has several are all meant.
     recursive
         with the sub-assemblies, also where no file of ``tops`` has them.
     skip_parts
         files without components of other files, and unregistered libraries of parts, are left alone.
     """
     plan = Plan(list(tops))
-    wanted: dict[Key, str] = {}
+    several: dict[Key, str] = {}
+    below: dict[Key, str] = {}
     asked_for = _announced(tops, progress)
     answers = reading.ask_many(Question(top, assembly, hardware) for top in asked_for)
     for top, answer in zip(tops, answers, strict=True):
-        if isinstance(error := _error(answer), SiloError):
+        error = _error(answer)
+        if each and isinstance(error, SeveralAssembliesError):
+            several |= {(error.path, name): top for name in error.names}
+            plan._files.setdefault(error.path, top)
+            continue
+        if error is not None:
             plan.errors[top] = error
             continue
         head, entries = rows = _rows(answer.plain)
@@ -135,9 +260,10 @@ def make_plan(
             plan.spares.add(((head["silo_uuid"] or "").lower(), path))
             plan._assemblies.setdefault((path, head["object_name"]), head["is_assembly"])
         else:
-            _add(plan, _node(answer.question, rows, top), rows, wanted)
-    while recursive and (asked := {key: top for key, top in wanted.items() if key not in plan._assemblies}):
-        wanted.clear()
+            _add(plan, _node(answer.question, rows, top), rows, below)
+    wanted = several | (below if recursive else {})
+    while asked := {key: top for key, top in wanted.items() if key not in plan._assemblies}:
+        wanted, below = {}, {}
         questions = [Question(path, name, hardware, name_only=True) for path, name in asked]
         for (key, top), answer in zip(asked.items(), reading.ask_many(questions), strict=True):
             plan._assemblies[key] = False
@@ -145,8 +271,9 @@ def make_plan(
                 continue
             rows = _rows(answer.plain)
             if (node := _node(answer.question, rows, top)).is_assembly:
-                _add(plan, node, rows, wanted)
+                _add(plan, node, rows, below)
                 plan._assemblies[key] = True  # the name that the link has for it
+        wanted = below if recursive else {}
     _add_used_parts(plan, reading, hardware, recursive)
     for node in plan.nodes.values():
         node.below = [key for key in dict.fromkeys(node.below) if key in plan.nodes]
@@ -184,8 +311,8 @@ def _is_part(plain: Mapping[str, Any], head: _Row, entries: Sequence[_Row]) -> b
     """No assembly: nothing in it, or an unregistered file of screws or parts for others to link."""
     if any(finding["severity"] == Severity.ERROR for finding in plain["findings"]):
         return False
-    if not entries:
-        return True
+    if not entries:  # a named assembly of own parts that are no items yet is one all the same
+        return not (head.get("own") and (head["is_assembly"] or head["silo_uuid"]))
     return head["silo_uuid"] is None and all(entry["doc_path"] == head["doc_path"] for entry in entries)
 
 

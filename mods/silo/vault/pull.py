@@ -3,30 +3,410 @@
 
 ::
 
-    fetch      the file, its recorded links, their items, their files, and so on  → Tree (silo.vault.fetch)
+    fetch      the file, its recorded links, their items, their files, and so on  → Tree (silo.vault.pull)
     lay out    where each file goes: the relative paths of the links              → paths below the folder
     place      new files are written; a file that is an older revision is replaced; edited ones stay
+
+The BOMs of an item's revisions, read from their files: what a colleague changed, and when.
+
+A revision's file is read as if it lay where the user's file lies, so that its links lead to the user's other
+files: the lines of two revisions, and those of the file at hand, are then named alike.
+
+Fetch an item's file with all that it links to into a scratch folder.
+
+The files themselves say what they link to. Which item a link means was written down by the commit; where it
+was not (an older client, another server), the item's BOM and its file names say it.
 """
 
 from __future__ import annotations
 
 import os
 import posixpath
+import re
 import shutil
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import DocumentError
-from silo.durable import replacing
+from silo.api.files import DocumentId, Standing, checksum_of, download_revision, has_file
+from silo.api.transport import Cancel, stop_if
+from silo.api.wire import Item, LinkedFile, Revision
+from silo.bom.compare import Assembly, LineChange, ThreeLines, compare_assemblies, compare_three
+from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError, listed
+from silo.bom.links import extract
+from silo.bom.model import Extraction
+from silo.bom.resolve import display_name
+from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.fcstd.linked import identity_in
+from silo.fcstd.library import Contents
+from silo.fcstd.linked import identity_in, recorded_paths
 from silo.fcstd.locate import refusal
-from silo.files import content_hash
-from silo.spelling import one_path
-from silo.vault.fetch import Fetched, Lost, Tree
+from silo.files import Kept, Project, content_hash
+from silo.platform import folded, one_path, remove_patiently, replacing, scratch_folder
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+
+
+def top_of(extraction: Extraction) -> Assembly:
+    """The assembly itself with its direct lines."""
+    return Assembly(extraction.assembly, tuple(extraction.entries))
+
+
+def bom_in(content: Path | str, path: str) -> Assembly | None:
+    """The BOM of a file that belongs at ``path``; None for a part, or where it holds several assemblies."""
+    contents = Contents(instead={os.path.realpath(path): os.fspath(content)})
+    with Library(contents=contents) as library:
+        try:
+            return top_of(extract(choose_assembly(library.open(path))))
+        except InputError:
+            return None
+
+
+@dataclass
+class RevisionBoms:
+    """BOMs of the revisions of one item, each file fetched once. Close it, or use it in a ``with`` block."""
+
+    client: SiloClient
+    part_number: str
+    path: str
+    cancelled: Cancel | None = None
+    _known: dict[int, Assembly | None] = field(default_factory=dict)
+    _stack: ExitStack = field(default_factory=ExitStack)
+
+    def __enter__(self) -> RevisionBoms:
+        self._folder = Path(self._stack.enter_context(scratch_folder("silo-revisions-")))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def bom(self, number: int) -> Assembly | None:
+        """The BOM of a revision; None for a part."""
+        if number not in self._known:
+            target = self._folder / f"{number}.FCStd"
+            self.client.download_file(self.part_number, target, number, cancelled=self.cancelled)
+            self._known[number] = bom_in(target, self.path)
+            remove_patiently(target)
+        return self._known[number]
+
+    def change(self, older: int | None, newer: int) -> tuple[LineChange, ...]:
+        """The lines that differ between two revisions; all of them where there is no older one."""
+        before, after = self.bom(older) if older is not None else None, self.bom(newer)
+        changes = compare_assemblies([before] if before else [], [after] if after else [])
+        return tuple(line for change in changes for line in change.lines)
+
+    def three(self, stands: Standing, mine: Assembly | None) -> tuple[ThreeLines, ...]:
+        """Base → theirs → mine, where all of them are assemblies."""
+        if mine is None or stands.newest is None:
+            return ()
+        theirs = self.bom(stands.newest.revision_number)
+        base = self.bom(stands.base.revision_number) if stands.base is not None else None
+        return compare_three(base, theirs, mine) if theirs is not None else ()
+
+
+def file_revisions(revisions: Sequence[Revision]) -> list[Revision]:
+    """Those with a file, newest first."""
+    return sorted(filter(has_file, revisions), key=lambda one: one.revision_number, reverse=True)
+
+
+def words(lines: Sequence[LineChange], most: int = 6) -> str:
+    """A difference in one line, such as ``+ Bolt 4, - Plate 1, Nut 4 → 8``."""
+    return listed(line_texts(lines), most)
+
+
+def line_texts(lines: Iterable[LineChange]) -> list[str]:
+    """The lines of a difference in words."""
+    told = []
+    for line in lines:
+        name = display_name(line.entry) or line.entry.object_name
+        if line.old is None:
+            told.append(f"+ {name} {line.entry.quantity:g}")
+        elif line.new is None:
+            told.append(f"- {name} {line.entry.quantity:g}")
+        elif line.old.quantity != line.new.quantity:
+            told.append(f"{name} {line.old.quantity:g} → {line.new.quantity:g}")
+        else:
+            told.append(f"{name} moved")
+    return told
+
+
+MOST_FILES = 20_000
+_ABSOLUTE = re.compile(r"/|[A-Za-z]:|[A-Za-z][A-Za-z0-9+.-]+://")
+
+Progress = Callable[[str, int], object]
+"""Called with the name of the file that is fetched now, and how many were."""
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Whose revisions are those of a file: an item by its number, or a document. ``id`` is its UUID."""
+
+    of: str
+    id: str
+
+    @property
+    def part_number(self) -> str:
+        """The item's; "" for a document without one."""
+        return "" if isinstance(self.of, DocumentId) else self.of
+
+
+@dataclass(frozen=True)
+class Fetched:
+    """A file of the tree, in the scratch folder.
+
+    position
+        relative to the folder of the top file, with ``/``; may begin with ``../``.
+    part_number, item
+        of the file's item; a file of several items or none has no number, and ``item`` is its document.
+    earlier
+        the hashes of the item's revisions: such a file may be replaced, it is in Silo.
+    """
+
+    position: str
+    part_number: str
+    item: str
+    revision: Revision
+    content: Path
+    sha256: str
+    earlier: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A link whose file could not be fetched: who links, to which path, and why."""
+
+    position: str
+    path: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Tree:
+    """All files, the top first, and the links that lead nowhere."""
+
+    files: tuple[Fetched, ...]
+    lost: tuple[Lost, ...] = ()
+
+
+@dataclass
+class _Fetch:
+    client: SiloClient
+    folder: Path
+    pinned: bool
+    cancelled: Cancel | None
+    progress: Progress
+    most: int
+    files: dict[str, Fetched] = field(default_factory=dict)
+    lost: list[Lost] = field(default_factory=list)
+    _at: datetime | None = None
+    _revisions: dict[str, list[Revision]] = field(default_factory=dict)
+    _contents: dict[tuple[str, int], tuple[Path, str]] = field(default_factory=dict)
+
+    def tree(self, item: Item, number: int | None) -> Tree:
+        holder = self.holder(item)
+        known = self.revisions(holder)
+        wanted = known if number is None else [one for one in known if one.revision_number == number]
+        if not wanted:
+            which = "no file yet" if number is None else f"no file with the revision {number}"
+            raise InputError(f"{item.part_number} has {which} in Silo")
+        top = wanted[0]
+        self._at = top.created_at
+        above, name = posixpath.split((top.file_path or top.file_name or "").replace("\\", "/"))
+        name = _safe_name(name or f"{item.part_number}.FCStd")
+        # The top lies where it lay in its project: a link that steps out of its folder and back leads to one
+        # place.
+        safe = not any(":" in one or one in ("", ".", "..") or refusal(one) for one in above.split("/"))
+        left = [(posixpath.join(above, name) if safe else name, holder, top)]
+        while left:
+            position, one, revision = left.pop(0)
+            left += self.fetch(position, one, revision)
+        return Tree(tuple(self.files.values()), tuple(self.lost))
+
+    def holder(self, item: Item) -> Holder:
+        """The item, or the file of several items that it lies in."""
+        own = Holder(item.part_number, item.id)
+        if self.revisions(own):
+            return own
+        try:
+            several = self.client.documents_of(item.part_number)
+        except (NotFoundError, RouteMissingError):
+            return own
+        return Holder(DocumentId(several[0].id), several[0].id) if several else own
+
+    def fetch(
+        self, position: str, holder: Holder, revision: Revision
+    ) -> Iterator[tuple[str, Holder, Revision]]:
+        """Fetch one file; gives what it links to and was not seen before."""
+        stop_if(self.cancelled)
+        if (known := self.files.get(position)) is not None:
+            if known.item != holder.id:
+                one, other = (text or "another file" for text in (known.part_number, holder.part_number))
+                self.lost.append(Lost(position, position, f"{one} and {other} want the same place"))
+            return
+        if len(self.files) >= self.most:
+            raise InputError(f"more than {self.most} files are not fetched in one go")
+        self.progress(posixpath.basename(position), len(self.files))
+        content, sha256 = self.content(holder.of, revision)
+        earlier = frozenset(filter(None, map(checksum_of, self.revisions(holder))))
+        self.files[position] = Fetched(
+            position, holder.part_number, holder.id, revision, content, sha256, earlier
+        )
+        try:
+            recorded = recorded_paths(content)
+        except DocumentError as error:
+            self.lost.append(Lost(position, "", f"its links cannot be read: {error.reason}"))
+            return
+        if recorded:
+            yield from self.linked(position, holder, revision, recorded)
+
+    def content(self, of: str, revision: Revision) -> tuple[Path, str]:
+        number, checksum = revision.revision_number, checksum_of(revision)
+        key = (of, number)
+        if key not in self._contents:
+            target = self.folder / f"{len(self._contents)}.FCStd"
+            sha256 = download_revision(self.client, of, target, number, checksum, cancelled=self.cancelled)
+            self._contents[key] = (target, sha256)
+        return self._contents[key]
+
+    def revisions(self, holder: Holder) -> list[Revision]:
+        if holder.of not in self._revisions:
+            try:
+                self._revisions[holder.of] = file_revisions(self.client.revisions(holder.of))
+            except NotFoundError:
+                if holder.part_number:
+                    raise
+                self._revisions[holder.of] = []  # a document that never arrived, or a Silo without any
+        return self._revisions[holder.of]
+
+    def linked(
+        self, position: str, holder: Holder, revision: Revision, recorded: Sequence[str]
+    ) -> Iterator[tuple[str, Holder, Revision]]:
+        by_top = len(self.files) == 1
+        told = self.client.get_revision(holder.of, revision.revision_number)
+        links = {link.path.replace("\\", "/"): link for link in told.links}
+        ids = [link.item for link in links.values() if link.item]
+        items = self.client.get_items_by_uuid(ids, cancelled=self.cancelled) if ids else {}
+        others = _Children(self, holder.part_number)
+        for path in recorded:
+            link = links.get(path)
+            child = self.means(path, link, items, others)
+            target = posixpath.normpath(posixpath.join(posixpath.dirname(position), path))
+            why = _refused(path)
+            if not why and child is None:
+                why = "no item in Silo is known for it: it was never committed"
+                if link is not None and not link.sha256:
+                    why = "it was not there either when the file was committed"
+            chosen = self.choose(child, link.sha256 if link else "", by_top=by_top) if child else None
+            if not why and chosen is None:
+                why = f"{(child.part_number if child else '') or path} has no file in Silo"
+            if why or child is None or chosen is None:
+                self.lost.append(Lost(position, path, why))
+            else:
+                yield target, child, chosen
+
+    def means(
+        self, path: str, link: LinkedFile | None, items: Mapping[str, Item], others: _Children
+    ) -> Holder | None:
+        """What a link leads to."""
+        if link is not None and link.document:
+            own = Holder(DocumentId(link.document), link.document)
+            if self.revisions(own):
+                return own
+        child = items.get(link.item) if link is not None and link.item else others.find(path)
+        return self.holder(child) if child is not None else None
+
+    def choose(self, child: Holder, sha256: str, *, by_top: bool) -> Revision | None:
+        """The newest revision of a linked file; for a chosen revision of the top, that of its time.
+
+        What the top itself links to was written down with it (``sha256``). A file further below
+        may have been committed again between the file that links to it and the top.
+        """
+        known = self.revisions(child)
+        if not self.pinned or not known:
+            return known[0] if known else None
+        at = self._at
+        same = [one for one in known if sha256 and checksum_of(one) == sha256]
+        before = [one for one in known if at and one.created_at and one.created_at <= at]
+        if same and by_top:
+            return same[0]
+        return max([*same[:1], *before[:1]] or known[-1:], key=lambda one: one.revision_number)
+
+
+@dataclass
+class _Children:
+    """Which item a recorded path means, where the commit did not say: by the BOM."""
+
+    fetch: _Fetch
+    part_number: str
+    _known: tuple[dict[str, str], dict[str, str]] | None = None
+
+    def find(self, path: str) -> Item | None:
+        by_path, by_name = self._known = self._known or self._read()
+        number = by_path.get(path) or by_name.get(posixpath.basename(path).casefold())
+        return self.fetch.client.get_item(number) if number else None
+
+    def _read(self) -> tuple[dict[str, str], dict[str, str]]:
+        by_path: dict[str, str] = {}
+        by_name: dict[str, str] = {}
+        if not self.part_number:
+            return {}, {}
+        try:
+            lines = self.fetch.client.get_bom(self.part_number)
+        except (NotFoundError, RouteMissingError):
+            return {}, {}
+        for line in lines:
+            number = line.child_part_number
+            by_path |= {str(one.get("file", "")).replace("\\", "/"): number for one in line.components}
+            for revision in self.fetch.revisions(Holder(number, ""))[:1]:
+                by_name[(revision.file_name or "").casefold()] = number
+        return by_path, by_name
+
+
+def _refused(path: str) -> str:
+    """Why a recorded path is not followed; "" where it is."""
+    if _ABSOLUTE.match(path):
+        return "it is an absolute path, which has no place in another folder"
+    if (found := refusal(path)) is not None:
+        return found.detail or "its path cannot be one"
+    if posixpath.splitext(path)[1].lower() != ".fcstd":
+        return "it is no FreeCAD file"
+    return ""
+
+
+def _safe_name(name: str) -> str:
+    name = name.replace("/", "_").strip(". ") or "file"
+    if posixpath.splitext(name)[1].lower() != ".fcstd":
+        name += ".FCStd"
+    return f"_{name}" if refusal(name) is not None else name
+
+
+@contextmanager
+def fetched(
+    client: SiloClient,
+    part_number: str,
+    revision: int | None = None,
+    *,
+    cancelled: Cancel | None = None,
+    progress: Progress = lambda _name, _count: None,
+    most: int = MOST_FILES,
+) -> Iterator[Tree]:
+    """The tree of an item, in a scratch folder that goes with the block.
+
+    revision
+        of the top; its linked files are then those of its time. None: the newest of all.
+
+    Raises InputError where the item has no such file, and for more than ``most`` files.
+    """
+    item = client.get_item(part_number)
+    with scratch_folder("silo-pull-") as scratch:
+        yield _Fetch(client, Path(scratch), revision is not None, cancelled, progress, most).tree(
+            item, revision
+        )
 
 
 class State(StrEnum):
@@ -84,7 +464,10 @@ def lay_out(files: Iterable[tuple[str, str | None]]) -> list[str]:
             if name not in ("", ".", "..") and refusal(name) is None:
                 names.setdefault(ups + step, name)
     above_top = [names.get(step, "folder") for step in range(most)]
-    return ["/".join([*reversed(above_top[ups:]), *parts]) for ups, parts, _ in split]
+    places = ["/".join([*reversed(above_top[ups:]), *parts]) for ups, parts, _ in split]
+    # A link may spell a name in another way than its file does.
+    spelt = [("/".join(told), place) for (_, _, told), place in zip(split, places, strict=True)]
+    return [told if folded(told) == folded(place) else place for told, place in spelt]
 
 
 def _ups(position: str) -> tuple[int, list[str]]:
@@ -141,6 +524,7 @@ def place(tree: Tree, into: Path | str, rules: Rules = Rules()) -> Pulled:
     places = lay_out((one.position, one.revision.file_path) for one in tree.files)
     anchor = _anchor(tree, places, base)
     placed: list[Placed] = []
+    known: dict[str, Kept | None] = {}
     lost = list(tree.lost)
     # The disk says which names are one file: by their case, their Unicode form, or a link.
     taken: dict[str, Placed] = {}
@@ -158,7 +542,19 @@ def place(tree: Tree, into: Path | str, rules: Rules = Rules()) -> Pulled:
             continue
         placed.append(_place(one, target, rules))
         taken[one_path(str(target))] = placed[-1]
+        if placed[-1].state not in (State.EDITED, State.OPEN):
+            known[str(target)] = Kept(one.item, one.sha256, _uid_of(target))
+    project = Project.of(anchor) or Project(one_path(str(anchor)))
+    project.note({at: kept for path, kept in known.items() if (at := project.place(path)) is not None})
     return Pulled(placed[0].path, tuple(placed), tuple(lost))
+
+
+def _uid_of(path: Path) -> str:
+    try:
+        with Library() as library:
+            return str(library.glance(path).Uid)
+    except DocumentError:
+        return ""
 
 
 def _in_the_way(target: Path, base: Path) -> str:

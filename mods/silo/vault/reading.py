@@ -4,30 +4,314 @@
 Many questions are answered in two steps, each spread over the executor. First every file is read, once: that
 gives its facts, and the answer where it links to no other. Then the assemblies are walked, with the facts of
 what they link to in place of the files. Answers come back in the order of the questions, whoever found them.
+
+Questions about files, and what a worker does to answer them; its values travel between processes.
+
+A question has a file and a kind: the whole BOM below its assembly, or that one assembly alone. It is answered
+in a session of its own, so that the answer's trail is exactly what the session has read.
+
+Where files are read when they are many: processes of this machine, or a Dask cluster.
 """
 
 from __future__ import annotations
 
+import gc
 import json
+import os
+import threading
+import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError, Future
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import islice
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 from uuid import uuid4
 
-from silo.bom.errors import DocumentError, InputError, SiloError
+from silo.bom.errors import DocumentError, InputError, SeveralAssembliesError, SiloError
+from silo.bom.findings import respelt_findings
+from silo.bom.links import extract
 from silo.bom.model import Extraction
-from silo.bom.report import from_plain
-from silo.fcstd.library import Content
-from silo.vault.answers import Known
-from silo.vault.index import Index
-from silo.vault.session import CHUNK, Done, First, Question, Session, Supplies, work, work_in
+from silo.bom.report import from_plain, to_plain
+from silo.bom.roots import choose_assembly
+from silo.fcstd.library import Content, Contents, Library, facts_of
+from silo.fcstd.locate import Found, Locator
+from silo.platform import workers
+from silo.vault.index import Index, StoredAnswer, engine
 
-if TYPE_CHECKING:
-    from silo.vault.pool import Pool
+CHUNK = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What is asked of a file.
+
+    assembly
+        name or label of the one meant, where the file holds several; None for the likeliest.
+    name_only
+        ``assembly`` is the internal name of any object that may hold components.
+    below
+        the whole tree, or the one assembly alone (:func:`silo.bom.links.extract`).
+    """
+
+    path: str
+    assembly: str | None = None
+    hardware: bool = True
+    below: bool = False
+    name_only: bool = False
+
+    def __post_init__(self) -> None:
+        # Another process, and another day, have other current folders.
+        object.__setattr__(self, "path", os.path.abspath(self.path))
+
+    @property
+    def name(self) -> str:
+        """For the index."""
+        return _name(self.assembly, self.hardware, self.below, self.name_only)
+
+
+@lru_cache(maxsize=256)
+def _name(assembly: str | None, hardware: bool, below: bool, name_only: bool) -> str:
+    words = ("bom" if below else "level") + ("" if hardware else " without hardware")
+    mark = "#" if name_only else "="
+    return f"{engine()} {words} {'' if assembly is None else mark + assembly}"
+
+
+def collect_seldom() -> None:
+    """Let Python search for rings of objects seldom.
+
+    A session takes its own rings apart. Each search goes through all that is remembered of a vault, so that
+    a document of a large vault would cost more than one of a small vault.
+    """
+    gc.set_threshold(100_000, *gc.get_threshold()[1:])
+
+
+@contextmanager
+def collecting_seldom() -> Iterator[None]:
+    """:func:`collect_seldom`, for a while."""
+    before = gc.get_threshold()
+    collect_seldom()
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+
+
+class First(NamedTuple):
+    """What reading one file gave.
+
+    known
+        the answer; None where that needs other files.
+    path, facts
+        the file without symlinks, and its facts, "" where there are none.
+    content, folders, linked
+        where there is no answer yet: the file itself, where its links' paths begin, and where they lead.
+    """
+
+    known: StoredAnswer | None
+    path: str = ""
+    facts: str = ""
+    content: Content | None = None
+    folders: tuple[str, ...] = ()
+    linked: Mapping[str, Found] = {}
+
+    @property
+    def files(self) -> list[str]:
+        """The file, and those that it links to."""
+        return [self.path, *(found.real for found in self.linked.values())]
+
+
+@dataclass(frozen=True, slots=True)
+class Supplies:
+    """What is known already of the files that some questions need.
+
+    found
+        (folders in which links' paths begin, where the paths lead), for each file.
+    """
+
+    contents: Mapping[str, Content] = field(default_factory=dict)
+    facts: Mapping[str, str] = field(default_factory=dict)
+    found: Sequence[tuple[tuple[str, ...], Mapping[str, Found]]] = ()
+
+
+class Session:
+    """What a worker keeps between questions."""
+
+    def __init__(self, contents: Contents | None = None) -> None:
+        self.contents = contents or Contents()
+        self.locator = Locator(remembers_files=True)
+
+    def ask(self, question: Question, facts: Callable[[str], str] = lambda _path: "") -> StoredAnswer:
+        """The answer with its trail."""
+        library = Library(contents=self.contents, locator=self.locator, facts=facts)
+        try:
+            return StoredAnswer.found_in(library, self._answer(library, question))
+        finally:
+            library.dissolve()
+
+    def read(self, question: Question) -> First:
+        """The file of a question, and the answer where no other file is needed for it."""
+        library = Library(contents=self.contents, locator=self.locator)
+        try:
+            return self._read(library, question)
+        finally:
+            library.dissolve()
+
+    def _read(self, library: Library, question: Question) -> First:
+        path, facts, linked = "", "", dict[str, Found]()
+        try:
+            document = library.open(question.path)
+            path, facts = document.FileName, facts_of(document)
+            for recorded in document.linked():
+                if isinstance(found := self.locator.find(recorded, document.folders), Found):
+                    linked[recorded] = found
+        except DocumentError:
+            pass  # which is the answer
+        else:
+            first = First(None, path, facts, None, document.folders, linked)
+            if set(first.files) != {path} and isinstance(document.content, Content):
+                return first._replace(content=document.content)
+        return First(StoredAnswer.found_in(library, self._answer(library, question)), path, facts)
+
+    def _answer(self, library: Library, question: Question) -> dict[str, Any]:
+        try:
+            document = library.open(question.path)
+            top = document.getObject(question.assembly or "") if question.name_only else None
+            top = choose_assembly(document, question.assembly) if top is None else top
+            found = extract(top, hardware=question.hardware, below=question.below)
+            told = respelt_findings(library.notes, document.FileName)
+            return to_plain(replace(found, findings=(*found.findings, *told)))
+        except DocumentError as error:
+            return {"document": [error.path, error.reason]}
+        except SeveralAssembliesError as error:
+            return {"several": [str(error), error.path, error.names]}
+        except InputError as error:
+            return {"input": str(error)}
+
+
+class Done(NamedTuple):
+    """Some questions worked on: what they gave in order, how many files were read, seconds of processor."""
+
+    found: list[First]
+    reads: int
+    seconds: float
+
+
+_mine = threading.local()
+
+
+def work(questions: Sequence[Question], supplies: Supplies | None, run: str) -> Done:
+    """Read the files of questions, or with supplies answer them; this is what travels to workers.
+
+    run
+        names the run: what a worker of a cluster keeps from another one may be old.
+    """
+    if getattr(_mine, "run", None) != run:
+        _mine.run, _mine.session = run, Session()
+    return work_in(_mine.session, questions, supplies)
+
+
+def work_in(session: Session, questions: Sequence[Question], supplies: Supplies | None) -> Done:
+    """:func:`work` in this process."""
+    reads, begin = session.contents.reads, time.thread_time()
+    if supplies is None:
+        firsts = [session.read(question) for question in questions]
+    else:
+        for path, content in supplies.contents.items():
+            session.contents.add(path, content)
+        for folders, found in supplies.found:
+            session.locator.learn(folders, found)
+        facts = supplies.facts
+        firsts = [First(session.ask(question, lambda path: facts.get(path, ""))) for question in questions]
+    return Done(firsts, session.contents.reads - reads, time.thread_time() - begin)
+
+
+# A worker process costs some 0.3 s to start; reading a file some milliseconds.
+_WORTH_A_POOL = 128
+
+
+def _end_processes(executor: Executor) -> None:
+    # Python would wait for them at the end anyway, and at times trips over it then.
+    executor.shutdown(wait=True, cancel_futures=True)
+
+
+class Pool:
+    """Makes executors for the work, and another one where that broke.
+
+    alone
+        makes one for a single question that may end its process.
+    worth
+        so many files are read here before others are called in: they take a moment to start.
+    chunk
+        questions that travel together.
+    end
+        gives up an executor: what was not begun is dropped.
+    """
+
+    def __init__(
+        self,
+        make: Callable[[], Executor],
+        jobs: int,
+        *,
+        alone: Callable[[], Executor] | None = None,
+        worth: int = _WORTH_A_POOL,
+        chunk: int = CHUNK,
+        end: Callable[[Executor], None] = _end_processes,
+    ) -> None:
+        self.jobs, self.worth, self.chunk = jobs, worth, chunk
+        self.alone = alone or (lambda: _processes(1))
+        self._make, self._end = make, end
+        self._run = str(uuid4())
+        self._executor: Executor | None = None
+
+    def submit(self, questions: Sequence[Question], supplies: Supplies | None) -> Future[Done]:
+        """Have questions worked on."""
+        if self._executor is None:
+            self._executor = self._make()
+        return self._executor.submit(work, questions, supplies, self._run)
+
+    def renew(self) -> None:
+        """Give up an executor that lost its workers, or that is no longer needed."""
+        if self._executor is not None:
+            self._end(self._executor)
+            self._executor = None
+
+
+@contextmanager
+def pool_of(jobs: int, dask: str | None = None, *, worth: int = _WORTH_A_POOL) -> Iterator[Pool | None]:
+    """Processes of this machine, or a Dask cluster at an address; None for one job."""
+    if dask is not None:
+        with _dask_client(dask) as client:
+            workers = sum(client.nthreads().values())
+            # Dask cancels where nobody waits, also what was begun.
+            yield Pool(
+                client.get_executor, max(1, workers), worth=worth, end=lambda one: one.shutdown(wait=False)
+            )
+        return
+    pool = Pool(lambda: _processes(jobs), jobs, worth=worth) if jobs > 1 else None
+    try:
+        yield pool
+    finally:
+        if pool is not None:
+            pool.renew()
+
+
+def _processes(jobs: int) -> Executor:
+    return workers(jobs, collect_seldom)
+
+
+def _dask_client(address: str) -> Any:
+    try:
+        from dask.distributed import Client
+    except ImportError as error:
+        raise InputError("--dask needs the extra: pip install 'silo-mod[dask]'") from error
+    try:
+        return Client(address, timeout=10, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
+
 
 T = TypeVar("T")
 _RECALLED = 256  # answers that are held on the way from the index
@@ -35,7 +319,7 @@ _RECALLED = 256  # answers that are held on the way from the index
 _HELD = 48 << 20
 _TRIES = 3
 _LEAST = 8  # questions that travel together, also at the end
-_WORKER_LOST = (BrokenProcessPool, CancelledError)
+_WORKER_LOST = (BrokenExecutor, CancelledError)
 
 
 class Answer:
@@ -43,7 +327,7 @@ class Answer:
 
     __slots__ = ("_plain", "known", "question")
 
-    def __init__(self, question: Question, known: Known) -> None:
+    def __init__(self, question: Question, known: StoredAnswer) -> None:
         self.question, self.known = question, known
         self._plain: dict[str, Any] | None = None
 
@@ -59,6 +343,8 @@ class Answer:
         """The BOM, or why there is none."""
         if "document" in self.plain:
             return DocumentError(*self.plain["document"])
+        if "several" in self.plain:
+            return SeveralAssembliesError(*self.plain["several"])
         if "input" in self.plain:
             return InputError(self.plain["input"])
         return from_plain(self.plain)
@@ -110,7 +396,7 @@ class Reading:
     def ask_many(self, questions: Iterable[Question]) -> Iterator[Answer]:
         """The answers in the order of the questions."""
         asked = list(questions)
-        waiting: dict[int, Known] = {}
+        waiting: dict[int, StoredAnswer] = {}
         left: list[int] = []
         for number, found in self._recalled(asked, range(len(asked))):
             if found is None:
@@ -151,7 +437,7 @@ class Reading:
 
     def _recalled(
         self, asked: Sequence[Question], numbers: Iterable[int]
-    ) -> Iterator[tuple[int, Known | None]]:
+    ) -> Iterator[tuple[int, StoredAnswer | None]]:
         """What the index has, question by question."""
         for group in grouped(numbers, _RECALLED):
             yield from zip(
@@ -173,7 +459,7 @@ class Reading:
         found = [(linked[number].folders, linked[number].linked) for number in group]
         return _Chunk([asked[number] for number in group], Supplies(given, self.index.facts([*files]), found))
 
-    def _remember(self, question: Question, known: Known) -> None:
+    def _remember(self, question: Question, known: StoredAnswer) -> None:
         self.index.remember(question.path, question.name, known)
 
     def _worked_on(self, chunks: Iterable[_Chunk], pool: Pool | None) -> Iterator[First]:
@@ -222,10 +508,10 @@ class Reading:
         with pool.alone() as executor:
             try:
                 return self._counted(executor.submit(work, [question], supplies, str(uuid4())).result())[0]
-            except BrokenProcessPool:
+            except BrokenExecutor:
                 reason = "the process that read it died; the file may need more memory than there is"
                 return First(
-                    Known(json.dumps({"document": [question.path, reason]}), "[{},[]]", lasting=False)
+                    StoredAnswer(json.dumps({"document": [question.path, reason]}), "[{},[]]", lasting=False)
                 )
 
 

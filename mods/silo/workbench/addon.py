@@ -18,18 +18,15 @@ from silo.workbench.settings.preferences import GROUP, Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
-    from silo.outbox.report import Sent
+    from silo.outbox.send import Sent
     from silo.workbench.buttons import Buttons
     from silo.workbench.commit.flow import CommitFlow
-    from silo.workbench.freecad.hooks import CommitHook
-    from silo.workbench.freecad.live_desk import LiveDesk
-    from silo.workbench.freecad.silo_group import SiloGroup
+    from silo.workbench.freecad.edits import CommitHook
+    from silo.workbench.freecad.live_desk import LiveDesk, SiloGroup
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
     from silo.workbench.revisions.flow import RevisionFlow
-    from silo.workbench.session.colleagues import Newer
-    from silo.workbench.session.session import Session
-    from silo.workbench.session.shown import Shown
+    from silo.workbench.session.session import Newer, Session, Shown
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
 BEGIN_AFTER_MS = 1500
@@ -61,7 +58,7 @@ class AddOn:
     # -- the session ------------------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Go on once the window stands."""
+        """Continue when the window stands."""
         from silo.workbench.freecad import saving
 
         saving.watch_edits()
@@ -82,7 +79,7 @@ class AddOn:
         self._timer.timeout.connect(self.session.tick)
         self._timer.start(TICK_MS)
         qt.QtCore.QCoreApplication.instance().aboutToQuit.connect(self._end)
-        from silo.workbench.gui.closing import CloseWatch
+        from silo.workbench.gui.widgets import CloseWatch
 
         self._watch = CloseWatch(host.main_window(), self._closing)
         self._find_foreign_commit()
@@ -94,7 +91,7 @@ class AddOn:
             self.commits.finish()
 
     def _end(self) -> None:
-        from silo.workbench.gui.closing import wait_for_disk
+        from silo.workbench.gui.widgets import wait_for_disk
 
         self.session.close(wait_for_disk)
 
@@ -103,10 +100,8 @@ class AddOn:
     @cached_property
     def session(self) -> Session:
         """What works beside the GUI thread."""
-        from silo.workbench.session.session import Session
-        from silo.workbench.session.shown import Listener
-        from silo.workbench.settings.server import read_known
-        from silo.workbench.settings.tokens import Keyring
+        from silo.workbench.session.session import Listener, Session
+        from silo.workbench.settings.server import Keyring, read_known
 
         listener = Listener(shown=self._shown, console=host.warning, sent=self._sent, bug=self._bug)
         return Session(self.relay.post, read_known(self.preferences), Keyring(), listener=listener)
@@ -163,7 +158,7 @@ class AddOn:
     @cached_property
     def group(self) -> SiloGroup:
         """What the property editor shows of components."""
-        from silo.workbench.freecad.silo_group import SiloGroup
+        from silo.workbench.freecad.live_desk import SiloGroup
 
         return SiloGroup()
 
@@ -201,7 +196,7 @@ class AddOn:
         # To find the item of each document takes a while where there are hundreds.
         asked = (colleagues, [(doc.Name, since) for doc, since in docs])
         if asked != self._present[0]:
-            from silo.workbench.pane.banner import presence_text
+            from silo.workbench.pane.waiting import presence_text
 
             found = []
             for doc, since in docs:
@@ -253,7 +248,7 @@ class AddOn:
     def hook_commit(self, name: str) -> None:
         """Sync the BOM after this command, which is not ours."""
         if self._hook is None:
-            from silo.workbench.freecad.hooks import CommitHook
+            from silo.workbench.freecad.edits import CommitHook
 
             self._hook = CommitHook(
                 host,
@@ -267,7 +262,7 @@ class AddOn:
     def _find_foreign_commit(self) -> None:
         """The Kindred workbench has further commands that upload a revision; connect to what is there."""
         from silo.workbench.commands import COMMIT, commands
-        from silo.workbench.freecad.hooks import FOREIGN
+        from silo.workbench.freecad.edits import FOREIGN
 
         ours = commands(self)[COMMIT].text
         for name in FOREIGN:
@@ -307,10 +302,14 @@ class AddOn:
 
     def open_from_silo(self) -> None:
         """Find an item and open its file."""
+        from silo.files import Project
         from silo.workbench.revisions.dialog import OpenDialog
 
-        doc = host.active_document()
-        folder = os.path.dirname(doc.FileName) if doc is not None and doc.FileName else ""
+        active = host.active_document()
+        several = [active, *host.documents()] if active is not None else host.documents()
+        found = (Project.of(doc.FileName) for doc in several if doc.FileName)
+        # The root of a project is marked, and never guessed from where a document lies.
+        folder = next((project.root for project in found if project is not None), "")
         self._window = OpenDialog(self.revisions, host.main_window(), folder)
         self._window.show()
 
@@ -341,6 +340,6 @@ class AddOn:
 
     def show_help(self) -> None:
         """Show the add-on's page of the documentation."""
-        from silo.workbench.gui.help_window import HelpWindow
+        from silo.workbench.gui.installing import HelpWindow
 
         HelpWindow(host.main_window()).show()

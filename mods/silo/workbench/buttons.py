@@ -57,7 +57,7 @@ class Buttons:
 
     def _choose(self, action: Action) -> None:
         """What to do about the colleague's revision for which a commit is held."""
-        from silo.workbench.commit.theirs import Choice, of_held
+        from silo.workbench.commit.flow import Choice, of_held
         from silo.workbench.pane.activity import Do
 
         session, entry_id = self._addon.session, int(action.target)
@@ -73,7 +73,7 @@ class Buttons:
 
     def _details(self, action: Action) -> None:
         """All lines of the BOM difference for which a commit is held."""
-        from silo.workbench.commit.theirs import line_texts
+        from silo.workbench.commit.flow import line_texts
         from silo.workbench.gui import widgets
 
         theirs = self._addon.session.shown.theirs.get(int(action.target))
@@ -109,7 +109,7 @@ class Buttons:
 
     def open_page(self, url: str) -> None:
         """Open a page of the server in use; where no browser opens, the address is on the clipboard."""
-        from silo.api.address import ServerAddress
+        from silo.api.config import ServerAddress
         from silo.bom.errors import SiloError
 
         try:

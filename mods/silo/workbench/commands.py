@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""FreeCAD's commands of the add-on: name, menu text, tooltip, icon, and what they ask of the add-on."""
+"""FreeCAD's commands of the add-on: name, menu text, tooltip, icon, and what they ask of the add-on.
+
+FreeCAD translates a command's texts itself, in the context of the command's name, also when the user changes
+the language: so they are only marked here.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from silo.workbench.words import translate
+from silo.workbench.words import QT_TRANSLATE_NOOP
 
 COMMIT = "Origin_Commit"
 # Where FreeCAD, or a fork of it, has an Origin_Commit of its own, it is left alone and hooked; ours for
@@ -63,16 +67,16 @@ def commands(addon: Any) -> dict[str, Command]:
     """All commands. ``addon`` does the work (:class:`silo.workbench.addon.AddOn`)."""
     return {
         COMMIT: Command(
-            text=translate("Silo", "Commit to Silo"),
-            tip=translate(
-                "Silo",
+            text=QT_TRANSLATE_NOOP("Origin_Commit", "Commit to Silo"),
+            tip=QT_TRANSLATE_NOOP(
+                "Origin_Commit",
                 "Save this document and its changed sub-assemblies, upload them as new revisions, "
                 "and bring the BOM to Silo",
             ),
             icon="silo-commit",
             keys="Ctrl+Alt+S",
-            help=translate(
-                "Silo",
+            help=QT_TRANSLATE_NOOP(
+                "Origin_Commit",
                 "Saves this document and the edited ones below it, uploads each as a new revision with your "
                 "comment, and brings the BOM to Silo. Nothing is ever deleted there.",
             ),
@@ -80,25 +84,30 @@ def commands(addon: Any) -> dict[str, Command]:
             active=addon.has_document,
         ),
         BOM: Command(
-            text=translate("Silo", "Compare BOM with Silo…"),
-            tip=translate("Silo", "Show how the BOM of this assembly differs from the one in Silo"),
+            text=QT_TRANSLATE_NOOP("Silo_BOM", "Compare BOM with Silo…"),
+            tip=QT_TRANSLATE_NOOP(
+                "Silo_BOM", "Show how the BOM of this assembly differs from the one in Silo"
+            ),
             icon="silo-bom",
             keys="Ctrl+Alt+B",
             run=addon.preview,
             active=addon.has_document,
         ),
         REGISTER: Command(
-            text=translate("Silo", "Register Parts…"),
-            tip=translate("Silo", "Give part numbers to the components of this assembly that have none"),
+            text=QT_TRANSLATE_NOOP("Silo_RegisterParts", "Register Parts…"),
+            tip=QT_TRANSLATE_NOOP(
+                "Silo_RegisterParts", "Give part numbers to the components of this assembly that have none"
+            ),
             icon="silo-register",
             keys="Ctrl+Alt+R",
             run=addon.register,
             active=addon.has_document,
         ),
         MASS: Command(
-            text=translate("Silo", "Mass of the Assembly…"),
-            tip=translate(
-                "Silo", "Mass and centre of mass from the parts' shapes and materials, with what is missing"
+            text=QT_TRANSLATE_NOOP("Silo_Mass", "Mass of the Assembly…"),
+            tip=QT_TRANSLATE_NOOP(
+                "Silo_Mass",
+                "Mass and centre of mass from the parts' shapes and materials, with what is missing",
             ),
             icon="silo-mass",
             keys="Ctrl+Alt+M",
@@ -106,34 +115,40 @@ def commands(addon: Any) -> dict[str, Command]:
             active=addon.has_document,
         ),
         ACTIVITY: Command(
-            text=translate("Silo", "Database Activity"),
-            tip=translate("Silo", "Show what happens in Silo, and what waits to be sent"),
+            text=QT_TRANSLATE_NOOP("Silo_Activity", "Database Activity"),
+            tip=QT_TRANSLATE_NOOP("Silo_Activity", "Show what happens in Silo, and what waits to be sent"),
             icon="silo-activity",
             keys="Ctrl+Alt+A",
             run=addon.show_activity,
         ),
         OPEN: Command(
-            text=translate("Silo", "Open from Silo…"),
-            tip=translate("Silo", "Find an item in Silo and open its file with all that it links to"),
+            text=QT_TRANSLATE_NOOP("Silo_Open", "Open from Silo…"),
+            tip=QT_TRANSLATE_NOOP(
+                "Silo_Open", "Find an item in Silo and open its file with all that it links to"
+            ),
             icon="silo-open",
             run=addon.open_from_silo,
         ),
         HISTORY: Command(
-            text=translate("Silo", "History…"),
-            tip=translate("Silo", "The revisions of this document: who, when, and what changed in the BOM"),
+            text=QT_TRANSLATE_NOOP("Silo_History", "History…"),
+            tip=QT_TRANSLATE_NOOP(
+                "Silo_History", "The revisions of this document: who, when, and what changed in the BOM"
+            ),
             icon="silo-history",
             run=addon.history,
             active=addon.has_document,
         ),
         SETTINGS: Command(
-            text=translate("Silo", "Silo Settings…"),
-            tip=translate("Silo", "Server, token, and what a commit does"),
+            text=QT_TRANSLATE_NOOP("Silo_Settings", "Silo Settings…"),
+            tip=QT_TRANSLATE_NOOP("Silo_Settings", "Server, token, and what a commit does"),
             icon="silo-settings",
             run=addon.show_settings,
         ),
         HELP: Command(
-            text=translate("Silo", "Help on Silo"),
-            tip=translate("Silo", "Open the page that explains the commands, the pane and the messages"),
+            text=QT_TRANSLATE_NOOP("Silo_Help", "Help on Silo"),
+            tip=QT_TRANSLATE_NOOP(
+                "Silo_Help", "Open the page that explains the commands, the pane and the messages"
+            ),
             icon="silo",
             run=addon.show_help,
         ),

@@ -6,10 +6,8 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Callable, Sequence
 
+from silo import FREECAD_PACKAGES
 from silo.workbench.words import translate
-
-# Import name → name on PyPI; package.xml declares the same to the Addon Manager.
-NEEDED = {"requests": "requests", "pydantic": "pydantic", "sseclient": "sseclient-py"}
 
 
 def _found(name: str) -> bool:
@@ -17,8 +15,8 @@ def _found(name: str) -> bool:
 
 
 def missing(found: Callable[[str], bool] = _found) -> tuple[str, ...]:
-    """The packages that are not there, by their names on PyPI."""
-    return tuple(package for name, package in NEEDED.items() if not found(name))
+    """The packages that are not there; their names on PyPI are those by which they are imported."""
+    return tuple(name for name in FREECAD_PACKAGES if not found(name))
 
 
 def sentence(packages: Sequence[str], folder: str, python: tuple[int, int]) -> str:

@@ -8,7 +8,7 @@ Started with its arguments in the environment (FreeCAD would open anything else 
 
 ``SILO_ARGS`` is a JSON object, or ``SILO_ARGS_FILE`` names a file with one; docs/headless.md has its keys.
 With ``lines`` the BOMs are only read, and
-written there one JSON object per line as they are finished: that is how ``silo-mod … --via freecad`` asks.
+written there one JSON object per line as they are finished: that is how :mod:`silo.freecads` asks.
 Otherwise they are synced with the server of ``SILO_API_URL`` and ``SILO_API_TOKEN`` (or the configuration).
 
 Exit codes: those of the command line (:class:`silo.bom.errors.Exit`).
@@ -167,8 +167,7 @@ def _sync(job: Job) -> int:
         client = _client()
     except ImportError as error:
         return _without_server(job, error)
-    from silo.batch import Options, TopResult, stopped_by, sync_top
-    from silo.batch_report import Json, Markdown, Report, Summary
+    from silo.batch import Json, Markdown, Options, Report, Summary, TopResult, stopped_by, sync_top
     from silo.workbench.freecad import host
 
     tops = documents_in(job.tops)
@@ -210,7 +209,7 @@ def _each(tops: list[str], job: Job) -> Iterator[tuple[str, Extraction | SiloErr
 
     Where this program cannot start itself anew, the files are read in here.
     """
-    from silo.freecadcmd.run import run_freecad
+    from silo.freecads import run_freecad
     from silo.workbench.freecad import host
 
     done = 0
@@ -237,8 +236,8 @@ def _without_server(job: Job, error: ImportError) -> int:
     from silo.bom.report import bom_json
 
     told = ConfigError(
-        f"FreeCAD's Python has no package {error.name!r}, so nothing was synced. Install requests, pydantic "
-        "and sseclient-py for it, or run `silo-mod sync --via freecad`, which needs none of them there"
+        f"FreeCAD's Python has no package {error.name!r}, so nothing was synced. `silo-mod install-addon` "
+        "installs what it needs, or run `silo-mod sync`, which needs no FreeCAD"
     )
     if job.json is not None:
         results = [
@@ -254,7 +253,7 @@ def _without_server(job: Job, error: ImportError) -> int:
 
 def _write(path: str, text: str) -> None:
     """Whole or not at all: a run that dies while it writes leaves the report before."""
-    from silo.durable import replacing
+    from silo.platform import replacing
 
     target = Path(path)
     if target.exists() and not target.is_file():  # a terminal, a pipe
@@ -272,7 +271,7 @@ def _in_words(result: TopResult) -> str:
 
 
 def _outcome_words(outcome: Outcome) -> str:
-    from silo.api.merging import unusual
+    from silo.api.boms import unusual
     from silo.bom_sync import blocking
 
     text = f"{outcome.assembly.part_number or outcome.assembly.label} {outcome.status.value}"

@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
-Translate = Callable[[str, str], str]
+if TYPE_CHECKING:
+    from silo.bom.errors import Translate
 
 _translate: Translate = lambda _context, text: text  # noqa: E731  (replaced as a whole by `use`)
 
@@ -30,6 +32,16 @@ def use(function: Translate) -> None:
 def translate(context: str, text: str) -> str:
     """The text in the user's language. Write both arguments as literals, or Qt's tools do not see them."""
     return _translate(context, text)
+
+
+def QT_TRANSLATE_NOOP(_context: str, text: str) -> str:  # the name that Qt's tools look for
+    """Return the text; FreeCAD translates it when it shows it."""
+    return text
+
+
+def of_command(name: str, text: str) -> str:
+    """Return a command's text in the user's language."""
+    return _translate(name, text)
 
 
 def plain(text: str, most: int = 200) -> str:

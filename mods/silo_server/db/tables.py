@@ -83,7 +83,6 @@ items = Table(
     Column("current_revision", Integer, nullable=False),
     Column("bom_version", Integer, nullable=False),
     Column("version", Integer, nullable=False, server_default="1"),
-    Column("created_as", String(64)),
     Column("created_at", Stamp, nullable=False),
     Column("created_by", String(64), nullable=False),
     Column("updated_at", Stamp, nullable=False),
@@ -105,11 +104,44 @@ number_counters = Table(
     Column("last_serial", Integer, nullable=False),
 )
 
+# A document is a file: its revisions are those of its item with a file, or, without an item, its own.
+documents = Table(
+    "documents",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("uuid", Uuid, nullable=False, unique=True),
+    Column("item_id", Id, ForeignKey("items.id"), unique=True),
+    Column("current_revision", Integer, nullable=False),
+    Column("created_at", Stamp, nullable=False),
+    Column("created_by", String(64), nullable=False),
+    sqlite_autoincrement=True,
+)
+
+# Which items the newest revision of a document holds, and in which of its objects ("": the file as a whole).
+document_items = Table(
+    "document_items",
+    metadata,
+    Column("document_id", Id, ForeignKey("documents.id"), primary_key=True),
+    Column("item_id", Id, ForeignKey("items.id"), primary_key=True),
+    Column("object", String(200), primary_key=True),
+    Index(None, "item_id"),
+)
+
+# What the newest revision of a document links to, by the UUID of a document.
+document_links = Table(
+    "document_links",
+    metadata,
+    Column("document_id", Id, ForeignKey("documents.id"), primary_key=True),
+    Column("target", Uuid, primary_key=True),
+    Index(None, "target"),
+)
+
 revisions = Table(
     "revisions",
     metadata,
     Column("id", Id, primary_key=True),
-    Column("item_id", Id, ForeignKey("items.id"), nullable=False),
+    Column("item_id", Id, ForeignKey("items.id")),
+    Column("document_id", Id, ForeignKey("documents.id")),
     Column("revision_number", Integer, nullable=False),
     Column("properties", Text, nullable=False),
     Column("comment", Text, nullable=False),
@@ -118,14 +150,13 @@ revisions = Table(
     Column("file_checksum", String(64)),
     Column("file_size", BigInteger),
     Column("thumbnail_key", String(64)),
-    Column("idempotency_key", String(128)),
     Column("created_at", Stamp, nullable=False),
     Column("created_by", String(64), nullable=False),
     Column("base_revision", Integer),
     Column("file_path", Text),
     Column("links", Text),
     UniqueConstraint("item_id", "revision_number"),
-    UniqueConstraint("item_id", "idempotency_key"),
+    UniqueConstraint("document_id", "revision_number"),
     Index(None, "file_checksum"),
     sqlite_autoincrement=True,
 )
@@ -188,11 +219,11 @@ bom_change_lines = Table(
     Column("after", Text),
 )
 
-bom_syncs = Table(
-    "bom_syncs",
+answers = Table(
+    "answers",
     metadata,
-    Column("parent_id", Id, ForeignKey("items.id"), primary_key=True),
-    Column("sync_id", String(128), primary_key=True),
+    Column("subject", String(64), primary_key=True),
+    Column("key", String(128), primary_key=True),
     Column("request_hash", String(64), nullable=False),
     Column("answer", Text, nullable=False),
     Column("version", Integer, nullable=False),
@@ -224,6 +255,25 @@ bom_last_syncs = Table(
     Column("refusal", Text),
     Column("folder", Text),
     Index("ix_bom_last_syncs_open", "parent_id", **_only(INCOMPLETE)),
+)
+
+# What services.bom.summary keeps of each assembly: no foreign key, so that keeping waits for no item.
+product_summaries = Table(
+    "product_summaries",
+    metadata,
+    Column("item_id", Id, primary_key=True, autoincrement=False),
+    Column("summary", Text, nullable=False),
+    Column("sets", Text, nullable=False),
+)
+
+# When a person looked at a product last, and the time before, for what changed since.
+product_looks = Table(
+    "product_looks",
+    metadata,
+    Column("user_id", Id, primary_key=True, autoincrement=False),
+    Column("item_id", Id, primary_key=True, autoincrement=False),
+    Column("at", Stamp, nullable=False),
+    Column("since", Stamp),
 )
 
 events = Table(
@@ -290,12 +340,13 @@ login_links = Table(
     Column("expires_at", Stamp, nullable=False),
 )
 
-login_failures = Table(
-    "login_failures",
+login_attempts = Table(
+    "login_attempts",
     metadata,
     Column("id", Id, primary_key=True),
     Column("username_key", String(64), nullable=False),
     Column("address", String(64), nullable=False),
+    Column("outcome", String(16), nullable=False),
     Column("at", Stamp, nullable=False),
     Index(None, "username_key", "at"),
     Index(None, "address", "at"),

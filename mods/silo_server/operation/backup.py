@@ -19,33 +19,62 @@ import json
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Callable, Collection, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, MetaData, Select, Table, column, func, insert, inspect, select, table, text
+from sqlalchemy import (
+    Connection,
+    MetaData,
+    Select,
+    Table,
+    column,
+    func,
+    insert,
+    inspect,
+    select,
+    table,
+    text,
+    update,
+)
 from sqlalchemy.exc import SQLAlchemyError
 
-from silo.bom.errors import ConfigError
-from silo.durable import replace_patiently, replacing, sync_folder
-from silo.folders import scratch_folder
-from silo_server.clock import stamp, utc_now
-from silo_server.db.bulk import insert_rows
-from silo_server.db.engine import EVENT_CHANNEL, MIGRATION_LOCK, Database, Tx, mode_of, put_state
+from silo.bom.errors import ConfigError, SiloError, listed
+from silo.platform import replace_patiently, replacing, scratch_folder, sync_folder
+from silo_server.db.engine import (
+    EVENT_CHANNEL,
+    MIGRATION_LOCK,
+    Database,
+    Tx,
+    insert_rows,
+    mode_of,
+    one_of,
+    put_state,
+)
 from silo_server.db.migrate import check_revision, upgrade
-from silo_server.db.tables import FILE_REFERENCES, events, items, metadata
-from silo_server.errors import cause_of
-from silo_server.files import FileStore
-from silo_server.json_values import dumps
+from silo_server.db.tables import (
+    FILE_REFERENCES,
+    api_tokens,
+    events,
+    items,
+    login_attempts,
+    login_links,
+    metadata,
+    sessions,
+    users,
+)
+from silo_server.events import HORIZON
 from silo_server.services import search
 from silo_server.services.access import audit
-from silo_server.services.events import HORIZON
-from silo_server.settings import Settings
-from silo_server.values import SYSTEM
+from silo_server.services.revisions import FileStore
+from silo_server.settings import Settings, cause_of, stamp, utc_now
+from silo_server.values import SYSTEM, dumps
 
 FORMAT = 1
+# When the last backup was made, and where; for the page of the system.
+BACKED_UP = "backed_up"
 PAGE = 5000
 CHUNK = 1024 * 1024
 # A restored server gives its events ids that none had before, so that every listener, even one that saw more
@@ -102,6 +131,12 @@ def back_up(settings: Settings, target: Path, report: Report = lambda _: None) -
         finally:
             shutil.rmtree(part, ignore_errors=True)
         sync_folder(target.parent)
+        with (
+            suppress(SQLAlchemyError, SiloError),
+            _open(settings) as db,
+            db.write(even_when_read_only=True) as tx,
+        ):
+            put_state(tx, BACKED_UP, dumps({"at": made.made_at, "target": str(target)}))
     except OSError as error:
         raise ConfigError(f"backup: {target} cannot be written: {error.strerror or error}") from error
     return made
@@ -119,8 +154,7 @@ def verify(source: Path) -> Manifest:
     store = FileStore(source / "files")
     bad = [c for c in sorted(_checksums(path) - set(made.missing_files)) if not store.holds(c)]
     if bad:
-        named = ", ".join(bad[:5]) + (" …" if len(bad) > 5 else "")
-        raise ConfigError(f"restore: {len(bad)} files of the backup are missing or damaged: {named}")
+        raise ConfigError(f"restore: {len(bad)} files of the backup are missing or damaged: {listed(bad)}")
     return made
 
 
@@ -137,6 +171,7 @@ def restore(
         needed where the database has items already.
     """
     made = verify(source)
+    check_revision(made.schema, "backup")
     report("the backup is whole")
     try:
         settings.storage.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -219,12 +254,25 @@ def _save_tables(settings: Settings, path: Path, report: Report) -> tuple[str, d
 
 
 def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) -> None:
+    revoked = tx.conn.scalars(
+        select(api_tokens.c.token_hash).where(api_tokens.c.revoked_at.is_not(None))
+    ).all()
+    inactive = tx.conn.scalars(select(users.c.username_key).where(~users.c.active)).all()
+    known = tx.conn.scalar(select(func.count()).select_from(users)) or 0
     highest = _highest_ids(tx.conn, metadata.sorted_tables)
     for target in reversed(metadata.sorted_tables):
         tx.conn.execute(target.delete())
     for target in metadata.sorted_tables:
+        if target in (sessions, login_links, login_attempts):
+            continue  # a restore lets nobody in who would not be let in by it now
         count = _copy_rows(reader, select(target), tx, target)
         report(f"{target.name}: {count} rows")
+    _keep_out(tx, revoked, inactive)
+    if not known:
+        report(
+            f"tokens that were revoked, users that were deactivated and passwords that were changed after "
+            f"{made.made_at} are as they were before; look at them on the page of the users"
+        )
     for name, value in _highest_ids(reader, metadata.sorted_tables).items():
         highest[name] = max(highest.get(name, 0), value)
     horizon = highest.get("events", 0) + EVENT_ID_STEP
@@ -240,6 +288,13 @@ def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) ->
     audit.note(tx, "server.restored", detail=f"backup of {made.made_at}")
     if tx.postgres:
         tx.conn.execute(select(func.pg_notify(EVENT_CHANNEL, "")))
+
+
+def _keep_out(tx: Tx, revoked: Sequence[str], inactive: Sequence[str]) -> None:
+    """Keep revoked what was revoked, and inactive who was deactivated, since the backup was made."""
+    tokens = one_of(tx, api_tokens.c.token_hash, revoked) & api_tokens.c.revoked_at.is_(None)
+    tx.conn.execute(update(api_tokens).where(tokens).values(revoked_at=tx.stamp))
+    tx.conn.execute(update(users).where(one_of(tx, users.c.username_key, inactive)).values(active=False))
 
 
 def _copy_rows(reader: Connection, query: Select[Any], writer: Tx, target: Table) -> int:
@@ -279,7 +334,9 @@ def _set_highest_ids(connection: Connection, highest: dict[str, int]) -> None:
             connection.execute(text("DELETE FROM sqlite_sequence WHERE name = :name"), values)
             connection.execute(text("INSERT INTO sqlite_sequence (name, seq) VALUES (:name, :seq)"), values)
         else:
-            connection.execute(select(func.setval(func.pg_get_serial_sequence(name, "id"), value)))
+            # A table that never had a row begins at 1, which is not taken yet.
+            sequence = func.pg_get_serial_sequence(name, "id")
+            connection.execute(select(func.setval(sequence, max(value, 1), value > 0)))
 
 
 def _checksums(path: Path) -> set[str]:

@@ -22,33 +22,34 @@ from sqlalchemy import ColumnElement, Table, delete, func, insert, select, updat
 from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import SiloError
-from silo_server.clock import stamp
+from silo_server import events
 from silo_server.db.engine import Database, Tx, get_state, put_state
 from silo_server.db.tables import (
     FILE_REFERENCES,
+    answers,
     api_tokens,
     audit,
     bom_change_lines,
     bom_changes,
-    bom_syncs,
-    login_failures,
+    login_attempts,
     login_links,
     sessions,
 )
-from silo_server.errors import cause_of
-from silo_server.files import FileStore
-from silo_server.json_values import dumps
-from silo_server.services import events
 from silo_server.services import items as item_service
-from silo_server.services.bom.changes import ChangeKind, LineChange, history_row
+from silo_server.services.access.credentials import START_TOKEN
 from silo_server.services.bom.history import state_at
+from silo_server.services.bom.lines import ChangeKind, LineChange, history_row
+from silo_server.services.revisions import FileStore
+from silo_server.settings import cause_of, stamp
+from silo_server.values import dumps
 
 logger = logging.getLogger("silo_server.housekeeping")
 
-START_TOKEN = "given out at start"
 STATE = "housekeeping"
 FILES_STATE = "housekeeping_of_files"
 BATCH = 1000
+# So long a name may log in from an address as before, whatever strangers try.
+PLACE_DAYS = 90
 # An upload is in the store before the row that refers to it is committed; a day is far more than that takes.
 ORPHAN_SECONDS = 24 * 3600.0
 
@@ -156,21 +157,25 @@ def _days(setting: str) -> Callable[[Tx], datetime | None]:
     return age
 
 
-def _failures(tx: Tx) -> datetime:
+def _attempts(tx: Tx) -> datetime:
     return tx.at - timedelta(seconds=10 * tx.settings.login_window_seconds)
 
 
-def _syncs(tx: Tx) -> int:
-    """Sync answers beyond their age, or beyond their bytes; the oldest first."""
+def _places(tx: Tx) -> datetime:
+    return tx.at - timedelta(days=PLACE_DAYS)
+
+
+def _answers(tx: Tx) -> int:
+    """Answers beyond their age, or beyond their bytes; the oldest first."""
     by_age = _days("sync_days")(tx)
-    newest = select(bom_syncs.c.at, events.bytes_of(tx, bom_syncs.c.answer)).order_by(bom_syncs.c.at.desc())
+    newest = select(answers.c.at, events.bytes_of(tx, answers.c.answer)).order_by(answers.c.at.desc())
     by_size = events.beyond(tx, newest, tx.settings.sync_bytes)
     before = max(stamp(by_age) if by_age else "", by_size or "")
-    oldest = select(bom_syncs.c.at).where(bom_syncs.c.at <= before).order_by(bom_syncs.c.at).limit(BATCH)
+    oldest = select(answers.c.at).where(answers.c.at <= before).order_by(answers.c.at).limit(BATCH)
     last = max(tx.conn.scalars(oldest), default=None)
     if last is None:
         return 0
-    return tx.conn.execute(delete(bom_syncs).where(bom_syncs.c.at <= last)).rowcount
+    return tx.conn.execute(delete(answers).where(answers.c.at <= last)).rowcount
 
 
 def _events(tx: Tx) -> int:
@@ -199,9 +204,7 @@ def _history(tx: Tx) -> int:
     ours = bom_changes.c.parent_id == parent.id
     gone = select(bom_changes.c.id).where(ours, bom_changes.c.id <= newest)
     tx.conn.execute(delete(bom_change_lines).where(bom_change_lines.c.change_id.in_(gone)))
-    tx.conn.execute(
-        delete(bom_syncs).where(bom_syncs.c.parent_id == parent.id, bom_syncs.c.change_id <= newest)
-    )
+    tx.conn.execute(delete(answers).where(answers.c.change_id.in_(gone)))
     count = tx.conn.execute(delete(bom_changes).where(ours, bom_changes.c.id < newest)).rowcount
     tx.conn.execute(
         update(bom_changes)
@@ -223,9 +226,10 @@ def _history(tx: Tx) -> int:
 _STEPS: dict[str, Step] = {
     "sessions": _old(sessions, "id_hash", "expires_at", _now),
     "login links": _old(login_links, "token_hash", "expires_at", _now),
-    "login failures": _old(login_failures, "id", "at", _failures),
+    "login attempts": _old(login_attempts, "id", "at", _attempts, login_attempts.c.outcome != "proved"),
+    "places of logins": _old(login_attempts, "id", "at", _places),
     "start tokens": _old(api_tokens, "id", "expires_at", _now, api_tokens.c.name == START_TOKEN),
-    "sync answers": _syncs,
+    "answers": _answers,
     "events": _events,
     "audit": _old(audit, "id", "at", _days("audit_days")),
     "history": _history,

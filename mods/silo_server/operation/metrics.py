@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``GET /metrics`` for Prometheus: requests by route, and how the server is at the moment.
+"""``GET /metrics`` for Prometheus: requests by route, and how the server is; that for people too.
 
 With several worker processes prometheus-client adds up what each of them writes to a shared folder
 (``PROMETHEUS_MULTIPROC_DIR``, which ``run`` sets before they start).
@@ -7,7 +7,12 @@ With several worker processes prometheus-client adds up what each of them writes
 
 from __future__ import annotations
 
+import importlib.metadata
+import json
+import math
 import os
+from dataclasses import asdict
+from typing import Any
 
 from prometheus_client import (
     CONTENT_TYPE_LATEST,
@@ -18,13 +23,17 @@ from prometheus_client import (
     generate_latest,
     multiprocess,
 )
+from sqlalchemy import func, select, text
 
-from silo_server.clock import Clock
-from silo_server.db.engine import Database, mode_of
-from silo_server.events.hub import Hub
-from silo_server.files import FileStore
+from silo_server import events
+from silo_server.db.engine import Database, Turnstile, get_state, mode_of
+from silo_server.db.tables import items, product_summaries, sessions, users
+from silo_server.events import Hub
+from silo_server.operation.backup import BACKED_UP
 from silo_server.operation.housekeeping import Run, last_run
-from silo_server.services import events
+from silo_server.schema.catalog import find_schema
+from silo_server.services.revisions import FileStore
+from silo_server.settings import Clock
 
 CONTENT_TYPE = CONTENT_TYPE_LATEST
 BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
@@ -90,6 +99,42 @@ class Metrics:
             counted = CollectorRegistry()
             multiprocess.MultiProcessCollector(counted)  # type: ignore[no-untyped-call]
         return generate_latest(counted) + generate_latest(now)
+
+
+def standing(db: Database, hub: Hub, files: FileStore, large_reads: Turnstile) -> dict[str, Any]:
+    """How this server is at the moment, for an administrator; the queues are those of one process."""
+    with db.read() as tx:
+        row = sessions.c
+        counts = {
+            "users": select(func.count()).select_from(users).where(users.c.active),
+            "sessions": select(func.count()).select_from(sessions).where(row.expires_at > tx.stamp),
+            "items": select(func.count()).select_from(items),
+            "summaries": select(func.count()).select_from(product_summaries),
+        }
+        told: dict[str, Any] = {name: tx.conn.scalar(query) or 0 for name, query in counts.items()}
+        run, saved = last_run(tx), get_state(tx, BACKED_UP)
+        schema, mode = tx.conn.scalar(text("SELECT version_num FROM alembic_version")), mode_of(tx)
+        size = tx.conn.scalar(text("SELECT pg_database_size(current_database())")) if tx.postgres else None
+    path = db.settings.sqlite_path
+    return told | {
+        "version": importlib.metadata.version("silo-mod"),
+        "mode": mode,
+        "database": "PostgreSQL" if path is None else str(path),
+        "database_bytes": size if path is None else path.stat().st_size,
+        "schema": schema,
+        "storage": str(db.settings.storage),
+        "free_bytes": None if math.isnan(free := files.free()) else int(free),
+        "backup": None if saved is None else json.loads(saved),
+        "housekeeping": None if run is None else asdict(run),
+        "queues": {
+            "changes": db.turn.here,
+            "exports and large reads": large_reads.here,
+            "event streams": hub.listeners,
+            "summaries to be kept": len(db.built),
+        },
+        "categories": len(find_schema(None).categories),
+        "warnings": list(db.settings.warnings),
+    }
 
 
 def _now(registry: CollectorRegistry, name: str, text: str, value: float) -> None:

@@ -3,40 +3,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+import hashlib
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import partial
+from tempfile import SpooledTemporaryFile
+from typing import IO, Annotated, Any, cast
 
 import anyio.to_thread
 import pydantic_core
-from fastapi import APIRouter, Query
-from starlette.responses import Response
+from fastapi import APIRouter, Depends, Path, Query, Request
+from pydantic import Field, WithJsonSchema
+from starlette.datastructures import UploadFile
+from starlette.responses import Response, StreamingResponse
 
 from silo.api.wire import MergeResult
 from silo.bom.errors import CycleError, RejectedError
-from silo.bom.numbers import plain
+from silo.bom.numbers import plain, whole_number
 from silo_server.db.engine import Tx
-from silo_server.routes import document
+from silo_server.routes import context, models
 from silo_server.routes.context import (
+    FORM_TYPES,
     READ_ERRORS,
     WRITE_ERRORS,
     Call,
     Editor,
     ExpectedVersion,
+    PageFrom,
     Viewer,
     etag_of,
+    idempotency_key,
     json_answer,
     json_body,
     raw_json,
 )
 from silo_server.routes.models import (
+    Body,
     BomsOut,
     LineChangeBody,
     LineOut,
     NewLineBody,
     NumbersBody,
+    Short,
+    Text,
 )
-from silo_server.services.bom import edits, rollup, tree
-from silo_server.services.bom.last_sync import NEVER, last_syncs, marks, remember_refusal
+from silo_server.services.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
+from silo_server.services.bom import history, review, transfer, tree
+from silo_server.services.bom import review as service
 from silo_server.services.bom.lines import (
     LineId,
     check_line_count,
@@ -44,20 +59,34 @@ from silo_server.services.bom.lines import (
     line_state_to_wire,
     line_to_wire,
     lines_of_many,
+    locked_parent,
     revisions_to_wire,
+    state_to_json,
 )
-from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merge
-from silo_server.services.bom.merge_json import MergeOrder, read_merge_order
+from silo_server.services.bom.merge import (
+    NEVER,
+    MergeOrder,
+    MergeOutcome,
+    last_syncs,
+    merge_bom,
+    preview_merge,
+    read_merge_order,
+    remember_refusal,
+)
 from silo_server.services.bom.review import told_quantities
+from silo_server.services.bom.summary import below, summary_of
+from silo_server.services.bom.transfer import View
 from silo_server.services.items import get_by_numbers, get_item
-from silo_server.values import Item, LineState, to_wire
+from silo_server.services.revisions import clean_name
+from silo_server.settings import stamp, wire
+from silo_server.values import Item, LineState, dumps, to_wire
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
 several = APIRouter(prefix="/api", tags=["bom"])
 
 Depth = Annotated[int, Query(ge=1, le=tree.MAX_DEPTH)]
 MERGE_BODY = {
-    **document.refused(
+    **context.refused(
         "an entry whose part number no item has, an assembly as its own child, and entries of one child that "
         "add up to more than 1e9; all of them are listed and nothing is changed"
     ),
@@ -111,7 +140,7 @@ def add_line(call: Editor, part_number: str, body: NewLineBody, expected: Expect
     values = body.model_dump(exclude={"child_part_number"})
     state = LineState(**{**values, "reference_designators": tuple(body.reference_designators)})
     with call.write() as tx:
-        edited = edits.add_line(tx, part_number, body.child_part_number, state, expected)
+        edited = review.add_line(tx, part_number, body.child_part_number, state, expected)
         return _edited(edited, 201)
 
 
@@ -166,21 +195,23 @@ async def merge(call: Editor, part_number: str, expected: ExpectedVersion) -> Re
 @router.get("/expanded", response_model=list[LineOut], responses=READ_ERRORS)
 def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) -> Response:
     """The tree as rows, parents before children; quantities per one parent, and in total."""
-    with call.read() as tx:
-        graph = tree.load_graph(tx, get_item(tx, part_number), None if depth == tree.MAX_DEPTH else depth)
-    rows = tree.expand(graph, depth, call.server.settings.max_expanded_rows)
-    return raw_json(render_expanded(rows))
+    with call.server.large_reads.enter():
+        with call.read() as tx:
+            item = get_item(tx, part_number)
+            graph = tree.load_graph(tx, item, None if depth == tree.MAX_DEPTH else depth)
+        return raw_json(render_expanded(tree.expand(graph, depth, call.server.settings.max_expanded_rows)))
 
 
 @router.get("/flat", responses=READ_ERRORS)
 def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
     """The leaf parts, quantities multiplied down the tree and summed; 409 where it never ends."""
-    with call.read() as tx:
+    with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
-        found = marks(tx, graph)
+        still = summary_of(tx, graph.root).open.values()
     return {
         "part_number": graph.root.part_number,
-        "incomplete": {graph.names()[one]: words for one, words in found.items()},
+        "incomplete": {one.part_number: one.incomplete for one in still if one.incomplete},
+        "open": {one.part_number: one.questions for one in still if one.questions},
         "flat_bom": [
             {
                 "part_number": row.line.child_part_number,
@@ -190,6 +221,8 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
                 "item_type": row.line.child_item_type,
                 "total_quantity": plain(row.total),
                 "unit": row.unit,
+                **({"unreferenced_quantity": plain(row.gone)} if row.gone else {}),
+                **({"in_conflict": True} if row.disputed else {}),
             }
             for row in tree.flatten(graph)
         ],
@@ -199,9 +232,9 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
 @router.get("/cost", responses=READ_ERRORS)
 def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
     """Flat BOM × ``standard_cost``, per currency; ``missing`` names what has no cost."""
-    with call.read() as tx:
+    with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
-        cost = rollup.roll_up_cost(graph, rollup.parts_of(tx, graph))
+        cost = tree.roll_up_cost(graph, tree.parts_of(tx, graph))
     only = next(iter(cost.totals.values())) if len(cost.totals) == 1 else None
     return {
         "part_number": graph.root.part_number,
@@ -216,9 +249,10 @@ def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
 @router.get("/mass", responses=READ_ERRORS)
 def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
     """The mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names what has none."""
-    with call.read() as tx:
+    with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
-        mass = rollup.roll_up_mass(graph, rollup.parts_of(tx, graph))
+        parts = tree.parts_of(tx, graph)
+        mass = tree.roll_up_mass(graph, parts, below(tx, graph, parts).standing_alone)
     return {
         "part_number": graph.root.part_number,
         "total_mass_kg": mass.total,
@@ -226,6 +260,36 @@ def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
         "complete": not mass.missing,
         "missing": list(mass.missing),
         "lines": [to_wire(row) for row in mass.rows],
+    }
+
+
+@router.get("/summary", responses=READ_ERRORS)
+def get_summary(call: Viewer, part_number: str) -> dict[str, Any]:
+    """The product over its whole graph: what is open, mass and cost, counts, the last change.
+
+    ``total_mass_kg`` and ``totals`` lack what ``mass_missing`` and ``cost_missing`` count; the first of them
+    are named.
+    """
+    with call.read() as tx:
+        item = get_item(tx, part_number)
+        found = summary_of(tx, item)
+    costs = found.worth.costs.items()
+    return {
+        "part_number": item.part_number,
+        "open": {one.part_number: one.questions for one in found.open.values() if one.questions},
+        "incomplete": {one.part_number: one.incomplete for one in found.open.values() if one.incomplete},
+        "questions": found.questions,
+        **to_wire(found, "open", "worth", "as_part", "levels", "no_mass", "no_cost", "changed"),
+        "levels": len(found.levels),
+        "total_mass_kg": plain(found.worth.mass),
+        "totals": [{"currency": currency, "total_cost": plain(cost)} for currency, cost in costs],
+        "mass_missing": {"count": found.no_mass, "first": list(found.mass_missing)},
+        "cost_missing": {"count": found.no_cost, "first": list(found.cost_missing)},
+        "last_change": {
+            "at": wire(found.changed.at),
+            "user": found.changed.username,
+            "item": found.changed.part_number,
+        },
     }
 
 
@@ -284,23 +348,23 @@ def _change(
     call: Call, part_number: str, which: str | LineId, body: LineChangeBody, expected: int | None
 ) -> Response:
     with call.write() as tx:
-        return _edited(edits.change_line(tx, part_number, which, line_changes(body), expected), 200)
+        return _edited(review.change_line(tx, part_number, which, line_changes(body), expected), 200)
 
 
 def _remove(call: Call, part_number: str, which: str | LineId, expected: int | None) -> Response:
     with call.write() as tx:
-        edited = edits.remove_line(tx, part_number, which, expected)
+        edited = review.remove_line(tx, part_number, which, expected)
     return Response(status_code=204, headers={"ETag": etag_of(edited.version)})
 
 
-def _edited(edited: edits.Edited, status: int) -> Response:
+def _edited(edited: review.Edited, status: int) -> Response:
     assert edited.line is not None  # add and change leave a line behind
     return json_answer(
         line_to_wire(edited.line, edited.parent.part_number), status, {"ETag": etag_of(edited.version)}
     )
 
 
-def render_expanded(rows: Sequence[tree.Occurrence]) -> bytes:
+def render_expanded(rows: Iterable[tree.Occurrence]) -> bytes:
     """The rows as a JSON list, each a line with ``depth`` and ``total_quantity``.
 
     Written from pieces that are made once per child and once per state: a tree of 100 000 occurrences has few
@@ -333,3 +397,448 @@ def render_expanded(rows: Sequence[tree.Occurrence]) -> bytes:
 
 def _members(value: Mapping[str, Any]) -> bytes:
     return pydantic_core.to_json(value)[1:-1]
+
+
+review_router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom review"])
+
+ChangeId = Annotated[int, Path(ge=0, le=2**62)]
+
+
+class DecisionBody(Body):
+    """One decision; ``reason`` says why a line is kept.
+
+    The line is named by ``line_id``, or by its child: then the component is meant.
+    """
+
+    child_part_number: Short = ""
+    line_id: Short | None = None
+    action: service.Action
+    reason: Text | None = None
+
+
+class ResolveBody(Body):
+    """``POST …/bom/resolve``: all of them as one change."""
+
+    decisions: Annotated[list[DecisionBody], Field(min_length=1, max_length=20_000)]
+
+
+class RestoreBody(Body):
+    """``POST …/bom/restore``: the change whose state comes back (0 = the empty BOM).
+
+    ``with_archived``: archived parts may come back with it; else 409 names them.
+    """
+
+    change_id: models.ChangeIdOrNone
+    reason: Text | None = None
+    with_archived: bool = False
+
+
+class UndoBody(Body):
+    """``POST …/bom/undo``."""
+
+    change_id: models.ChangeId
+
+
+@review_router.get("/review", responses=READ_ERRORS)
+def get_review(call: Viewer, part_number: str) -> Response:
+    """What is open: unreferenced lines, conflicts with both values, and the last merge."""
+    with call.read() as tx:
+        found = service.review(tx, part_number)
+        open_below = summary_of(tx, found.parent).told(found.parent.id)
+    name = found.parent.part_number
+    body = {
+        "part_number": name,
+        "version": found.parent.bom_version,
+        "unreferenced": [line_to_wire(line, name) for line in found.unreferenced],
+        "conflicts": [
+            {
+                "child_part_number": conflict.line.child_part_number,
+                "child_name": conflict.line.child_name,
+                "assembly_quantity": plain(conflict.cad_quantity),
+                "server_quantity": plain(conflict.line.state.quantity),
+                "since": wire(conflict.since),
+                "override": conflict.line.state.override,
+            }
+            for conflict in found.conflicts
+        ],
+        "last_merge": change_to_wire(found.last_merge) if found.last_merge else None,
+        "below": dict(open_below),
+    }
+    return json_answer(body, headers={"ETag": etag_of(found.parent.bom_version)})
+
+
+@review_router.post(
+    "/resolve",
+    responses=WRITE_ERRORS,
+    openapi_extra=context.refused(
+        "a decision that does not fit its line, such as keep for one that is referenced, or a line that the "
+        "BOM does not have; all of them are listed and nothing is changed"
+    ),
+)
+def resolve(call: Editor, part_number: str, body: ResolveBody, expected: ExpectedVersion) -> Response:
+    """Decide on lines: ``remove``, ``keep`` (as intentional), ``take_cad``, ``keep_silo``."""
+    decisions = [service.Decision(d.child_part_number, d.action, d.reason, d.line_id) for d in body.decisions]
+    with call.write() as tx:
+        change_id, version = service.resolve(tx, part_number, decisions, expected)
+        return _changed(change_id, version)
+
+
+@review_router.get("/history", responses=READ_ERRORS)
+def list_history(
+    call: Viewer, part_number: str, limit: Annotated[int, Query(ge=1, le=500)] = 50, before: PageFrom = None
+) -> list[dict[str, Any]]:
+    """The changes, newest first: who, when, why, from which file."""
+    with call.read() as tx:
+        found = history.list_changes(tx, get_item(tx, part_number, include_archived=True), limit, before)
+    return [change_to_wire(change) for change in found]
+
+
+@review_router.get("/history/{change_id}", responses=READ_ERRORS)
+def get_change(call: Viewer, part_number: str, change_id: ChangeId) -> dict[str, Any]:
+    """One change with its lines before and after."""
+    with call.read() as tx:
+        item = get_item(tx, part_number, include_archived=True)
+        change, lines = history.get_change(tx, item, change_id)
+    rows = [
+        {
+            "line_id": line.line_id,
+            "child_part_number": line.child.part_number,
+            "child_name": line.child.name,
+            "before": state_to_wire(line.before),
+            "after": state_to_wire(line.after),
+        }
+        for line in lines
+    ]
+    return {**change_to_wire(change), "lines": rows}
+
+
+@review_router.get("/history/{change_id}/bom", responses=READ_ERRORS)
+def get_past_bom(call: Viewer, part_number: str, change_id: ChangeId) -> list[dict[str, Any]]:
+    """The BOM as this change left it (0 = before everything)."""
+    with call.read() as tx:
+        item = get_item(tx, part_number, include_archived=True)
+        lines = history.state_at(tx, item, change_id)
+    return [
+        {
+            "id": line.line_id,
+            "child_part_number": line.child.part_number,
+            "child_name": line.child.name,
+            **(state_to_wire(line.state) or {}),
+        }
+        for line in lines
+    ]
+
+
+Point = Annotated[str, Query(max_length=40), WithJsonSchema(context.POINT)]
+
+
+@review_router.get("/compare", responses=READ_ERRORS)
+def compare(
+    call: Viewer,
+    part_number: str,
+    from_point: Annotated[str, Query(alias="from", max_length=40), WithJsonSchema(context.POINT)] = "0",
+    to: Point = "now",
+) -> dict[str, Any]:
+    """Two points of time side by side; each a change id, a time, or ``now``."""
+    with call.read() as tx:
+        item = get_item(tx, part_number, include_archived=True)
+        first, second = find_point(tx, item, from_point), find_point(tx, item, to)
+        rows = history.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
+    return {
+        "part_number": item.part_number,
+        "from": first,
+        "to": second,
+        "lines": [
+            {
+                "child_part_number": row.child.part_number,
+                "child_name": row.child.name,
+                "status": row.status,
+                "fields": list(row.fields),
+                "before": state_to_wire(row.before),
+                "after": state_to_wire(row.after),
+            }
+            for row in rows
+        ],
+    }
+
+
+@review_router.post("/restore", responses=WRITE_ERRORS)
+def restore(call: Editor, part_number: str, body: RestoreBody, expected: ExpectedVersion) -> Response:
+    """Bring an earlier state back, as a new change."""
+    with call.write() as tx:
+        change_id, version = history.restore(
+            tx, part_number, body.change_id, body.reason, expected, with_archived=body.with_archived
+        )
+        return _changed(change_id, version)
+
+
+@review_router.post("/undo", responses=WRITE_ERRORS)
+def undo(call: Editor, part_number: str, body: UndoBody, expected: ExpectedVersion) -> Response:
+    """Take one change back, as a new change; 409 where its lines changed again since."""
+    with call.write() as tx:
+        change_id, version = history.undo(tx, part_number, body.change_id, expected)
+        return _changed(change_id, version)
+
+
+def find_point(tx: Tx, item: Item, text: str) -> int:
+    """The change that a point of time means; RejectedError where it is none."""
+    if (change_id := whole_number(text, 18)) is not None:
+        return change_id
+    if text == "now":
+        return history.change_at(tx, item, "9999")
+    try:
+        when = datetime.fromisoformat(text.replace(" ", "+"))
+        at = stamp(when) if when.tzinfo is not None else ""
+    except (ValueError, OverflowError):
+        raise RejectedError(
+            f"from, to: wanted a change id, a time such as 2026-02-08T22:15:00Z, or now, got {text!r}"
+        ) from None
+    if when.tzinfo is None:
+        raise RejectedError(f"from, to: wanted a time with its zone (such as …Z), got {text!r}")
+    return history.change_at(tx, item, at)
+
+
+def change_to_wire(change: history.Change) -> dict[str, Any]:
+    """A change, without its lines."""
+    context = {
+        "file": change.document_file,
+        "sha256": change.document_sha256,
+        "revision": change.document_revision,
+    }
+    return {
+        **to_wire(change, "username", "document_file", "document_sha256", "document_revision"),
+        "user": change.username,
+        "document": context if any(v is not None for v in context.values()) else None,
+    }
+
+
+def state_to_wire(state: LineState | None) -> dict[str, Any] | None:
+    """A line's state; only what is set."""
+    if state is None:
+        return None
+    told = line_state_to_wire(state)
+    return {name: told[name] for name in state_to_json(state)}
+
+
+def _changed(change_id: int, version: int) -> Response:
+    return json_answer({"change_id": change_id, "version": version}, headers={"ETag": etag_of(version)})
+
+
+transfer_router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom transfer"])
+
+SPOOL_BYTES = 1024 * 1024
+CHUNK = 64 * 1024
+XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
+
+
+def _content(media_type: str) -> dict[int | str, dict[str, Any]]:
+    return {**READ_ERRORS, 200: {"content": {media_type: {}}, "description": "The file"}}
+
+
+IMPORT_BODY = {
+    **context.refused(
+        "what is no CSV with a header row (part number, quantity), and rows that name unknown parts or "
+        "unusable values; without dry_run a wrong row refuses the whole file"
+    ),
+    "requestBody": {
+        "required": True,
+        "content": {
+            "text/csv": {"schema": {"type": "string"}},
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "required": ["file"],
+                    "properties": {"file": {"type": "string", "format": "binary"}},
+                }
+            },
+        },
+    },
+}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What an export shows: the view, for how many pieces, and the filter of the page (words, a type)."""
+
+    view: View = View.SINGLE
+    pieces: Annotated[int, Query(ge=1, le=1_000_000)] = 1
+    q: Annotated[str, Query(max_length=200)] = ""
+    type: Annotated[str, Query(max_length=20)] = ""
+
+
+As = Annotated[Wanted, Depends()]
+
+
+@transfer_router.get("/export.csv", response_class=Response, responses=_content("text/csv"))
+def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = False) -> Response:
+    """The BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text.
+
+    ``pieces``: totals for so many of it; ``q``, ``type``: only what fits. ``semicolons``: for an Excel that
+    expects 1,5 instead of 1.5.
+    """
+    return _exported(
+        call,
+        part_number,
+        wanted,
+        partial(transfer.to_csv, semicolons=semicolons),
+        "text/csv; charset=utf-8; header=present",
+        "csv",
+    )
+
+
+@transfer_router.get("/export.xlsx", response_class=Response, responses=_content(XLSX))
+def export_xlsx(call: Viewer, part_number: str, wanted: As) -> Response:
+    """The BOM as a workbook."""
+    return _exported(call, part_number, wanted, transfer.to_xlsx, XLSX, "xlsx")
+
+
+@transfer_router.get("/export.json", responses=READ_ERRORS)
+def export_json(call: Viewer, part_number: str, wanted: As) -> Response:
+    """The BOM as JSON."""
+    return _exported(call, part_number, wanted, transfer.to_json, "application/json", "json")
+
+
+Moment = Annotated[str, Query(max_length=40)]
+Since = Annotated[str, Query(alias="from", min_length=1, max_length=40)]
+
+
+@transfer_router.get("/changes", responses=READ_ERRORS)
+def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -> dict[str, Any]:
+    """What changed in the product, over all levels: lines, quantities, data and files of its parts.
+
+    ``from`` and ``to`` are a date, a time, or a revision of the item as ``r3``; without ``to`` until now.
+    """
+    with call.server.large_reads.enter(), call.read() as tx:
+        item = get_item(tx, part_number)
+        first = history.moment(tx, item, since)
+        last = history.moment(tx, item, to, end=True) if to else tx.stamp
+        found = history.what_changed(tx, item, first, last)
+    return {
+        "part_number": item.part_number,
+        "from": wire(first),
+        "to": wire(last),
+        "changes": [one._asdict() | {"at": wire(one.at)} for one in found],
+    }
+
+
+@transfer_router.get("/changes.csv", response_class=Response, responses=_content("text/csv"))
+def changes_csv(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
+    """What changed, as CSV."""
+    make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
+    return _file(call, make, transfer.to_csv, "text/csv; charset=utf-8; header=present", "changes.csv")
+
+
+@transfer_router.get("/changes.xlsx", response_class=Response, responses=_content(XLSX))
+def changes_xlsx(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
+    """What changed, as a workbook."""
+    make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
+    return _file(call, make, transfer.to_xlsx, XLSX, "changes.xlsx")
+
+
+@transfer_router.post("/import", responses=WRITE_ERRORS, openapi_extra=IMPORT_BODY)
+async def import_csv(
+    call: Editor, part_number: str, expected: ExpectedVersion, dry_run: Annotated[bool, Query()] = False
+) -> Response:
+    """Import a CSV (as the body, or as the form part ``file``).
+
+    ``dry_run`` says row by row what would happen; without it everything is imported, or, where a row is
+    wrong, nothing (400 with all problems). ``Idempotency-Key`` makes a repeat give the first answer.
+    """
+    data, name = await _uploaded(call.request)
+
+    def work() -> Response:
+        records = transfer.read_csv(data, call.server.settings.max_merge_entries)
+        if dry_run:
+            with call.read() as tx:
+                return json_answer(plan_to_wire(transfer.plan_import(tx, part_number, records), dry_run))
+        with call.write() as tx:
+            parent = locked_parent(tx, part_number)
+            digest = hashlib.sha256(data).hexdigest()
+            request = KeyedRequest.of(f"import {parent.id}", idempotency_key(call.request), digest, name)
+            answer = earlier_answer(tx, request)
+            if answer is None:
+                plan, _, version = transfer.apply_import(tx, part_number, records, name, expected)
+                answer = KeptAnswer(dumps(plan_to_wire(plan, dry_run)), version)
+                keep_answer(tx, request, answer)
+            return raw_json(answer.text, headers={"ETag": etag_of(answer.version)})
+
+    return await anyio.to_thread.run_sync(work)
+
+
+def plan_to_wire(plan: transfer.ImportPlan, dry_run: bool) -> dict[str, Any]:
+    """What an import does, or would do."""
+    return {
+        "dry_run": dry_run,
+        "counts": {status: plan.count(status) for status in ("add", "change", "same", "skip", "error")},
+        "problems": plan.problems,
+        "rows": [
+            {
+                "row": row.row,
+                "part_number": row.part_number,
+                "status": row.status,
+                "problems": list(row.problems),
+                "before": state_to_wire(row.before),
+                "after": state_to_wire(row.after),
+            }
+            for row in plan.rows
+        ],
+    }
+
+
+async def _uploaded(request: Request) -> tuple[bytes, str | None]:
+    if not request.headers.get("content-type", "").startswith(FORM_TYPES):
+        return await request.body(), None
+    async with request.form(max_files=1, max_fields=20) as form:
+        file = form.get("file")
+        if not isinstance(file, UploadFile):
+            raise RejectedError("file: wanted a multipart form with the CSV in a part named 'file'")
+        return await file.read(), clean_name(file.filename or "")
+
+
+def _sent(out: IO[bytes]) -> Iterator[bytes]:
+    with out:
+        while chunk := out.read(CHUNK):
+            yield chunk
+
+
+def _exported(
+    call: Call,
+    part_number: str,
+    wanted: Wanted,
+    write: Callable[[transfer.Export, IO[bytes]], None],
+    media_type: str,
+    suffix: str,
+) -> Response:
+    view, pieces = wanted.view, wanted.pieces
+
+    def make(tx: Tx) -> transfer.Export:
+        return transfer.export(tx, part_number, view, pieces, wanted.q, wanted.type)
+
+    many = f"-for-{pieces}" if pieces > 1 else ""
+    return _file(call, make, write, media_type, f"bom-{view.value}{many}.{suffix}")
+
+
+def _file(
+    call: Call,
+    make: Callable[[Tx], transfer.Export],
+    write: Callable[[transfer.Export, IO[bytes]], None],
+    media_type: str,
+    name: str,
+) -> Response:
+    # On the disk where it is large: an export must not take the memory of a whole file.
+    out = cast(IO[bytes], SpooledTemporaryFile(max_size=SPOOL_BYTES))  # noqa: SIM115 - the answer closes it
+    try:
+        with call.server.large_reads.enter():
+            with call.read() as tx:
+                made = make(tx)
+            write(made, out)
+    except BaseException:
+        out.close()
+        raise
+    stem = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in made.root.part_number)
+    headers = {
+        "Content-Disposition": f'attachment; filename="{stem}-{name}"',
+        "Content-Length": str(out.seek(0, os.SEEK_END)),
+    }
+    out.seek(0)
+    return StreamingResponse(_sent(out), media_type=media_type, headers=headers)

@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What every route gets: the server's parts, who is calling, and how an answer is written."""
+"""What every route gets: the server's parts, who is calling, and how an answer is written.
+
+What the OpenAPI document says of values, so that it calls valid what the server takes and nothing else.
+
+Some requests are refused although their form is right: a CSV without a header row, a merge that names an
+unknown part number. Such an operation says why under ``x-valid-but-refused``, and so does its 400.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +13,7 @@ import json
 import secrets
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import anyio.to_thread
@@ -16,18 +22,23 @@ from fastapi import Depends, Query, Request
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.api.wire import ErrorBody
+from silo.api.wire import ErrorBody, MergeRequest
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
-from silo.bom.numbers import whole_number
+from silo.bom.numbers import LARGEST_QUANTITY, whole_number
+from silo.bom.resolve import REFUSED_CHARACTERS
 from silo_server.background import Probe
-from silo_server.db.engine import Database, Tx
-from silo_server.events.hub import Hub
-from silo_server.files import FileStore
-from silo_server.operation.requests import info_of
+from silo_server.db.engine import Database, Turnstile, Tx
+from silo_server.events import Hub
+from silo_server.http import info_of
+from silo_server.schema.catalog import ITEM_TYPES, find_schema
+from silo_server.services.access.accounts import MAX_PASSWORD, MIN_PASSWORD, USERNAME_FORM
 from silo_server.services.access.credentials import actor_by_token
 from silo_server.services.access.logins import actor_by_session
+from silo_server.services.bom.merge import text_problem
+from silo_server.services.items import NUMBER_FORM, RESERVED
+from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
-from silo_server.values import Actor, Role
+from silo_server.values import MAX_KEY, MAX_NUMBER, Actor, Role
 
 SESSION_COOKIE = "silo_session"
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -60,6 +71,8 @@ class Server:
     hub: Hub
     files: FileStore
     probe: Probe
+    # Reads that may take seconds and much memory: one at a time, so that all others go on.
+    large_reads: Turnstile = field(default_factory=lambda: Turnstile(1, 16, 60, "exports and large reads"))
 
 
 def server_of(request: Request) -> Server:
@@ -175,7 +188,7 @@ _MASKED = "m."
 def json_answer(value: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
     """``value`` as JSON, by the quick writer that pydantic brings along.
 
-    It writes all that :mod:`silo_server.json_values` lets in. Call it before the commit: an answer that
+    It writes all that :mod:`silo_server.values` lets in. Call it before the commit: an answer that
     cannot be written must not leave anything behind.
     """
     return raw_json(pydantic_core.to_json(value), status, headers)
@@ -217,6 +230,174 @@ def expected_version(request: Request) -> int | None:
     return -1 if version is None else version
 
 
+def idempotency_key(request: Request) -> str | None:
+    """The ``Idempotency-Key``, under which a repeat of the request gets the first answer."""
+    key = request.headers.get("idempotency-key")
+    if key is not None and (not key or (problem := text_problem(key, 128))):
+        raise RejectedError(f"Idempotency-Key: {problem if key else 'wanted 1 to 128 characters, got none'}")
+    return key
+
+
 ExpectedVersion = Annotated[int | None, Depends(expected_version)]
 # The id of a row, to page a list from.
 PageFrom = Annotated[int | None, Query(ge=0, le=2**62)]
+
+
+Schema = dict[str, Any]
+ALLOWED = f"^[^{REFUSED_CHARACTERS}]*$"
+NOTHING: Schema = {"type": "null"}
+REFUSED = "x-valid-but-refused"
+
+
+def text(longest: int, **more: Any) -> Schema:
+    """A text of allowed characters."""
+    return {"type": "string", "maxLength": longest, "pattern": ALLOWED, **more}
+
+
+def or_null(schema: Schema) -> Schema:
+    """The schema, or null."""
+    return {"anyOf": [schema, NOTHING]}
+
+
+def part_number(*, or_empty: bool = False) -> Schema:
+    """A part number to be given to an item; ``or_empty``: an empty text stands for none."""
+    optional = "?" if or_empty else ""
+    return {
+        "type": "string",
+        "maxLength": 200,
+        "pattern": f"^(\\s*{NUMBER_FORM.pattern}\\s*){optional}$",
+        "not": {"pattern": f"^\\s*(\\.|\\.\\.|{'|'.join(map(_in_any_case, sorted(RESERVED)))})\\s*$"},
+        "description": "1 to 64 characters, none of / \\ ? # % and no control characters; unique in any case",
+    }
+
+
+def _in_any_case(word: str) -> str:
+    """A pattern of the texts that are ``word`` when case does not count; ſ is an s."""
+    same = {"s": "sSſ", "k": "kK\u212a"}
+    return "".join(
+        f"[{same.get(c, c + c.upper())}]" if c.isalpha() else "\\" + c if c == "." else c for c in word
+    )
+
+
+def refused(reason: str) -> Schema:
+    """``openapi_extra`` of an operation that refuses (400) what has the right form, and why."""
+    return {REFUSED: reason}
+
+
+CATEGORIES = list(find_schema(None).categories)
+CATEGORY: Schema = {
+    "type": "string",
+    "enum": CATEGORIES,
+    "description": "a category of the part-number schema; lower case is taken as well",
+}
+CATEGORY_OR_EMPTY: Schema = {**CATEGORY, "enum": [*CATEGORIES, ""]}
+ITEM_TYPE: Schema = {"type": "string", "enum": list(ITEM_TYPES)}
+UUID: Schema = {"type": "string", "format": "uuid"}
+USERNAME: Schema = {"type": "string", "pattern": f"^{USERNAME_FORM.pattern}$"}
+PASSWORD: Schema = text(MAX_PASSWORD, minLength=MIN_PASSWORD)
+SHA256: Schema = {"type": "string", "pattern": "^[0-9A-Fa-f]{64}$"}
+# An item gets its number from one or the other.
+NUMBER_OR_CATEGORY: Schema = {
+    "anyOf": [
+        {"required": ["category"], "properties": {"category": {"enum": CATEGORIES}}},
+        {"required": ["part_number"], "properties": {"part_number": {"type": "string", "minLength": 1}}},
+    ]
+}
+
+_TIME = "T([01][0-9]|2[0-3]):[0-5][0-9]:[0-5][0-9](\\.[0-9]{1,6})?(Z|[+-](0[0-9]|1[0-4]):[0-5][0-9])"
+POINT: Schema = {
+    "anyOf": [
+        {"type": "string", "enum": ["now"]},
+        {
+            "type": "string",
+            "pattern": "^[0-9]{1,18}$",
+            "description": "the id of a change, 0 = no lines",
+        },
+        {
+            "type": "string",
+            "maxLength": 40,
+            "format": "date-time",
+            "pattern": f"^[1-9][0-9]{{3}}-[0-9]{{2}}-[0-9]{{2}}{_TIME}$",
+            "description": "a time with its zone (ISO 8601)",
+        },
+    ]
+}
+
+_ANY_JSON: Schema = {"title": "JsonValue"}
+_JSON = "#/components/schemas/JsonValue"
+_KEY = {"maxLength": MAX_KEY, "pattern": ALLOWED}
+# pydantic has no way to refer to a schema that it did not make; :func:`complete` puts the reference in.
+JSON_OBJECT: Schema = {"type": "object", "propertyNames": _KEY, "additionalProperties": _ANY_JSON}
+_JSON_VALUE: Schema = {
+    "description": "JSON of at most 32 levels and 256 KiB, with numbers that a double can hold"
+    " (send longer ones as text)",
+    "anyOf": [
+        NOTHING,
+        {"type": "boolean"},
+        {"type": "number", "minimum": -MAX_NUMBER, "maximum": MAX_NUMBER},
+        {"type": "string", "pattern": ALLOWED},
+        {"type": "array", "items": {"$ref": _JSON}},
+        {"type": "object", "propertyNames": _KEY, "additionalProperties": {"$ref": _JSON}},
+    ],
+}
+_NOT_BLANK = rf"^[^{REFUSED_CHARACTERS}]*[^\s{REFUSED_CHARACTERS}][^{REFUSED_CHARACTERS}]*$"
+# What services.bom.merge_json asks of the wire model's fields.
+_MERGE: dict[str, dict[str, Schema]] = {
+    "MergeRequest": {
+        "source": {"description": "not read: the entries are an assembly's"},
+        "sync_id": or_null(text(128, minLength=1)),
+        "dry_run": or_null({"type": "boolean", "default": False}),
+    },
+    "MergeEntry": {
+        "child_part_number": {
+            "type": "string",
+            "maxLength": 200,
+            "pattern": _NOT_BLANK,
+        },
+        "quantity": {"type": "number", "exclusiveMinimum": 0, "maximum": LARGEST_QUANTITY},
+        "source": {"description": "not read: the entries are an assembly's"},
+    },
+    "Component": {"file": text(4096), "object": text(1024)},
+    "SourceDocument": {
+        "file": text(4096),
+        "sha256": or_null(SHA256),
+        "revision": or_null({"type": "integer", "minimum": 0, "maximum": 2**31 - 1}),
+    },
+    "LeftOutPart": {
+        "reason": text(32, minLength=1),
+        "name": text(1024),
+        "file": text(4096),
+        "object": text(1024),
+        "message": text(4096),
+        "quantity": {"type": "number", "minimum": 0, "maximum": LARGEST_QUANTITY},
+    },
+}
+
+
+def complete(document: Schema) -> Schema:
+    """FastAPI's document with what it does not know of this server."""
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            # We answer 400 where FastAPI by itself would answer 422.
+            answers = operation.get("responses", {})
+            answers.pop("422", None)
+            if REFUSED in operation:
+                answers["400"]["description"] += f". Also where the form is right: {operation[REFUSED]}"
+    schemas = document["components"]["schemas"]
+    for name in ("HTTPValidationError", "ValidationError"):
+        schemas.pop(name, None)
+    # The merge reads its body by itself (services.bom.merge_json); its form is the wire model's.
+    merge = MergeRequest.model_json_schema(ref_template="#/components/schemas/{model}")
+    schemas.update(merge.pop("$defs"), MergeRequest=merge, JsonValue=_JSON_VALUE)
+    for model, fields in _MERGE.items():
+        schemas[model]["properties"].update(fields)
+    _refer(document)
+    return document
+
+
+def _refer(part: Any) -> None:
+    below = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+    if isinstance(part, dict) and part.get("additionalProperties") == _ANY_JSON:
+        part["additionalProperties"] = {"$ref": _JSON}
+    for one in below:
+        _refer(one)

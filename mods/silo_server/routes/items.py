@@ -1,24 +1,37 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Items, part numbers and schemas."""
+"""Items, part numbers and schemas.
+
+Revisions and their files.
+"""
 
 from __future__ import annotations
 
+import json
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Annotated, Any
+from urllib.parse import quote
 
 import anyio.to_thread
 from fastapi import APIRouter, Path, Query
-from starlette.responses import Response
+from pydantic import Field, TypeAdapter, ValidationError
+from starlette.datastructures import UploadFile
+from starlette.responses import FileResponse, Response
 
-from silo.bom.errors import RejectedError
-from silo_server.routes import document
+from silo.api.wire import HeldItem, ItemTexts, LinkedFile
+from silo.bom.errors import NotFoundError, RejectedError
+from silo_server.db.engine import Tx
+from silo_server.routes import context
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
+    Call,
     Editor,
     ExpectedVersion,
     Viewer,
     etag_of,
+    idempotency_key,
     json_answer,
     json_body,
 )
@@ -31,16 +44,28 @@ from silo_server.routes.models import (
     NewItemBody,
     NumberBody,
     NumberOut,
+    RevisionBody,
+    RevisionOut,
     Short,
     Text,
     UuidsBody,
 )
 from silo_server.schema.catalog import describe, describe_form, find_schema, schemas
+from silo_server.services import items, revisions, search
 from silo_server.services import items as service
-from silo_server.services import search
-from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
-from silo_server.services.numbering import preview_number
-from silo_server.values import Item, to_wire
+from silo_server.services.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
+from silo_server.services.bom.merge import (
+    NEVER,
+    LastSync,
+    last_sync,
+    last_syncs,
+    sha256_or_none,
+    text_problem,
+)
+from silo_server.services.bom.tree import where_used
+from silo_server.services.items import preview_number
+from silo_server.services.revisions import Origin, revision_to_wire
+from silo_server.values import Document, Item, Revision, to_wire
 
 router = APIRouter(prefix="/api", tags=["items"])
 
@@ -48,7 +73,7 @@ PATCH_BODY = {
     "requestBody": {
         "required": True,
         "content": {
-            media_type: {"schema": document.JSON_OBJECT}
+            media_type: {"schema": context.JSON_OBJECT}
             for media_type in ("application/merge-patch+json", "application/json")
         },
     }
@@ -96,11 +121,16 @@ def search_items(
     "/items", status_code=201, response_model=ItemOut, responses={**WRITE_ERRORS, 200: {"model": ItemOut}}
 )
 def create_item(call: Editor, body: NewItemBody) -> Response:
-    """Make an item; 200 with the item where its ``id`` is known already."""
+    """Make an item. The same request with the same ``id`` (or ``Idempotency-Key``) gives the item again: 200.
+
+    409 for another request with an ``id`` that is known.
+    """
     new = service.NewItem(
         schema=body.schema_name,
         uuid=body.id,
-        **body.model_dump(exclude={"schema_name", "id"}, exclude_none=True),
+        key=idempotency_key(call.request),
+        texts=body.model_dump(include=_TEXTS, exclude_none=True),
+        **body.model_dump(exclude={"schema_name", "id", *_TEXTS}, exclude_none=True),
     )
     with call.write() as tx:
         item, made = service.create_item(tx, new)
@@ -148,7 +178,8 @@ def change_item(call: Editor, part_number: str, body: ItemChangeBody, expected: 
 
     ``If-Match`` with the item's ``ETag``: 412 where somebody was quicker.
     """
-    change = service.ItemChange(**body.model_dump())
+    texts = body.model_dump(include=_TEXTS)
+    change = service.ItemChange(texts=texts, **body.model_dump(exclude=_TEXTS))
     with call.write() as tx:
         return _answer(service.change_item(tx, part_number, change, expected))
 
@@ -176,10 +207,16 @@ async def patch_properties(
 
 @router.delete("/items/{part_number}", status_code=204, responses=WRITE_ERRORS)
 def archive_item(call: Editor, part_number: str, expected: ExpectedVersion) -> Response:
-    """Archive an item; its number stays taken and its lines stay in their BOMs."""
+    """Archive an item; its number stays taken and its lines stay in their BOMs.
+
+    ``X-Total-Count`` says on how many BOM lines it is, ``X-Used-In`` the first of those BOMs (their part
+    numbers as in a path, with commas).
+    """
     with call.write() as tx:
+        used, uses = where_used(tx, service.get_item(tx, part_number), limit=20)
         service.archive_item(tx, part_number, expected)
-    return Response(status_code=204)
+    where = ",".join(quote(one.parent.part_number, safe="") for one in used)
+    return Response(status_code=204, headers={"X-Total-Count": str(uses), "X-Used-In": where})
 
 
 @router.post("/items/{part_number}/unarchive", response_model=ItemOut, responses=WRITE_ERRORS)
@@ -218,8 +255,280 @@ def get_schema_form(call: Viewer, name: str) -> dict[str, Any]:
 def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any]:
     """An item, under the contract's names; ``last_sync`` where it was looked up."""
     told = {} if last_sync is None else {"last_sync": last_sync.to_wire()}
-    return told | {"id": item.uuid} | to_wire(item, "id", "uuid", "created_as")
+    return told | {"id": item.uuid, **item.texts} | to_wire(item, "id", "uuid", "texts")
 
 
 def _answer(item: Item, status: int = 200, last: LastSync | None = None) -> Response:
     return json_answer(item_to_wire(item, last), status, {"ETag": etag_of(item.version)})
+
+
+revisions_router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"])
+
+# A file is handed out as a thing to keep, never as something a browser would run or show.
+DOWNLOAD_HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; sandbox",
+    "Cache-Control": "private, no-cache",
+}
+_MAX_FIELD = 8 << 20
+_TEXTS = set(ItemTexts.model_fields)
+_LINKS = TypeAdapter(Annotated[list[LinkedFile], Field(max_length=10_000)])
+_HELD = TypeAdapter(Annotated[list[HeldItem], Field(max_length=10_000)])
+Find = Callable[[Tx, bool], Item | Document]
+"""Gives what a file belongs to; with True it locks that, and makes a document that is new."""
+RevisionNumber = Annotated[int, Path(ge=1, le=1_000_000)]
+BINARY: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"application/octet-stream": {}}, "description": "The file"},
+    206: {"content": {"application/octet-stream": {}}, "description": "The part of the file asked for"},
+    304: {"description": "The file is still the one that If-None-Match names"},
+    416: {"description": "The file has no such range"},
+}
+_FORM: context.Schema = {
+    "file": {"type": "string", "format": "binary"},
+    "comment": context.text(10_000),
+    "properties": {"type": "string", "description": "a JSON object"},
+    "sha256": {**context.SHA256, "description": "of the file; another content is refused"},
+    "base_revision": {
+        "type": "integer",
+        "minimum": 0,
+        "maximum": 1_000_000,
+        "description": "what the file was made from; 409 where a newer file is there",
+    },
+    "path": context.text(1000, description="where the file is in its project, with /"),
+    "links": {
+        "type": "string",
+        "description": "a JSON list of the linked files: path, item (UUID), sha256, document (UUID)",
+    },
+    "items": {
+        "type": "string",
+        "description": "a JSON list of the items in the file: item (UUID), object",
+    },
+}
+UPLOAD = {
+    **context.refused(
+        "properties that are no JSON object, links or items that are no such list, "
+        "and a sha256 that is not that of the file"
+    ),
+    "requestBody": {
+        "required": True,
+        "content": {
+            "multipart/form-data": {"schema": {"type": "object", "required": ["file"], "properties": _FORM}}
+        },
+    },
+}
+
+
+@revisions_router.get("/revisions", response_model=list[RevisionOut], responses=READ_ERRORS)
+def list_revisions(
+    call: Viewer,
+    part_number: str,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    before: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
+    after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
+) -> Response:
+    """Revisions, newest first; those below the number ``before`` and above ``after``.
+
+    ``X-Total-Count`` says how many there are above ``after``.
+    """
+    with call.read() as tx:
+        item = items.get_item(tx, part_number)
+        found, total = revisions.list_revisions(tx, item, limit, before=before, after=after)
+    told = [revision_to_wire(item, revision) for revision in found]
+    return json_answer(told, headers={"X-Total-Count": str(total)})
+
+
+@revisions_router.get("/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
+def get_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Response:
+    """One revision, with the files that its file links to."""
+    with call.read() as tx:
+        item = items.get_item(tx, part_number)
+        revision = revisions.get_revision(tx, item, number)
+    return json_answer(revision_to_wire(item, revision, links=True))
+
+
+@revisions_router.post("/revisions", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS)
+def add_revision(call: Editor, part_number: str, body: RevisionBody) -> Response:
+    """A revision without a file: a new property snapshot."""
+    with call.write() as tx:
+        item = items.get_item(tx, part_number, lock=True)
+        revision = revisions.add_revision(tx, item, comment=body.comment, properties=body.properties)
+        return json_answer(revision_to_wire(item, revision, links=True), 201)
+
+
+@revisions_router.post(
+    "/file", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS, openapi_extra=UPLOAD
+)
+async def upload_file(call: Editor, part_number: str) -> Response:
+    """Upload a file (form part ``file``, texts ``comment`` and ``properties``) as a new revision.
+
+    ``Idempotency-Key`` makes a repeat give the revision that the first request made. With ``base_revision``
+    a file is refused (409 ``newer_revision``, with that revision) where somebody committed one since.
+    """
+    return await receive(call, numbered(part_number))
+
+
+def numbered(part_number: str) -> Find:
+    """Give the item with this number."""
+    return lambda tx, lock: items.get_item(tx, part_number, lock=lock)
+
+
+async def receive(call: Call, find: Find) -> Response:
+    """Take an upload as a new revision of an item or a document.
+
+    The form is read here and not by a parameter, so that nobody without a role fills the disk.
+    """
+    async with call.request.form(max_files=1, max_fields=20, max_part_size=_MAX_FIELD) as form:
+        twice = [name for name in _FORM if len(form.getlist(name)) > 1]
+        if twice:
+            raise RejectedError(f"{', '.join(twice)}: wanted one part of this name, got several")
+        file, comment, raw = form.get("file"), form.get("comment"), form.get("properties")
+        if not isinstance(file, UploadFile):
+            raise RejectedError("file: wanted a multipart form with the file in a part named 'file'")
+        if problem := text_problem(comment or "", 10_000) or text_problem(raw or "", _MAX_FIELD):
+            raise RejectedError(f"comment, properties: {problem}")
+        sha256 = sha256_or_none("sha256", form.get("sha256"))
+        properties = _properties(raw if isinstance(raw, str) else None)
+        origin = Origin(
+            _base_revision(form.get("base_revision")),
+            _path(form.get("path")),
+            _list("links", _LINKS, form.get("links")),
+            _list("items", _HELD, form.get("items")),
+        )
+        key, text, digest = idempotency_key(call.request), str(comment or ""), sha256 or ""
+
+        def answer(of: Item | Document, revision: Revision) -> Response:
+            return json_answer(revision_to_wire(of, revision, links=True), 201)
+
+        def work() -> Response:
+            return store_file(call, find, file, text, answer, properties, key, digest, origin)
+
+        return await anyio.to_thread.run_sync(work)
+
+
+@revisions_router.get("/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
+def download_newest(call: Viewer, part_number: str) -> Response:
+    """The newest file."""
+    with call.read() as tx:
+        revision = revisions.newest_file(tx, items.get_item(tx, part_number))
+    return download(call, revision)
+
+
+@revisions_router.get("/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
+def download_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Response:
+    """The file of one revision."""
+    with call.read() as tx:
+        revision = revisions.get_revision(tx, items.get_item(tx, part_number), number)
+    return download(call, revision)
+
+
+@revisions_router.get(
+    "/thumbnail",
+    response_class=Response,
+    responses={**READ_ERRORS, 200: {"content": {"image/png": {}}, "description": "The picture"}},
+)
+def thumbnail(call: Viewer, part_number: str, key: Annotated[str, Query(max_length=64)] = "") -> Response:
+    """The picture that came with the newest file that has one. One asked for by its ``key`` may be kept."""
+    with call.read() as tx:
+        item = items.get_item(tx, part_number)
+    if not item.thumbnail_key:
+        raise NotFoundError(f"item {item.part_number} has no thumbnail")
+    path = call.server.files.path_of(item.thumbnail_key)
+    kept = "max-age=31536000, immutable" if key and item.thumbnail_key.startswith(key) else "max-age=300"
+    return FileResponse(path, media_type="image/png", headers={"Cache-Control": f"private, {kept}"})
+
+
+def store_file(
+    call: Call,
+    find: Find,
+    file: UploadFile,
+    comment: str,
+    answer: Callable[[Item | Document, Revision], Response],
+    properties: Mapping[str, Any] | None = None,
+    key: str | None = None,
+    sha256: str = "",
+    origin: Origin | None = None,
+) -> Response:
+    """An uploaded file as a new revision, for the API and the pages; ``answer`` is made before the commit."""
+    origin = origin or Origin()
+    with call.read() as tx:
+        find(tx, False)  # before anything is written to the disk
+    stored = call.server.files.keep(file.filename or "file", file.file)
+    if sha256 and stored.checksum != sha256:
+        raise RejectedError(
+            f"sha256: the file arrived as {stored.checksum}, and {sha256} was sent; no revision was made"
+        )
+    with call.write() as tx:
+        of = find(tx, True)
+        said = (stored.name, stored.checksum, comment, properties, asdict(origin))
+        kind = "upload" if isinstance(of, Item) else "upload document"
+        request = KeyedRequest.of(f"{kind} {of.id}", key, said)
+        if earlier := earlier_answer(tx, request):
+            return answer(of, revisions.get_revision(tx, of, int(earlier.text)))
+        if isinstance(of, Document) and properties:
+            raise RejectedError("properties: a document without an item has none")
+        merged = {**of.properties, **properties} if isinstance(of, Item) and properties is not None else None
+        revision = revisions.add_revision(
+            tx, of, comment=comment, properties=merged, file=stored, origin=origin
+        )
+        keep_answer(tx, request, KeptAnswer(str(revision.revision_number)))
+        return answer(of, revision)
+
+
+def _base_revision(raw: object) -> int | None:
+    if raw is None or raw == "":
+        return None
+    if not (isinstance(raw, str) and re.fullmatch("[0-9]{1,7}", raw) and int(raw) <= 1_000_000):
+        raise RejectedError("base_revision: wanted the number of a revision, or 0 where there was none")
+    return int(raw)
+
+
+def _path(raw: object) -> str | None:
+    if raw is None or raw == "":
+        return None
+    if problem := text_problem(raw, 1000):
+        raise RejectedError(f"path: {problem}")
+    return str(raw)
+
+
+def _list(name: str, kind: TypeAdapter[Any], raw: object) -> list[dict[str, str]] | None:
+    if raw is None or raw == "":
+        return None
+    try:
+        found = kind.validate_json(raw if isinstance(raw, str) else "")
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise RejectedError(f"{name}: wanted a JSON list as text; {where}: {first['msg']}") from None
+    told: list[dict[str, str]] = [one.model_dump(exclude_defaults=True) for one in found]
+    for text in (text for one in told for text in one.values()):
+        if problem := text_problem(text, 1000):
+            raise RejectedError(f"{name}: {problem}")
+    return told
+
+
+def _properties(raw: str | None) -> dict[str, Any] | None:
+    if raw is None or not raw.strip():
+        return None
+    try:
+        value = json.loads(raw)
+    except (ValueError, RecursionError):
+        value = None
+    if not isinstance(value, dict):
+        raise RejectedError("properties: wanted a JSON object as text")
+    return value
+
+
+def download(call: Call, revision: Revision) -> Response:
+    """Hand out the file of a revision. Raises NotFoundError."""
+    if revision.file_checksum is None or revision.file_name is None:
+        raise NotFoundError(f"revision {revision.revision_number} has no file")
+    etag = f'"{revision.file_checksum}"'
+    headers = {**DOWNLOAD_HEADERS, "ETag": etag}
+    if call.request.headers.get("if-none-match") == etag:
+        return Response(status_code=304, headers=headers)
+    return FileResponse(
+        call.server.files.path_of(revision.file_checksum),
+        media_type="application/octet-stream",
+        filename=revision.file_name,
+        content_disposition_type="attachment",
+        headers=headers,
+    )

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import (
     AfterValidator,
@@ -13,42 +13,43 @@ from pydantic import (
     Field,
     StringConstraints,
     WithJsonSchema,
+    create_model,
 )
 
 from silo.api import wire
 from silo.bom.numbers import LARGEST_QUANTITY, read_quantity
-from silo_server.routes import document
-from silo_server.services.bom.edits import REL_TYPES, SOURCES
-from silo_server.services.bom.merge_json import quantity_problem
+from silo.bom.resolve import character_problem
+from silo_server.routes import context
+from silo_server.services.bom.merge import quantity_problem
+from silo_server.services.bom.review import REL_TYPES, SOURCES
 from silo_server.services.search import LookAlike
 
 
-def _no_nul(text: str) -> str:
-    # PostgreSQL has no place for it; what one database refuses, the other does as well.
-    if "\x00" in text:
-        raise ValueError("wanted a text, got one with the character NUL in it")
+def _characters(text: str) -> str:
+    if problem := character_problem(text):
+        raise ValueError(problem)
     return text
 
 
 Text = Annotated[
     str,
     StringConstraints(max_length=10_000),
-    AfterValidator(_no_nul),
-    WithJsonSchema(document.text(10_000)),
+    AfterValidator(_characters),
+    WithJsonSchema(context.text(10_000)),
 ]
 Short = Annotated[
-    str, StringConstraints(max_length=200), AfterValidator(_no_nul), WithJsonSchema(document.text(200))
+    str, StringConstraints(max_length=200), AfterValidator(_characters), WithJsonSchema(context.text(200))
 ]
 # The services check what these say; here the document learns it.
-ItemUuid = Annotated[Short, WithJsonSchema(document.UUID)]
-ItemType = Annotated[Short, WithJsonSchema(document.ITEM_TYPE)]
+ItemUuid = Annotated[Short, WithJsonSchema(context.UUID)]
+ItemType = Annotated[Short, WithJsonSchema(context.ITEM_TYPE)]
 RelType = Annotated[Short, WithJsonSchema({"type": "string", "enum": list(REL_TYPES)})]
 Source = Annotated[Short, WithJsonSchema({"type": "string", "enum": list(SOURCES)})]
-Brief = Annotated[Short, WithJsonSchema(document.text(32))]
+Brief = Annotated[Short, WithJsonSchema(context.text(32))]
 
 
-# What may be in it is one rule for all ways in, which the services keep (silo_server.json_values).
-Properties = Annotated[dict[str, Any], WithJsonSchema(document.JSON_OBJECT)]
+# What may be in it is one rule for all ways in, which the services keep (silo_server.values).
+Properties = Annotated[dict[str, Any], WithJsonSchema(context.JSON_OBJECT)]
 
 
 def _amount(value: object) -> object:
@@ -94,7 +95,21 @@ class Body(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
 
-class NewItemBody(Body):
+if TYPE_CHECKING:
+    _ItemTexts = Body
+else:
+    # What silo.api.wire.ItemTexts names, with the server's bounds and characters.
+    _ItemTexts = create_model(
+        "_ItemTexts",
+        __base__=Body,
+        **{
+            name: ((Text if (field.json_schema_extra or {}).get("long") else Short) | None, None)
+            for name, field in wire.ItemTexts.model_fields.items()
+        },
+    )
+
+
+class NewItemBody(_ItemTexts):
     """``POST /api/items``. With ``id`` (a UUID chosen by the client) a repeat makes no second item.
 
     An ``id`` that is no UUID is refused, as is one whose item has another part number or is archived.
@@ -104,31 +119,27 @@ class NewItemBody(Body):
         extra="ignore",
         protected_namespaces=(),
         populate_by_name=True,
-        json_schema_extra=document.NUMBER_OR_CATEGORY,
+        json_schema_extra=context.NUMBER_OR_CATEGORY,
     )
 
     schema_name: Short | None = Field(None, alias="schema")
-    category: Annotated[Short, WithJsonSchema(document.CATEGORY_OR_EMPTY)] | None = None
-    part_number: Annotated[Short, WithJsonSchema(document.part_number(or_empty=True))] | None = None
+    category: Annotated[Short, WithJsonSchema(context.CATEGORY_OR_EMPTY)] | None = None
+    part_number: Annotated[Short, WithJsonSchema(context.part_number(or_empty=True))] | None = None
     id: ItemUuid | None = None
     name: Short | None = None
     description: Text | None = None
     item_type: ItemType | None = None
-    sourcing_type: Short | None = None
-    long_description: Text | None = None
     properties: Properties | None = None
 
 
-class ItemChangeBody(Body):
+class ItemChangeBody(_ItemTexts):
     """``PUT /api/items/{pn}``: what is absent or null stays. ``properties`` make a new revision."""
 
-    part_number: Annotated[Short, WithJsonSchema(document.part_number())] | None = None
+    part_number: Annotated[Short, WithJsonSchema(context.part_number())] | None = None
     name: Short | None = None
     description: Text | None = None
     item_type: ItemType | None = None
-    category: Annotated[Short, WithJsonSchema(document.CATEGORY_OR_EMPTY)] | None = None
-    sourcing_type: Short | None = None
-    long_description: Text | None = None
+    category: Annotated[Short, WithJsonSchema(context.CATEGORY_OR_EMPTY)] | None = None
     properties: Properties | None = None
     comment: Text = ""
 
@@ -164,7 +175,7 @@ class NumberBody(Body):
     model_config = ConfigDict(extra="ignore", protected_namespaces=(), populate_by_name=True)
 
     schema_name: Short | None = Field(None, alias="schema")
-    category: Annotated[Short, WithJsonSchema(document.CATEGORY)]
+    category: Annotated[Short, WithJsonSchema(context.CATEGORY)]
 
 
 class NumberOut(BaseModel):
@@ -201,6 +212,12 @@ class RevisionOut(wire.Revision):
 
     part_number: str
     thumbnail_key: str | None
+
+
+class DocumentsOut(BaseModel):
+    """The documents that were found; what is missing is absent."""
+
+    documents: list[wire.Document]
 
 
 class RevisionBody(Body):

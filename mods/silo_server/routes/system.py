@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Health, events, modules, mode."""
+"""Health, events, modules, mode.
+
+Login, tokens, users, audit.
+"""
 
 from __future__ import annotations
 
@@ -7,26 +10,36 @@ import re
 from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query
-from pydantic import BaseModel
+from fastapi import APIRouter, Path, Query, Request
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, WithJsonSchema
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import Response
 
+from silo.api.wire import ErrorBody
 from silo.bom.errors import RejectedError
+from silo_server import events
 from silo_server.background import HEALTH_SECONDS, READY_SECONDS, State
 from silo_server.db.engine import mode_of
-from silo_server.events.stream import EventStream
+from silo_server.events import EventStream
 from silo_server.operation.housekeeping import last_run
-from silo_server.operation.metrics import CONTENT_TYPE
+from silo_server.operation.metrics import CONTENT_TYPE, standing
+from silo_server.routes import context
 from silo_server.routes.context import (
     READ_ERRORS,
+    SESSION_COOKIE,
+    WRITE_ERRORS,
     Admin,
+    PageFrom,
     ServerDep,
     Viewer,
+    client_address,
     find_actor,
     json_answer,
+    server_of,
 )
-from silo_server.services import events
+from silo_server.routes.models import Body, Short, Text
+from silo_server.services.access import accounts, audit, credentials, logins
+from silo_server.values import Role, Scope, to_wire
 
 router = APIRouter(tags=["system"])
 EVENT_ID = re.compile(r"(?P<number>[0-9]{1,18})(?:-(?P<tag>[0-9a-f]{8}))?")
@@ -57,6 +70,14 @@ async def health(server: ServerDep) -> dict[str, Any]:
     return {"status": "ok", "mode": state.mode}
 
 
+@router.api_route("/health", methods=["HEAD", "OPTIONS"], include_in_schema=False)
+@router.api_route("/ready", methods=["OPTIONS"], include_in_schema=False)
+async def looked_at() -> Response:
+    """For balancers and browsers that look before they ask."""
+    return Response(status_code=204, headers={"Allow": "GET, HEAD, OPTIONS"})
+
+
+@router.api_route("/ready", methods=["HEAD"], include_in_schema=False)
 @router.get("/ready", responses={503: {"description": "The database or the file store is not there"}})
 async def ready(server: ServerDep) -> Response:
     """The server can do its work: 200, or 503 while the database or the file store is away or full."""
@@ -70,6 +91,7 @@ async def ready(server: ServerDep) -> Response:
         "files": state.files,
         "sse_clients": server.hub.listeners,
         "takes_item_ids": True,
+        "browser_login": True,
     }
     return json_answer(body, 200 if state.ready else 503)
 
@@ -124,6 +146,13 @@ def get_mode(call: Admin) -> dict[str, Any]:
         return {"mode": mode_of(tx)}
 
 
+@router.get("/api/admin/system", responses=READ_ERRORS)
+def get_system(call: Admin) -> dict[str, Any]:
+    """Version, database, disk, the last backup and housekeeping, queues, counts, warnings of the start."""
+    server = call.server
+    return standing(server.db, server.hub, server.files, server.large_reads)
+
+
 @router.get("/api/admin/housekeeping", responses=READ_ERRORS)
 def get_housekeeping(call: Admin) -> dict[str, Any]:
     """When old rows and files were last deleted, how many of what, and what went wrong; null before that."""
@@ -146,3 +175,201 @@ def _event_id(text: str | None) -> events.Mark | None:
     if found is None:
         raise RejectedError(f"Last-Event-ID: wanted the id of an event (a number), got {text[:40]!r}")
     return events.Mark(int(found["number"]), found["tag"] or "")
+
+
+auth_router = APIRouter(prefix="/api", tags=["auth"])
+
+LOGIN_ERRORS: dict[int | str, dict[str, Any]] = {
+    400: {"model": ErrorBody},
+    401: {"model": ErrorBody},
+    429: {"model": ErrorBody, "description": "Too many failed logins; Retry-After says for how long"},
+    503: {"model": ErrorBody},
+}
+
+
+NewPassword = Annotated[Text, WithJsonSchema(context.PASSWORD)]
+
+
+class LoginBody(Body):
+    """``POST /api/auth/login``."""
+
+    username: Short
+    password: Short
+
+
+class TokenBody(Body):
+    """``POST /api/auth/tokens``.
+
+    expires_in_days
+        null = until revoked; absent = as long as the token that asks (a session: until revoked).
+    scopes
+        ``read``, ``write``, ``admin``, each with those before it; absent = all that the caller may.
+
+    Unknown keys are refused: a misspelt limit must not make a token without it.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: Annotated[Short, Field(min_length=1), WithJsonSchema(context.text(200, minLength=1))]
+    expires_in_days: Annotated[float, Field(gt=0, le=3650, strict=True)] | None = None
+    scopes: Annotated[list[Scope], Field(min_length=1, max_length=3)] | None = None
+
+
+class NewUserBody(Body):
+    """``POST /api/users``; without a password only tokens and login links let the user in."""
+
+    username: Annotated[Short, WithJsonSchema(context.USERNAME)]
+    role: Role = Role.VIEWER
+    display_name: Short = ""
+    password: NewPassword | None = None
+
+
+class UserChangeBody(Body):
+    """``PUT /api/users/{username}``: what is absent or null stays."""
+
+    role: Role | None = None
+    display_name: Short | None = None
+    active: StrictBool | None = None
+    password: NewPassword | None = None
+
+
+class PasswordBody(Body):
+    """``PUT /api/auth/password``: the new password, and the old one but after a login link."""
+
+    password: NewPassword
+    current_password: Text | None = None
+
+
+@auth_router.post("/auth/login", responses=LOGIN_ERRORS)
+def log_in(server: ServerDep, request: Request, body: LoginBody) -> Response:
+    """Begin a browser session: sets the cookie, answers with the CSRF secret for later requests."""
+    session = logins.log_in(server.db, body.username, body.password, client_address(request))
+    response = json_answer({"username": session.username, "csrf_token": session.csrf_token})
+    set_session_cookie(response, request, session)
+    return response
+
+
+@auth_router.post("/auth/logout", status_code=204, responses=READ_ERRORS)
+def log_out(call: Viewer) -> Response:
+    """End this browser session."""
+    logins.log_out(call.server.db, call.actor)
+    response = Response(status_code=204)
+    response.delete_cookie(SESSION_COOKIE)
+    return response
+
+
+@auth_router.get("/auth/me", responses=READ_ERRORS)
+def who_am_i(call: Viewer) -> dict[str, Any]:
+    """Who this token or session is."""
+    return {
+        "username": call.actor.username,
+        "display_name": call.actor.display_name,
+        "role": call.actor.role.value,
+        "auth_source": call.actor.auth_source,
+    }
+
+
+@auth_router.put("/auth/password", status_code=204, responses={**LOGIN_ERRORS, **WRITE_ERRORS})
+def set_password(call: Viewer, body: PasswordBody) -> Response:
+    """Set the own password; ends all own sessions. Not with a token; asks for the old password."""
+    logins.set_own_password(call.server.db, call.actor, body.password, body.current_password)
+    return Response(status_code=204)
+
+
+@auth_router.get("/auth/tokens", responses=READ_ERRORS)
+def list_tokens(call: Viewer) -> list[dict[str, Any]]:
+    """The own tokens; never their secrets."""
+    with call.read() as tx:
+        return [_token(token) for token in credentials.list_tokens(tx, call.actor.own_id)]
+
+
+@auth_router.post("/auth/tokens", status_code=201, responses=WRITE_ERRORS)
+def create_token(call: Viewer, body: TokenBody) -> dict[str, Any]:
+    """Make a token. The secret is in this answer and never again."""
+    forever = "expires_in_days" in body.model_fields_set and body.expires_in_days is None
+    scope = max(body.scopes, key=list(Scope).index) if body.scopes else None
+    with call.write(even_when_read_only=True) as tx:
+        token, secret = credentials.create_own_token(
+            tx, body.name, days=body.expires_in_days, forever=forever, scope=scope
+        )
+        return {**_token(token), "token": secret}
+
+
+@auth_router.delete("/auth/tokens/{token_id}", status_code=204, responses=WRITE_ERRORS)
+def revoke_token(call: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]) -> Response:
+    """Revoke a token: one's own, or anybody's for an admin."""
+    credentials.check_may_change(call.actor)
+    owner = None if call.actor.role is Role.ADMIN else call.actor.own_id
+    with call.write(even_when_read_only=True) as tx:
+        credentials.revoke_token(tx, token_id, owner)
+    return Response(status_code=204)
+
+
+@auth_router.get("/users", responses=READ_ERRORS)
+def list_users(call: Admin) -> list[dict[str, Any]]:
+    """All users."""
+    with call.read() as tx:
+        return [_user(user) for user in accounts.list_users(tx)]
+
+
+@auth_router.post("/users", status_code=201, responses=WRITE_ERRORS)
+def create_user(call: Admin, body: NewUserBody) -> dict[str, Any]:
+    """Make a user."""
+    with call.write(even_when_read_only=True) as tx:
+        user = accounts.create_user(
+            tx, body.username, body.role, display_name=body.display_name, password=body.password
+        )
+        return _user(user)
+
+
+@auth_router.put("/users/{username}", responses=WRITE_ERRORS)
+def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, Any]:
+    """Change a user's role, name, password, or let nobody in under this name any more."""
+    with call.write(even_when_read_only=True) as tx:
+        user = accounts.change_user(tx, username, **body.model_dump())
+        return _user(user)
+
+
+@auth_router.post("/users/{username}/login-link", status_code=201, responses=WRITE_ERRORS)
+def create_login_link(call: Admin, username: str) -> dict[str, Any]:
+    """A link that lets this user in once; for a new colleague or a forgotten password."""
+    with call.write(even_when_read_only=True) as tx:
+        secret = logins.create_login_link(tx, username)
+        audit.note(tx, "login_link.created", username)
+        path = f"/login/link/{secret}"
+        public = call.server.settings.public_url
+        return {"path": path, "url": f"{public}{path}" if public else None}
+
+
+@auth_router.get("/admin/audit", responses=READ_ERRORS)
+def list_audit(
+    call: Admin, limit: Annotated[int, Query(ge=1, le=1000)] = 100, before: PageFrom = None
+) -> list[dict[str, Any]]:
+    """Who did what, newest first."""
+    with call.read() as tx:
+        entries = audit.list_entries(tx, limit, before)
+    return [to_wire(entry) for entry in entries]
+
+
+def set_session_cookie(response: Response, request: Request, session: logins.NewSession) -> None:
+    """The session's cookie: not for scripts, not for other sites, and only over TLS where there is TLS."""
+    settings = server_of(request).settings
+    response.set_cookie(
+        SESSION_COOKIE,
+        session.secret,
+        max_age=int(settings.session_seconds),
+        httponly=True,
+        samesite="lax",
+        secure=settings.secure_cookies or request.url.scheme == "https",
+    )
+
+
+def _token(token: credentials.Token) -> dict[str, Any]:
+    return {
+        **to_wire(token, "username", "scope"),
+        "scopes": [scope.value for scope in Scope if token.scope.covers(scope)],
+    }
+
+
+def _user(user: accounts.User) -> dict[str, Any]:
+    return to_wire(user, "id")

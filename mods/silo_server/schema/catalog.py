@@ -14,14 +14,16 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from pydantic.fields import FieldInfo
+
+from silo.api.wire import ItemTexts
 from silo.bom.errors import ConfigError, InputError, NotFoundError, RejectedError
-from silo.bom.naming import Rule
 from silo.bom.numbers import plain, read_number
+from silo.bom.resolve import Rule
 
 DEFAULT_SCHEMA = "kindred-rd"
 _log = logging.getLogger(__name__)
 ITEM_TYPES = ("part", "assembly", "consumable", "tool")
-SOURCING_TYPES = ("manufactured", "purchased")
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +106,7 @@ class Schema:
     fields: tuple[PropertyField, ...]
 
     def number(self, category: str, serial: int) -> str:
-        """``F01-0001``. A serial beyond the digits simply grows; gaps are tolerated everywhere."""
+        """``F01-0001``. A serial beyond the digits grows; gaps are tolerated everywhere."""
         return f"{category}{self.separator}{serial:0{self.serial_digits}d}"
 
     def category(self, code: str) -> Category:
@@ -257,16 +259,22 @@ def _field(field: PropertyField) -> dict[str, Any]:
     return {"required": False, **said}
 
 
+def text_hints(field: FieldInfo) -> Mapping[str, Any]:
+    """What :class:`silo.api.wire.ItemTexts` says of a field for its form: ``options``, ``long``."""
+    hints = field.json_schema_extra
+    return hints if isinstance(hints, dict) else {}
+
+
+def _text_field(name: str, field: FieldInfo) -> dict[str, Any]:
+    hints = text_hints(field)
+    kind = "select" if "options" in hints else "text" if hints.get("long") else "string"
+    told = {"name": name, "type": kind, "label": field.title, "required": False}
+    return told | ({"options": hints["options"]} if "options" in hints else {})
+
+
 _ITEM_FIELDS: list[dict[str, Any]] = [
     {"name": "name", "type": "string", "label": "Name", "required": True},
     {"name": "description", "type": "string", "label": "Description", "required": False},
     {"name": "item_type", "type": "select", "label": "Type", "required": False, "options": list(ITEM_TYPES)},
-    {
-        "name": "sourcing_type",
-        "type": "select",
-        "label": "Sourcing",
-        "required": False,
-        "options": list(SOURCING_TYPES),
-    },
-    {"name": "long_description", "type": "text", "label": "Long description", "required": False},
+    *(_text_field(name, field) for name, field in ItemTexts.model_fields.items()),
 ]

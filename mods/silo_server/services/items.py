@@ -1,33 +1,118 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Items: their stable UUIDs, their part numbers (which may be renamed), finding and changing them."""
+"""Items: their stable UUIDs, their part numbers (which may be renamed), finding and changing them.
+
+Part numbers: what one may look like, and how the next of a category is found.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 import uuid as uuids
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from sqlalchemy import ColumnElement, func, insert, select, update
+from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import IntegrityError
 
+from silo.api.wire import ItemTexts
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
-from silo_server.db.bulk import one_of
-from silo_server.db.engine import Tx
-from silo_server.db.tables import items
-from silo_server.errors import DuplicateError
-from silo_server.json_values import check_json, merge_patch
-from silo_server.schema.catalog import ITEM_TYPES, Category, find_schema
-from silo_server.services import events, revisions
-from silo_server.services.numbering import check_number, take_number
+from silo.bom.resolve import REFUSED_CHARACTERS, character_problem
+from silo_server import events
+from silo_server.db.engine import Tx, one_of
+from silo_server.db.tables import items, number_counters
+from silo_server.schema.catalog import ITEM_TYPES, Category, Schema, find_schema
+from silo_server.services import revisions
+from silo_server.services.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.services.search import index_item, search_for
-from silo_server.values import Item, from_row
+from silo_server.settings import DuplicateError
+from silo_server.values import Item, check_json, from_row, merge_patch
+
+# Words that stand where a part number stands in a path.
+RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
+# Two numbers that look the same must be the same number: what has no picture is refused. These are the
+# blanks but the plain one, the bidirectional and zero-width characters (Cf, Zl, Zp), and others that readers
+# may ignore.
+UNSEEN = (
+    "\\xa0\\xad\\u034f\\u0600-\\u0605\\u061c\\u06dd\\u070f\\u0890\\u0891\\u08e2\\u115f\\u1160\\u1680\\u17b4\\u17b5"
+    "\\u180b-\\u180f\\u2000-\\u200f\\u2028-\\u202f\\u205f-\\u206f\\u2800\\u3000\\u3164\\ufe00-\\ufe0f\\ufeff\\uffa0"
+    "\\ufff9-\\ufffb\U0001bca0-\U0001bca3\U0001d173-\U0001d17a\U000e0000-\U000e0fff"
+)
+_INSIDE = rf"/\\?#%\t\n\r{REFUSED_CHARACTERS}{UNSEEN}"
+NUMBER_FORM = re.compile(rf"[^\s{_INSIDE}](?:[^{_INSIDE}]{{0,62}}[^\s{_INSIDE}])?")
+_UNSEEN = re.compile(f"[{UNSEEN}]")
+
+
+def check_number(number: str) -> str:
+    """A part number as given, trimmed; RejectedError where it cannot stand in a path or a cell."""
+    if problem := character_problem(number):
+        raise RejectedError(f"part_number: {problem}")
+    trimmed = number.strip()
+    unseen = sorted({f"U+{ord(c):04X}" for c in _UNSEEN.findall(trimmed)})
+    if unseen:
+        raise RejectedError(
+            f"part_number: wanted characters that can be seen, got {', '.join(unseen)} in {number!a}; "
+            "type the number by hand instead of pasting it"
+        )
+    if not NUMBER_FORM.fullmatch(trimmed) or trimmed.casefold() in RESERVED or trimmed in (".", ".."):
+        raise RejectedError(
+            f"part_number: wanted 1 to 64 characters without / \\ ? # % and line ends, got {number!r}"
+        )
+    return trimmed
+
+
+def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
+    """The number the next item of the category would get; consumes nothing."""
+    schema = find_schema(schema_name)
+    found = schema.category(category)
+    last = tx.conn.scalar(
+        select(number_counters.c.last_serial).where(
+            number_counters.c.schema_name == schema.name, number_counters.c.category == found.code
+        )
+    )
+    return _next_free(tx, schema, found, last or 0)[0]
+
+
+def take_number(tx: Tx, schema: Schema, category: Category) -> str:
+    """The next free number of the category, taken."""
+    where = (number_counters.c.schema_name == schema.name, number_counters.c.category == category.code)
+    _ensure_counter(tx, schema.name, category.code)
+    last = tx.conn.scalar(select(number_counters.c.last_serial).where(*where).with_for_update()) or 0
+    number, serial = _next_free(tx, schema, category, last)
+    tx.conn.execute(update(number_counters).where(*where).values(last_serial=serial))
+    return number
+
+
+def _ensure_counter(tx: Tx, schema: str, category: str) -> None:
+    make = postgresql.insert if tx.postgres else sqlite.insert
+    tx.conn.execute(
+        make(number_counters)
+        .values(schema_name=schema, category=category, last_serial=0)
+        .on_conflict_do_nothing()
+    )
+
+
+def _next_free(tx: Tx, schema: Schema, category: Category, last: int) -> tuple[str, int]:
+    # Explicit numbers may stand in the way; they are few, so that a page of candidates is looked at a time.
+    serial = last
+    while True:
+        page = {schema.number(category.code, n): n for n in range(serial + 1, serial + 65)}
+        keys = {number.casefold(): number for number in page}
+        taken = set(
+            tx.conn.scalars(select(items.c.part_number_key).where(one_of(tx, items.c.part_number_key, keys)))
+        )
+        for key, number in keys.items():
+            if key not in taken:
+                return number, page[number]
+        serial += 64
 
 
 @dataclass(frozen=True, kw_only=True)
 class NewItem:
-    """What a client says of an item to be made. With ``uuid`` a repeat makes no second item."""
+    """What a client says of an item to be made. With ``uuid`` or ``key`` a repeat makes no second item."""
 
     schema: str | None = None
     category: str | None = None
@@ -36,9 +121,9 @@ class NewItem:
     name: str = ""
     description: str = ""
     item_type: str | None = None
-    sourcing_type: str | None = None
-    long_description: str | None = None
+    texts: Mapping[str, str | None] = field(default_factory=dict)  # of silo.api.wire.ItemTexts
     properties: Mapping[str, Any] = field(default_factory=dict)
+    key: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,21 +160,25 @@ SORTS: Mapping[str, Sequence[ColumnElement[Any]]] = {
 
 def to_item(row: Any) -> Item:
     """A frozen item from its row."""
-    return from_row(Item, row, schema=row.schema_name, properties=json.loads(row.properties))
+    texts = {name: getattr(row, name) for name in ItemTexts.model_fields}
+    return from_row(Item, row, schema=row.schema_name, texts=texts, properties=json.loads(row.properties))
 
 
 def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: bool = False) -> Item:
     """The item with this number, in whatever case; NotFoundError where there is none (or it is archived).
 
-    ``lock`` makes other writers of this item, and of its BOM, wait until this transaction ends.
+    ``lock`` makes other writers of this item, and of its BOM, wait until this transaction ends, whose time
+    is then later than that of the item's last change.
     """
-    if "\x00" in part_number:
-        raise NotFoundError("no item has a part number with the character NUL in it")
+    if problem := character_problem(part_number):
+        raise NotFoundError(f"no item has this part number: {problem}")
     query = select(items).where(items.c.part_number_key == part_number.casefold())
     row = tx.conn.execute(query.with_for_update(key_share=True) if lock else query).one_or_none()
     if row is None or (row.archived_at and not include_archived):
         state = "is archived" if row is not None else "does not exist on this server"
         raise NotFoundError(f"item {part_number!r} {state}")
+    if lock:
+        tx.take_time(row.updated_at)
     return to_item(row)
 
 
@@ -156,10 +245,10 @@ def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
 
 
 def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
-    """Make an item. Returns it, and False where its UUID was known already (the repeat of a request).
+    """Make an item. Returns it, and False for the repeat of a request.
 
     Raises RejectedError for unusable values, DuplicateError for a taken part number, ConflictError for a
-    UUID whose item is not the one that is asked for.
+    UUID or key of another request.
     """
     # A repeat is judged like the first request: what is unusable is refused, whether or not the id is known.
     schema = find_schema(new.schema)
@@ -169,31 +258,36 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     if number is None and category is None:
         raise RejectedError("category: wanted one (such as F01) or an explicit part_number, got neither")
     check_json("properties", new.properties)
-    if new.uuid is not None:
+    uuid = normal_uuid(new.uuid, "id") if new.uuid is not None else None
+    request = KeyedRequest.of("item", uuid or new.key, asdict(replace(new, uuid=uuid, key=None)))
+    if request is not None:
         # A repeat that comes while the first request is under way waits for it, and finds its item.
-        tx.lock(uuids.UUID(normal_uuid(new.uuid, "id")).int & (2**63 - 1))
-    if new.uuid is not None and (known := _made_before(tx, new.uuid, new.part_number)) is not None:
-        return known, False
+        tx.lock(int(hashlib.sha256(request.key.encode()).hexdigest()[:15], 16))
+    if (earlier := earlier_answer(tx, request)) is not None:
+        return _made_before(tx, earlier.text), False
+    if uuid is not None and (others := get_by_uuids(tx, [uuid], include_archived=True)):
+        state = ", which is archived" if others[0].archived_at else " already"
+        raise ConflictError(
+            f"id: {uuid} is that of {others[0].part_number}{state}; a new item needs a new id"
+        )
     if number is None and category is not None:
         number = take_number(tx, schema, category)
     assert number is not None  # given, or of the category
     name, description = new.name.strip(), new.description.strip()
     values = {
-        "uuid": normal_uuid(new.uuid, "id") if new.uuid else str(uuids.uuid4()),
+        "uuid": uuid or str(uuids.uuid4()),
         "schema_name": schema.name,
         "category": category.code if category else None,
         "item_type": item_type,
         "name": name or description or number,
         "description": description or name,
-        "sourcing_type": new.sourcing_type,
-        "long_description": new.long_description,
+        **new.texts,
         "properties": "{}",
         "current_revision": 0,
         "bom_version": 0,
         "version": 1,
         "created_at": tx.stamp,
         "created_by": tx.actor.username,
-        "created_as": number.casefold() if new.part_number else None,
     }
     _insert(tx, number, values)
     item = get_item(tx, number)
@@ -203,6 +297,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     else:
         index_item(tx, item.id)
     events.item_created(tx, item)
+    keep_answer(tx, request, KeptAnswer(item.uuid))
     return item, True
 
 
@@ -215,8 +310,7 @@ class ItemChange:
     description: str | None = None
     item_type: str | None = None
     category: str | None = None
-    sourcing_type: str | None = None
-    long_description: str | None = None
+    texts: Mapping[str, str | None] = field(default_factory=dict)  # of silo.api.wire.ItemTexts
     properties: Mapping[str, Any] | None = None
     comment: str = ""
 
@@ -313,17 +407,9 @@ def uuid_or_none(uuid: str) -> str | None:
         return None
 
 
-def _made_before(tx: Tx, uuid: str, number: str | None) -> Item | None:
-    """The item that an earlier request made with this UUID."""
-    row = tx.conn.execute(select(items).where(items.c.uuid == normal_uuid(uuid, "id"))).one_or_none()
-    if row is None:
-        return None
-    item = to_item(row)
-    # It may have been renamed since.
-    if number is not None and number.strip().casefold() not in (item.part_number.casefold(), item.created_as):
-        raise ConflictError(
-            f"id: {item.uuid} is that of {item.part_number}, not of {number}; a new item needs a new id"
-        )
+def _made_before(tx: Tx, uuid: str) -> Item:
+    """Return the item that the same request made before; it may have been changed since."""
+    (item,) = get_by_uuids(tx, [uuid], include_archived=True)
     if item.archived_at:
         raise ConflictError(
             f"id: {item.uuid} is that of {item.part_number}, which is archived; bring it back, or give a new "
@@ -369,7 +455,7 @@ def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
         "description": change.description,
         "item_type": _item_type(change.item_type, None) if change.item_type is not None else None,
         "category": find_schema(item.schema).category(change.category).code if change.category else None,
-        "sourcing_type": change.sourcing_type,
-        "long_description": change.long_description,
     }
-    return {key: value for key, value in given.items() if value is not None and value != getattr(item, key)}
+    changed = {key: value for key, value in given.items() if value != getattr(item, key)}
+    changed |= {key: value for key, value in change.texts.items() if value != item.texts[key]}
+    return {key: value for key, value in changed.items() if value is not None}

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import json
 import re
-import unicodedata
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from typing import Any
 
 from sqlalchemy import (
@@ -35,13 +35,14 @@ from sqlalchemy import (
 from sqlalchemy.dialects.postgresql import TSQUERY, TSVECTOR
 from sqlalchemy.sql.expression import cast, literal
 
-from silo.bom.naming import name_key
-from silo_server.db.bulk import one_of
-from silo_server.db.engine import Tx, get_state, put_state
+from silo.api.wire import ItemTexts
+from silo.bom.resolve import folded, glued, name_key
+from silo_server.db.engine import Tx, get_state, one_of, put_state
 from silo_server.db.tables import items, revisions
+from silo_server.schema.catalog import text_hints
 
 # Counts up when the rules below change; the next start then makes the index anew.
-RULES = "1"
+RULES = "2"
 STATE = "search_index"
 PAGE = 1000
 # More than anybody searches for, and what keeps the index of one item small.
@@ -50,6 +51,7 @@ MOST_WORDS = 500
 LONGEST_PROPERTY = 200
 
 _WORD = re.compile(r"[^\W_]+")
+_RUNS = re.compile(r"(?<=[^\W\d_])\d+")
 _SHA256 = re.compile(r"(?:sha256:)?([0-9a-f]{64})", re.IGNORECASE)
 _fts = table("item_search", column("rowid", Integer))
 _vectors = table("item_search", column("item_id", Integer), column("words", TSVECTOR))
@@ -57,7 +59,21 @@ _vectors = table("item_search", column("item_id", Integer), column("words", TSVE
 
 def words_of(written: str) -> list[str]:
     """The words of a text as the index has them."""
-    return [word[:LONGEST_WORD] for word in _WORD.findall(_plain(written))]
+    return [word[:LONGEST_WORD] for word in _WORD.findall(folded(written))]
+
+
+def fits(asked: str) -> Callable[..., bool]:
+    """A test of texts: true where every word of ``asked`` is in one of them, without case and accents."""
+    wanted = words_of(asked)
+
+    def test(*texts: str | None) -> bool:
+        if not wanted:
+            return True
+        written = " ".join(words_of(" ".join(text for text in texts if text)))
+        joined = written.replace(" ", "")
+        return all(word in written or word in joined for word in wanted)
+
+    return test
 
 
 def search_for(tx: Tx, written: str) -> tuple[ColumnElement[bool], ColumnElement[int]] | None:
@@ -69,7 +85,7 @@ def search_for(tx: Tx, written: str) -> tuple[ColumnElement[bool], ColumnElement
     had, the file with this content, or were registered from it. Best first: the very number, then the words
     in the number, then in number and name, then anywhere.
     """
-    parts = written.split()
+    parts = folded(written).split()
     if not parts:
         return None
     conditions: list[ColumnElement[bool]] = []
@@ -128,6 +144,10 @@ def rebuild_index(tx: Tx) -> int:
     return count
 
 
+# A choice is no word to search for: half of the items would be found.
+_TEXTS = [name for name, field in ItemTexts.model_fields.items() if "options" not in text_hints(field)]
+
+
 def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
     names: dict[int, list[str]] = {}
     files = select(revisions.c.item_id, revisions.c.file_name).distinct()
@@ -140,7 +160,7 @@ def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
             items.c.part_number,
             items.c.name,
             items.c.description,
-            items.c.long_description,
+            *(items.c[name] for name in _TEXTS),
             items.c.properties,
         ).where(one_of(tx, items.c.id, ids))
     ).all()
@@ -148,9 +168,10 @@ def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
         {
             "id": row.id,
             "number": _inner({*words_of(row.part_number), _joined(row.part_number)}),
-            "name": _inner(words_of(row.name)),
+            "name": _inner({*words_of(row.name), *words_of(glued(folded(row.name)))}),
             "other": _limited(
-                [row.description, row.long_description or "", *names.get(row.id, ())], row.properties
+                [row.description, *(getattr(row, name) or "" for name in _TEXTS), *names.get(row.id, ())],
+                row.properties,
             ),
         }
         for row in found
@@ -202,15 +223,8 @@ def _vector(*parts: tuple[set[str], str]) -> str:
     return " ".join(f"'{word}':{','.join(where)}" for word, where in places.items())
 
 
-def _plain(written: str) -> str:
-    if written.isascii():
-        return written.lower()
-    parted = unicodedata.normalize("NFKD", written.casefold())
-    return "".join(c for c in parted if not unicodedata.combining(c)).casefold()
-
-
 def _joined(number: str) -> str:
-    return "".join(_WORD.findall(_plain(number)))[:LONGEST_WORD]
+    return "".join(_WORD.findall(folded(number)))[:LONGEST_WORD]
 
 
 def _inner(words: Iterable[str]) -> set[str]:
@@ -231,7 +245,9 @@ def _limited(texts: Iterable[str], properties: str) -> set[str]:
     found: set[str] = set()
     for written in [*texts, *_texts(json.loads(properties))]:
         words = words_of(written)
-        found.update(words)
+        found.update(words, words_of(glued(folded(written))))
+        for word in words:  # only the beginnings of these words are found: "iso4762" by its number too
+            found.update(_RUNS.findall(word))
         if len(words) > 1 and len(written) <= LONGEST_WORD and any(c.isdigit() for c in written):
             found.add(_joined(written))  # a supplier's number, without its dashes too
         if len(found) > MOST_WORDS:
@@ -267,23 +283,23 @@ class LookAlike:
 def find_look_alikes(tx: Tx, wanted: Sequence[tuple[str, str]]) -> list[list[LookAlike]]:
     """For each (name, SHA-256 of the file or ""): what it may be already, the same file first.
 
-    One pass over the names of all items: a name is compared as people read it, without suffix, in any case.
+    The index gives those that may fit; a name is compared as people read it, without suffix, in any case.
     """
     names: dict[str, list[Any]] = {name_key(name): [] for name, _ in wanted if name}
     files: dict[str, dict[int, Any]] = {digest.lower(): {} for _, digest in wanted if digest}
-    has_hash = items.c.properties.like('%"file_sha256"%')
-    kept = case((has_hash, items.c.properties), else_=None).label("properties")
     columns = (items.c.id, items.c.uuid, items.c.part_number, items.c.name)
     live = items.c.archived_at.is_(None)
-    for row in tx.conn.execute(select(*columns, kept).where(live).order_by(items.c.part_number_key)):
-        same = names.get(name_key(row.name))
-        if same is not None and len(same) < MOST_LOOK_ALIKES:
-            same.append(row)
-        digest = (
-            str(json.loads(row.properties).get("file_sha256")).lower() if row.properties and files else ""
-        )
-        if digest in files:
-            files[digest][row.id] = row
+    for key, same in names.items():
+        if words := words_of(key):
+            near = select(*columns).where(live, _matches(tx, words, "number name"))
+            rows = tx.conn.execute(near.order_by(items.c.part_number_key))
+            same += islice((row for row in rows if name_key(row.name) == key), MOST_LOOK_ALIKES)
+    for digest, having in files.items():
+        if _SHA256.fullmatch(digest):
+            near = select(*columns, items.c.properties).where(live, _matches(tx, [digest], ""))
+            for row in tx.conn.execute(near):
+                if str(json.loads(row.properties).get("file_sha256")).lower() == digest:
+                    having[row.id] = row
     query = select(*columns, revisions.c.file_checksum).join(items).where(live)
     for row in tx.conn.execute(query.where(one_of(tx, revisions.c.file_checksum, list(files)))):
         files[row.file_checksum][row.id] = row

@@ -1,39 +1,249 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""One's own password and API tokens; for admins users, everybody's tokens, the mode, and the audit list."""
+"""One's own password and API tokens; for admins users, everybody's tokens, the mode, and the audit list.
+
+The way in and out: who may see and do what on the pages, the login form, the one-time link, log out.
+"""
 
 from __future__ import annotations
 
 import secrets
 from collections.abc import Mapping
+from datetime import datetime
 from functools import partial
 from typing import Annotated
+from urllib.parse import quote, urlsplit
 
-from fastapi import APIRouter, Path
-from starlette.responses import Response
+import anyio.to_thread
+from fastapi import APIRouter, Depends, Path, Query, Request
+from starlette.responses import RedirectResponse, Response
 
-from silo.bom.errors import ConflictError, RejectedError, SiloError
+from silo.api.wire import login_code
+from silo.bom.errors import AuthError, ConflictError, ForbiddenError, RejectedError, SiloError
+from silo_server import events
 from silo_server.db.engine import mode_of
-from silo_server.errors import TooManyAttemptsError
 from silo_server.operation.housekeeping import last_run
-from silo_server.routes.context import SESSION_COOKIE, Call, PageFrom
-from silo_server.services import events
+from silo_server.operation.metrics import standing
+from silo_server.routes.context import (
+    FORM_TYPES,
+    SAFE_METHODS,
+    SESSION_COOKIE,
+    Call,
+    FormSecretError,
+    Guard,
+    PageFrom,
+    ServerDep,
+    client_address,
+    find_actor,
+    form_of,
+    server_of,
+)
+from silo_server.routes.system import set_session_cookie
 from silo_server.services.access import accounts, audit, credentials, logins
-from silo_server.values import Role, Scope
+from silo_server.settings import TooManyAttemptsError
+from silo_server.values import Actor, Role, Scope
 from silo_server.web.forms import (
+    MOST_KEPT,
     Form,
+    Kept,
     back,
     back_with_secret,
     compared,
+    kept_form,
+    local_path,
+    own_site,
     password_of,
     secret_of,
     take_away_secret,
     text,
+    unpacked,
 )
-from silo_server.web.login_page import Administrator, Reader
-from silo_server.web.render import page, sentence
-from silo_server.web.tables import part_of
+from silo_server.web.render import page, page_for, part_of, sentence
 
 router = APIRouter(include_in_schema=False)
+
+
+class LoginNeededError(Exception):
+    """Nobody is logged in; the login page leads back to ``target``, or to the form that was ``kept``."""
+
+    def __init__(self, target: str, kept: Kept | None = None) -> None:
+        super().__init__(target)
+        self.target, self.kept = target, kept
+
+
+class OldFormError(Exception):
+    """A form of ours that was shown in an earlier session; the person is asked whether to send it now."""
+
+    def __init__(self, actor: Actor, kept: Kept) -> None:
+        super().__init__(kept.path)
+        self.actor, self.kept = actor, kept
+
+
+class PageGuard(Guard):
+    """As :class:`Guard`, for people: what they typed is kept over a login."""
+
+    async def __call__(self, request: Request) -> Call:
+        try:
+            return await super().__call__(request)
+        except FormSecretError:
+            kept, actor = await _kept(request), await anyio.to_thread.run_sync(find_actor, request)
+            if kept is None or actor is None or not own_site(request):
+                raise
+            raise OldFormError(actor, kept) from None
+        except AuthError as error:
+            kept = await _kept(request)
+            if error.status_hint != 401:
+                request.state.kept = kept
+                raise
+            raise LoginNeededError(_here(request), kept if own_site(request) else None) from None
+
+
+async def _kept(request: Request) -> Kept | None:
+    """What the request's form holds; None where it is none, or too large to be carried along."""
+    length = request.headers.get("content-length", "")
+    small = length.isdigit() and int(length) <= MOST_KEPT
+    is_form = request.headers.get("content-type", "").startswith(FORM_TYPES)
+    if request.method in SAFE_METHODS or not is_form or not small:
+        return None
+    return kept_form(request.url.path, await form_of(request))
+
+
+Reader = Annotated[Call, Depends(PageGuard(Role.VIEWER))]
+Writer = Annotated[Call, Depends(PageGuard(Role.EDITOR))]
+Administrator = Annotated[Call, Depends(PageGuard(Role.ADMIN))]
+
+
+def own_form(request: Request) -> None:
+    """For the one form without a session, the login: ForbiddenError where another site sent it.
+
+    A browser says where a form comes from; a page elsewhere must not log somebody in under its own name.
+    """
+    if own_site(request) is False:
+        raise ForbiddenError("this form was sent by another site; log in on the login page itself")
+
+
+def _here(request: Request) -> str:
+    if request.method in SAFE_METHODS:
+        query = f"?{request.url.query}" if request.url.query else ""
+        return request.url.path + query
+    # A form cannot be sent again by a link; the page before it is the best that is left.
+    referer = urlsplit(request.headers.get("referer", ""))
+    path = referer.path.removeprefix(server_of(request).settings.root_path)
+    return path if referer.netloc == request.headers.get("host") and path else "/"
+
+
+def _login_page(
+    request: Request, target: str, problem: str = "", status: int = 200, kept: Kept | None = None
+) -> Response:
+    values = {"target": target, "problem": problem, "kept": kept}
+    return page_for(request, None, "login.html", status=status, **values)
+
+
+async def to_login(request: Request, error: Exception) -> Response:
+    """Lead visitors who are not logged in to the login page."""
+    assert isinstance(error, LoginNeededError)
+    if error.kept is None:
+        return RedirectResponse("/login?next=" + quote(error.target, safe="/"), 303)
+    return await anyio.to_thread.run_sync(_login_page, request, error.target, "", 401, error.kept)
+
+
+async def send_again(request: Request, error: Exception) -> Response:
+    """Ask whether a form of an earlier session is to be sent."""
+    assert isinstance(error, OldFormError)
+    actor, kept = error.actor, error.kept
+    return await anyio.to_thread.run_sync(
+        lambda: page_for(request, actor, "again.html", status=403, kept=kept)
+    )
+
+
+START = "/"
+Next = Annotated[str, Query(max_length=500)]
+
+
+@router.get("/login")
+def login_form(request: Request, next: Next = START) -> Response:
+    """The login form; users who are logged in already are sent on."""
+    if find_actor(request) is not None:
+        return back(local_path(next))
+    return _login_page(request, local_path(next))
+
+
+@router.post("/login", dependencies=[Depends(own_form)])
+def log_in(request: Request, server: ServerDep, form: Form) -> Response:
+    """Begin a session and lead to ``next``, or to the form that was being sent when the last one ended."""
+    target = local_path(text(form, "next"))
+    packed = form.get("kept")
+    kept = unpacked(packed) if isinstance(packed, str) and packed else None
+
+    if "already" in form:
+        actor = find_actor(request)
+        if actor is None:
+            return _login_page(request, target, "You are not logged in yet in this browser.", 401, kept)
+        return page_for(request, actor, "again.html", kept=kept) if kept else back(target)
+    try:
+        session = logins.log_in(
+            server.db, text(form, "username", 200), password_of(form, "password"), client_address(request)
+        )
+    except (AuthError, TooManyAttemptsError) as error:
+        return _login_page(request, target, str(error), error.status_hint, kept)
+    if kept is None:
+        return _with_session(request, session, target)
+    actor = logins.actor_by_session(server.db, session.secret, client_address(request))
+    shown = page_for(request, actor, "again.html", kept=kept)
+    set_session_cookie(shown, request, session)
+    return shown
+
+
+@router.get("/login/link/{secret}")
+def login_link(request: Request, secret: str, next: Next = START) -> Response:
+    """Ask whether to use the link up: what only looks at links (mail scanners, previews) must not do that."""
+    return page_for(request, None, "login_link.html", secret=secret, target=local_path(next))
+
+
+@router.post("/login/link/{secret}", dependencies=[Depends(own_form)])
+def use_link(request: Request, server: ServerDep, secret: str, form: Form) -> Response:
+    """Begin a session by a one-time link; one that was used already leads on where the session lives."""
+    target = local_path(text(form, "next"))
+    try:
+        session = logins.use_login_link(server.db, secret, client_address(request))
+    except AuthError as error:
+        if find_actor(request) is not None:
+            return back(target)
+        return _login_page(request, target, str(error), 401)
+    return _with_session(request, session, target)
+
+
+ProgramName = Annotated[str, Query(min_length=1, max_length=100)]
+Proof = Annotated[str, Query(pattern="^[0-9a-f]{64}$")]
+
+
+@router.get("/login/program")
+def ask_for_program(call: Reader, name: ProgramName, proof: Proof) -> Response:
+    """Ask whether a program on the person's computer may come in."""
+    return page(call, "login_program.html", name=name, proof=proof, code=login_code(proof))
+
+
+@router.post("/login/program")
+def let_program_in(call: Reader, name: ProgramName, proof: Proof) -> Response:
+    """Make a token whose secret only the program knows: no more than its SHA-256 came here."""
+    with call.write(even_when_read_only=True) as tx:
+        credentials.let_program_in(tx, name, proof)
+    return back("/account", f"{name} is logged in. You may close this page.")
+
+
+@router.post("/logout")
+def log_out(call: Reader) -> Response:
+    """End the session."""
+    logins.log_out(call.server.db, call.actor)
+    response = RedirectResponse("/login", 303)
+    response.delete_cookie(SESSION_COOKIE)
+    return response
+
+
+def _with_session(request: Request, session: logins.NewSession, target: str) -> Response:
+    response = back(target)
+    set_session_cookie(response, request, session)
+    return response
+
 
 AUDIT_SIZE = 100
 MODES = ("normal", "read-only")
@@ -114,6 +324,17 @@ def set_mode(call: Administrator, form: Form) -> Response:
     return back(
         "/users", "The server takes changes." if mode == "normal" else "The server takes no changes now."
     )
+
+
+@router.get("/system")
+def system_page(call: Administrator) -> Response:
+    """How the server is, for those who look after it."""
+    server = call.server
+    told = standing(server.db, server.hub, server.files, server.large_reads)
+    with call.read() as tx:
+        last = told["backup"]
+        days = (tx.at - datetime.fromisoformat(last["at"])).days if last else None
+    return page(call, "system.html", told=told, backup_days=days)
 
 
 @router.get("/audit")

@@ -7,6 +7,7 @@ import base64
 import binascii
 import json
 import re
+import secrets
 import zlib
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,14 +20,16 @@ from starlette.responses import RedirectResponse, Response
 
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import parse_number, plain, read_quantity, whole_number
+from silo.bom.resolve import character_problem
 from silo_server.routes.context import form_of, server_of
 from silo_server.services.access.accounts import MAX_PASSWORD
-from silo_server.web.render import NOTICE_COOKIE
+from silo_server.web.render import NOTICE, NOTICE_COOKIE
 
 NOTICE_SECONDS = 60
 SECRET_COOKIE = "silo_shown_once"
 # A browser takes no cookie beyond 4096 bytes, and a character may need twelve of them.
-MOST_NOTICE = 300
+MOST_NOTICE = 200
+MOST_CHANGES = 1500
 
 
 async def _form(request: Request) -> AsyncIterator[FormData]:
@@ -47,7 +50,9 @@ def text(form: FormData, name: str, most: int = 500) -> str:
     value = form.get(name)
     if not isinstance(value, str):
         return ""
-    trimmed = value.replace("\x00", "").replace("\r\n", "\n").strip()
+    if problem := character_problem(value):
+        raise RejectedError(f"{name}: {problem}")
+    trimmed = value.replace("\r\n", "\n").strip()
     if len(trimmed) > most:
         raise RejectedError(f"{name}: wanted at most {most} characters, got {len(trimmed)}")
     return trimmed
@@ -84,12 +89,12 @@ class Kept:
     """A form that was not carried out, to be sent again by the person who filled it in.
 
     files
-        names of files in it, which have to be chosen again.
+        (field, name) of the files in it, which have to be chosen again.
     """
 
     path: str
     fields: Sequence[tuple[str, str]]
-    files: Sequence[str] = ()
+    files: Sequence[tuple[str, str]] = ()
 
     @property
     def typed(self) -> list[tuple[str, str]]:
@@ -121,7 +126,7 @@ def kept_form(path: str, form: FormData) -> Kept | None:
         return None
     pairs = form.multi_items()
     fields = [(name, value) for name, value in pairs if isinstance(value, str) and name != "csrf_token"]
-    files = [value.filename for _, value in pairs if not isinstance(value, str) and value.filename]
+    files = [(name, one.filename) for name, one in pairs if not isinstance(one, str) and one.filename]
     return Kept(path, fields, files)
 
 
@@ -132,7 +137,7 @@ def unpacked(packed: str) -> Kept | None:
         data = unpacker.decompress(base64.b64decode(packed, validate=True), MOST_KEPT * 4)
         path, fields, files = json.loads(data.decode("utf-8", "surrogatepass"))
         pairs = [(str(name), str(value)) for name, value in fields]
-        return Kept(local_path(path), pairs, [str(name) for name in files])
+        return Kept(local_path(path), pairs, [(str(name), str(file)) for name, file in files])
     except (binascii.Error, ValueError, TypeError, AttributeError, RecursionError, zlib.error):
         return None
 
@@ -244,19 +249,24 @@ def compared(
     return Edit(mine, clashes, theirs)
 
 
-def back(path: str, notice: str = "", *, undo: int = 0) -> Response:
+def back(path: str, notice: str = "", *, undo: Sequence[int] = ()) -> Response:
     """Go and look at ``path`` (303); ``notice`` stands there on top, once.
 
-    It travels in a cookie and not in the address, so that no link can put words into our mouth.
+    It travels in a cookie and not in the address, so that no link can put words into our mouth. The address
+    has the cookie's key: no other tab, nor a script that fetches a page there, takes the notice.
 
     undo
-        the change of a BOM that was just made, which a button beside the notice takes back; 0 for none.
+        the changes of BOMs that were just made, which a button beside the notice takes back; 0 for none.
     """
-    response = RedirectResponse(path, 303)
+    key = secrets.token_hex(4) if notice else ""
+    page, mark, place = path.partition("#")
+    said = f"{'&' if '?' in page else '?'}{NOTICE}={key}" if key else ""
+    response = RedirectResponse(f"{page}{said}{mark}{place}", 303)
     if notice:
+        changes = ",".join(str(change) for change in undo if change)
         response.set_cookie(
-            NOTICE_COOKIE,
-            quote(f"{undo} {notice[:MOST_NOTICE]}"),
+            f"{NOTICE_COOKIE}_{key}",
+            quote(f"{changes if len(changes) <= MOST_CHANGES else ''} {notice[:MOST_NOTICE]}"),
             max_age=NOTICE_SECONDS,
             httponly=True,
             samesite="lax",

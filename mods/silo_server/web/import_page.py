@@ -21,14 +21,15 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
 from silo.bom.headers import Role
 from silo.bom.numbers import Mark
-from silo_server.errors import TooLargeError
 from silo_server.routes.context import Call
-from silo_server.services.bom import imports
-from silo_server.services.bom.imports import Layout
+from silo_server.services.bom import transfer
+from silo_server.services.bom.transfer import Layout
 from silo_server.services.items import get_item
+from silo_server.services.revisions import clean_name
+from silo_server.settings import TooLargeError
+from silo_server.web.accounts import Writer
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.line_form import changes
-from silo_server.web.login_page import Writer
 from silo_server.web.merge_page import bom_path
 from silo_server.web.render import isolate, page, sentence
 
@@ -74,9 +75,9 @@ def apply(call: Writer, part_number: str, form: Form) -> Response:
     """Write it; where the BOM changed since the check, check again instead."""
     upload, layout = _carried(form), layout_of(form)
     try:
-        records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout)
+        records = transfer.read_csv(upload.data, call.server.settings.max_merge_entries, layout)
         with call.write() as tx:
-            plan, change, _ = imports.apply_import(
+            plan, change, _ = transfer.apply_import(
                 tx, part_number, records, upload.name, whole(form, "version")
             )
     except VersionConflictError:
@@ -85,7 +86,7 @@ def apply(call: Writer, part_number: str, form: Form) -> Response:
     except SiloError as error:
         return _show(call, part_number, upload, layout, Problem.of(error))
     said = f"Imported {isolate(upload.name)}: {plan.count('add')} added, {plan.count('change')} changed."
-    return back(bom_path(part_number), said, undo=change)
+    return back(bom_path(part_number), said, undo=[change])
 
 
 @dataclass(frozen=True)
@@ -107,12 +108,12 @@ def layout_of(form: FormData) -> Layout | None:
     if "header" not in form:
         return None
     marks = {mark.value: mark for mark in Mark}
-    columns = {role: whole(form, f"column_{role}") for role in imports.ROLES}
+    columns = {role: whole(form, f"column_{role}") for role in transfer.ROLES}
     delimiter = form.get("delimiter")
     return Layout(
-        delimiter if isinstance(delimiter, str) and delimiter in imports.DELIMITERS else ",",
-        min(whole(form, "header") or 0, imports.HEADER_WITHIN - 1),
-        {role: at for role, at in columns.items() if at is not None and at < imports.MAX_COLUMNS},
+        delimiter if isinstance(delimiter, str) and delimiter in transfer.DELIMITERS else ",",
+        min(whole(form, "header") or 0, transfer.HEADER_WITHIN - 1),
+        {role: at for role, at in columns.items() if at is not None and at < transfer.MAX_COLUMNS},
         marks.get(text(form, "mark")),
     )
 
@@ -124,10 +125,10 @@ def _show(
     layout: Layout | None = None,
     problem: Problem = Problem(),
 ) -> Response:
-    records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout) if upload else ()
+    records = transfer.read_csv(upload.data, call.server.settings.max_merge_entries, layout) if upload else ()
     with call.read() as tx:
         item = get_item(tx, part_number)
-        plan = imports.plan_import(tx, part_number, records) if upload else None
+        plan = transfer.plan_import(tx, part_number, records) if upload else None
     rows = plan.rows if plan else ()
     said = {row.row: changes(row.before, row.after) for row in rows if row.before and row.after}
     # What is wrong, and what would change, is worth reading; rows that are as they were are not.
@@ -153,8 +154,8 @@ _LABELS = {Role.TYPE: "Type", Role.REVISION: "Revision"}
 
 def _reading(file: Upload, layout: Layout | None) -> dict[str, Any]:
     """How the file is read, for the form in which a person changes that."""
-    known = layout or imports.guess_of(file.data) or Layout(imports.likely_delimiter(file.data), 0)
-    lines = imports.first_lines(file.data, known.delimiter, known.header + 6)
+    known = layout or transfer.guess_of(file.data) or Layout(transfer.likely_delimiter(file.data), 0)
+    lines = transfer.first_lines(file.data, known.delimiter, known.header + 6)
     header = lines[known.header] if known.header < len(lines) else []
     width = max(map(len, lines), default=0)
     samples = lines[known.header + 1 :]
@@ -162,8 +163,8 @@ def _reading(file: Upload, layout: Layout | None) -> dict[str, Any]:
         "layout": known,
         "chosen": layout is not None,
         "lines": [" | ".join(cells)[:60] for cells in lines],
-        "delimiters": imports.DELIMITERS,
-        "roles": [(role, _LABELS.get(role, role.replace("_", " ").capitalize())) for role in imports.ROLES],
+        "delimiters": transfer.DELIMITERS,
+        "roles": [(role, _LABELS.get(role, role.replace("_", " ").capitalize())) for role in transfer.ROLES],
         "columns": [_name_of(index, header, samples) for index in range(width)],
     }
 
@@ -181,8 +182,8 @@ def _uploaded(form: FormData) -> Upload:
     data = file.file.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise TooLargeError(f"The file is larger than {MOST_BYTES // 2**20} MiB; this cannot be a BOM.")
-    imports.refuse_workbook(data)
-    return Upload(file.filename[:200], data)
+    transfer.refuse_workbook(data)
+    return Upload(clean_name(file.filename), data)
 
 
 def _carried(form: FormData) -> Upload:

@@ -8,6 +8,7 @@ somebody else changed the same field meanwhile, nothing is saved and the page sh
 from __future__ import annotations
 
 import json
+import secrets
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,33 +18,34 @@ from fastapi import APIRouter
 from starlette.datastructures import FormData, UploadFile
 from starlette.responses import Response
 
-from silo.bom.errors import RejectedError, SiloError
+from silo.api.wire import ItemTexts
+from silo.bom.errors import NewerRevisionError, RejectedError, SiloError
 from silo.bom.numbers import plain, read_number
 from silo_server.db.engine import Tx
 from silo_server.routes.context import Call
-from silo_server.routes.revisions import store_file
-from silo_server.schema.catalog import ITEM_TYPES, SOURCING_TYPES, Category, find_schema
+from silo_server.routes.items import numbered, store_file
+from silo_server.schema.catalog import ITEM_TYPES, Category, find_schema, text_hints
 from silo_server.services import items as service
 from silo_server.services.bom.tree import where_used
 from silo_server.services.items import ItemChange, NewItem, get_item
 from silo_server.services.revisions import Origin
 from silo_server.values import Item, Revision
-from silo_server.web.forms import Form, back, compared, same_text, text, whole
-from silo_server.web.login_page import Writer
+from silo_server.web.accounts import Writer
+from silo_server.web.forms import Form, Kept, back, compared, same_text, text, whole
 from silo_server.web.render import isolate, page, segment
 
 router = APIRouter(include_in_schema=False)
 
 # The item's own fields; those of its properties are called ``p.NAME``, and ``o.N.name``, ``o.N.value``.
-OWN = ("part_number", "name", "description", "category", "item_type", "sourcing_type", "long_description")
+TEXTS = ItemTexts.model_fields
+OWN = ("part_number", "name", "description", "category", "item_type", *TEXTS)
 LABELS = {
     "part_number": "Part number",
     "name": "Name",
     "description": "Description",
     "category": "Category",
     "item_type": "Type",
-    "sourcing_type": "Sourcing",
-    "long_description": "Long description",
+    **{name: field.title or name for name, field in TEXTS.items()},
 }
 EMPTY_ROWS = 2
 SHORT, LONGEST = 200, 10_000
@@ -90,8 +92,7 @@ def make(call: Writer, form: Form) -> Response:
             name=typed["name"],
             description=typed["description"],
             item_type=typed["item_type"] or None,
-            sourcing_type=typed["sourcing_type"] or None,
-            long_description=typed["long_description"] or None,
+            texts={name: typed[name] or None for name in TEXTS},
             properties=properties,
         )
         with call.write() as tx:
@@ -149,24 +150,38 @@ def upload(call: Writer, part_number: str, form: Form) -> Response:
     if not isinstance(file, UploadFile) or not file.filename:
         raise RejectedError("no file was chosen, so nothing was uploaded")
 
-    def answer(_item: Item, revision: Revision) -> Response:
+    def answer(_of: object, revision: Revision) -> Response:
         said = f"{isolate(revision.file_name or '')} is revision {revision.revision_number}."
         return back(f"{path}#revisions", said)
 
     comment, key = text(form, "comment", LONGEST), text(form, "key", 128) or None
     origin = Origin(whole(form, "base_revision"))
-    return store_file(call, part_number, file, comment, answer, key=key, origin=origin)
+    try:
+        return store_file(call, numbered(part_number), file, comment, answer, key=key, origin=origin)
+    except NewerRevisionError as error:
+        # Who sends the form of that page has read of the newer revision: the file goes on top of it.
+        newest = str(error.revision["revision_number"])
+        fields = {"comment": comment, "key": secrets.token_urlsafe(16), "base_revision": newest}
+        call.request.state.kept = Kept(f"{path}/file", list(fields.items()), [("file", file.filename)])
+        again = (
+            f"{error.revision['created_by']} made revision {newest} after you opened this page. Look at that "
+            "file first; to put yours on top of it, choose it again and send it"
+        )
+        raise NewerRevisionError(again, error.revision) from None
 
 
 @router.post("/items/{part_number}/archive")
 def archive(call: Writer, part_number: str, form: Form) -> Response:
     """Put an item into the archive."""
     with call.write() as tx:
+        item = service.get_item(tx, part_number)
+        used, uses = where_used(tx, item, limit=5)
         service.archive_item(tx, part_number, whole(form, "version"))
-    path = f"/items/{segment(part_number)}"
-    return back(
-        path, f"{isolate(part_number)} is in the archive. Its number stays taken; its BOM lines stay."
-    )
+    said = f"{isolate(part_number)} is in the archive. Its number stays taken"
+    if uses:
+        more = f" and {uses - len(used)} more" if uses > len(used) else ""
+        said += f"; it stays in the BOM of {', '.join(isolate(one.parent.part_number) for one in used)}{more}"
+    return back(f"/items/{segment(part_number)}", f"{said}.")
 
 
 @router.post("/items/{part_number}/unarchive")
@@ -179,7 +194,7 @@ def unarchive(call: Writer, part_number: str, form: Form) -> Response:
 
 def texts_of(item: Item) -> dict[str, str]:
     """An item as the texts of its form."""
-    shown = {name: str(getattr(item, name) or "") for name in OWN}
+    shown = {name: str((item.texts[name] if name in TEXTS else getattr(item, name)) or "") for name in OWN}
     known = {one.name for one in find_schema(item.schema).fields}
     for name, value in item.properties.items():
         if name in known and not (isinstance(value, str) and len(value) > LONGEST):
@@ -203,7 +218,10 @@ def shown_properties(item: Item) -> list[tuple[str, str, str]]:
     fields = {one.name: one for one in find_schema(item.schema).fields}
     order = [name for name in fields if name in item.properties]
     order += sorted(name for name in item.properties if name not in fields)
-    found = []
+    hinted = {name: text_hints(field) for name, field in TEXTS.items()}
+    # The page has places of its own for choices and long texts.
+    plain_texts = [name for name, hints in hinted.items() if item.texts[name] and not hints]
+    found = [(LABELS[name], item.texts[name] or "", "") for name in plain_texts]
     for name in order:
         known = fields.get(name)
         text_ = property_text(item.properties[name])
@@ -223,7 +241,8 @@ def _change(tx: Tx, item: Item, typed: Mapping[str, str], mine: set[str], commen
         problems += wrong
     if problems:
         raise RejectedError("; ".join(problems), problems)
-    given = ItemChange(**own, properties=properties, comment=comment)
+    texts = {name: own.pop(name) for name in TEXTS if name in own}
+    given = ItemChange(**own, texts=texts, properties=properties, comment=comment)
     return service.change_item(tx, item.part_number, given)
 
 
@@ -276,7 +295,7 @@ def _typed(form: FormData, prefix: str = "") -> dict[str, str]:
 
 
 def _same(name: str, a: str, b: str) -> bool:
-    return same_text(a, b, lines=name == "long_description")
+    return same_text(a, b, lines=name in TEXTS and bool(text_hints(TEXTS[name]).get("long")))
 
 
 def _text(form: FormData, key: str) -> str:
@@ -314,7 +333,7 @@ def _page(call: Call, item: Item | None, shown: Shown, uses: int = 0) -> Respons
         nested=nested,
         groups=groups,
         types=ITEM_TYPES,
-        sourcing=SOURCING_TYPES,
+        texts={name: text_hints(field) for name, field in TEXTS.items()},
         labels=labels,
         uses=uses,
     )

@@ -1,30 +1,314 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Finding items, and one item with all that is known of it: BOM, totals, revisions, where-used."""
+"""Finding items, and one item with all that is known of it: BOM, totals, revisions, where-used.
+
+A BOM over all levels as a table: which rows of the tree are open, and its flat list.
+
+Only what is open is walked, so that a tree with a million occurrences costs what is looked at of it.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import secrets
-from dataclasses import replace
-from typing import Annotated, Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from functools import cache, cached_property
+from itertools import accumulate, islice
+from typing import Annotated, Any, NamedTuple
 
 from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
 from silo.bom.errors import ConflictError
+from silo.bom.numbers import as_decimal
 from silo_server.db.engine import Tx
-from silo_server.errors import TooLargeError
+from silo_server.routes.documents import told_of
 from silo_server.schema.catalog import ITEM_TYPES, find_schema
-from silo_server.services import revisions
-from silo_server.services.bom import rollup, tree
-from silo_server.services.bom.last_sync import in_sentences, last_sync
-from silo_server.services.bom.last_sync import marks as marks_of
+from silo_server.services import documents, revisions
+from silo_server.services.bom import tree
+from silo_server.services.bom.lines import lines_of_many
+from silo_server.services.bom.merge import in_sentences, last_sync
+from silo_server.services.bom.summary import (
+    MOST_NAMED,
+    Summary,
+    Worth,
+    below,
+    last_look,
+    own_worth,
+    summaries,
+    summary_of,
+)
+from silo_server.services.bom.tree import Part
 from silo_server.services.items import ItemQuery, get_item, list_items
-from silo_server.values import Item
+from silo_server.settings import TooLargeError
+from silo_server.values import Item, Line, names_of
+from silo_server.web.accounts import Reader
 from silo_server.web.item_edit_page import shown_properties
-from silo_server.web.login_page import Reader
-from silo_server.web.render import page, segment
-from silo_server.web.structure import Look, Structure, flat_page, level_counts, tree_page, usual_depth
-from silo_server.web.tables import PAGE_ROWS, Address, Page
+from silo_server.web.render import PAGE_ROWS, Address, Page, arranged, page, page_of, segment
+
+# More open rows than this nobody pages through; a filter or fewer levels bring them down.
+MOST_OPEN = 20_000
+# A filter and the flat list read all lines of a product, up to so many.
+MOST_READ = 20_000
+MOST_PIECES = 1_000_000
+
+
+@dataclass(frozen=True)
+class Look:
+    """The part of the address that says how a BOM over all levels is shown.
+
+    depth
+        levels that are open (0: as many as fit on a page); ``flip`` names the branches that are not so.
+    pieces
+        for how many of the assembly the quantities are.
+    """
+
+    view: Annotated[str, Query(max_length=10)] = "tree"
+    q: Annotated[str, Query(max_length=200)] = ""
+    type: Annotated[str, Query(max_length=20)] = ""
+    sort: Annotated[str, Query(max_length=20)] = ""
+    page: Annotated[int, Query(ge=1, le=10**9)] = 1
+    depth: Annotated[int, Query(ge=0, le=tree.MAX_DEPTH)] = 0
+    flip: Annotated[str, Query(max_length=20_000)] = ""
+    pieces: Annotated[int, Query(ge=1, le=MOST_PIECES)] = 1
+
+    @property
+    def is_flat(self) -> bool:
+        return self.view == "flat"
+
+    @property
+    def is_filtered(self) -> bool:
+        return bool(self.q or self.type)
+
+    @property
+    def flips(self) -> list[str]:
+        """The branches that are not as ``depth`` says."""
+        return list(dict.fromkeys(filter(None, self.flip.split(","))))
+
+    def address(self, path: str) -> Address:
+        """The page with this view."""
+        usual = {"view": "tree", "page": 1, "depth": 0, "pieces": 1}
+        names = ("view", "q", "type", "sort", "page", "depth", "flip", "pieces")
+        values = {name: getattr(self, name) for name in names}
+        return Address(path, {n: str(v) for n, v in values.items() if v not in ("", usual.get(n))})
+
+    def flipped(self, key: str) -> str:
+        """``flip`` where this branch is the other way round."""
+        keys = self.flips
+        return ",".join(one for one in keys if one != key) if key in keys else ",".join([*keys, key])
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """A row of the tree. ``total``: of all pieces; ``key`` names the branch, "" if nothing is below.
+
+    marks
+        what is open about the line, or, below a closed branch, in it.
+    """
+
+    line: Line
+    part: Part
+    depth: int
+    total: tree.Exact
+    worth: Worth
+    marks: Sequence[str] = ()
+    key: str = ""
+    is_open: bool = False
+
+    @property
+    def mass(self) -> Decimal | None:
+        """Of all pieces [kg]."""
+        return None if self.worth.mass is None else self.worth.mass * as_decimal(self.total)
+
+    @property
+    def costs(self) -> Mapping[str, Decimal]:
+        """Of all pieces, per currency."""
+        return {currency: cost * as_decimal(self.total) for currency, cost in self.worth.costs.items()}
+
+
+class Row(NamedTuple):
+    """An open row of the tree before it is dressed: ``key`` names the branch, if it can be one."""
+
+    line: Line
+    depth: int
+    total: tree.Exact
+    key: str
+    is_open: bool
+
+
+class Structure:
+    """The lines that a view of a product needs, with all that its rows show; the rest is never read.
+
+    graph
+        the levels that are open, or the whole for a filter or the flat list.
+    """
+
+    def __init__(self, tx: Tx, summary: Summary, graph: tree.Graph, page_rows: int = PAGE_ROWS) -> None:
+        self._tx = tx
+        self.summary = summary
+        self.graph = graph
+        self.page_rows = page_rows
+        self._lines = dict(graph.lines)
+        self._worths: dict[int, Worth] = {}
+
+    @cached_property
+    def parts(self) -> Mapping[int, Part]:
+        """What a filter looks in, for all of the graph."""
+        return tree.parts_of(self._tx, self.graph)
+
+    def sought(self, look: Look) -> Callable[[Line], bool]:
+        """Return the test of lines that the view's filter is."""
+        return tree.sought(look.q, look.type, self.parts)
+
+    def lines_of(self, item_id: int) -> Sequence[Line]:
+        """The lines of a BOM; a branch below the open levels is read when it is asked for."""
+        if item_id not in self._lines:
+            self._lines[item_id] = lines_of_many(self._tx, [item_id]).get(item_id, [])
+        return self._lines[item_id]
+
+    def worth(self, line: Line) -> Worth:
+        """What the child of a line is worth, to sort by it."""
+        if line.child_id not in self._worths:
+            children = {one.child_id for one in self.lines_of(line.parent_id)}
+            found = summaries(self._tx, children)
+            self._worths |= {child: found[child].as_part for child in children}
+        return self._worths[line.child_id]
+
+    def dressed(self, rows: Sequence[tuple[Row, Sequence[str]]]) -> list[Branch]:
+        """Return the rows with everything that they show; beside each stand the doubts of its line."""
+        children = {row.line.child_id for row, _ in rows}
+        parts = tree.some_parts(self._tx, children)
+        found = summaries(self._tx, children)
+
+        def dress(row: Row, doubts: Sequence[str]) -> Branch:
+            child = row.line.child_id
+            known = found[child]
+            return Branch(
+                row.line,
+                parts[child],
+                row.depth,
+                row.total,
+                known.as_part,
+                [*known.inside(child, is_open=row.is_open), *doubts],
+                row.key if row.is_open or known.levels else "",
+                row.is_open,
+            )
+
+        return [dress(*row) for row in rows]
+
+
+def usual_depth(counts: Sequence[int]) -> int:
+    """As many levels as fit on a page, at least one."""
+    return max(1, sum(rows <= PAGE_ROWS for rows in accumulate(counts)))
+
+
+def tree_page(shown: Structure, look: Look, total: int) -> tuple[Page[Branch], Sequence[Branch]]:
+    """A page of the open rows, and the branches above its first one (none on the first page).
+
+    TooLargeError where more is open than anybody can page through.
+    """
+    rows = list(islice(_walk(shown, look), MOST_OPEN + 1))
+    if len(rows) > MOST_OPEN:
+        raise TooLargeError(
+            f"more than {MOST_OPEN} of the {total} rows of this tree are open; show fewer levels or take an "
+            "export"
+        )
+    found = page_of(rows, total if look.is_filtered else len(rows), look.page, shown.page_rows)
+    above: list[Row] = []
+    for row in reversed(rows[: found.start]):
+        if row.depth < (above[-1] if above else rows[found.start]).depth:
+            above.append(row)
+    here = shown.dressed([(row, shown.graph.doubts(row.line)) for row in found.rows])
+    page = Page(here, found.total, found.found, found.number, found.size)
+    return page, shown.dressed([(row, ()) for row in above[::-1]])
+
+
+def _walk(shown: Structure, look: Look) -> Iterator[Row]:
+    graph, filtered, flipped = shown.graph, look.is_filtered, set(look.flips)
+    hit = tree.leading_to(graph, shown.sought(look)) if filtered else lambda _line: True
+
+    @cache
+    def lines_of(item_id: int) -> Sequence[Line]:
+        return arranged([line for line in shown.lines_of(item_id) if hit(line)], look.sort, _tree_keys(shown))
+
+    one: tree.Exact = look.pieces
+    stack = [(1, one, "", iter(lines_of(graph.root.id)))]
+    while stack:
+        level, factor, above, lines = stack[-1]
+        for line in lines:
+            total = tree.multiplied(factor, line)
+            key = _key(above, line) if line.state.rel_type == "component" and level < tree.MAX_DEPTH else ""
+            is_open = bool(key) and (filtered or (level < look.depth) != (key in flipped))
+            inner = lines_of(line.child_id) if is_open else ()
+            yield Row(line, level, total, key, bool(inner))
+            if inner:
+                stack.append((level + 1, total, key, iter(inner)))
+                break
+        else:
+            stack.pop()
+
+
+def _tree_keys(shown: Structure) -> Mapping[str, Callable[[Line], Any]]:
+    def times(line: Line, value: Decimal | None) -> Decimal | None:
+        return None if value is None else value * as_decimal(line.state.quantity)
+
+    return {
+        "number": lambda line: line.child_part_number.casefold(),
+        "name": lambda line: line.child_name.casefold(),
+        "quantity": lambda line: line.state.quantity,
+        "total": lambda line: line.state.quantity,
+        "unit_mass": lambda line: shown.worth(line).mass,
+        "mass": lambda line: times(line, shown.worth(line).mass),
+        "unit_cost": lambda line: _cost_key(shown.worth(line).costs),
+        "cost": lambda line: times(line, _cost_key(shown.worth(line).costs)),
+    }
+
+
+def _cost_key(costs: Mapping[str, Decimal]) -> Decimal | None:
+    # Currencies cannot be compared; where there are several, the amounts are.
+    return max(costs.values(), default=None)
+
+
+def _key(above: str, line: Line) -> str:
+    return hashlib.blake2b(f"{above} {line.id}".encode(), digest_size=4).hexdigest()
+
+
+def flat_page(shown: Structure, look: Look) -> Page[Branch]:
+    """A page of the leaf parts, each with its total over the whole tree."""
+    fitting, rows = shown.sought(look), tree.flatten(shown.graph)
+    found = arranged([row for row in rows if fitting(row.line)], look.sort, _flat_keys(shown))
+    table = page_of(found, len(rows), look.page, shown.page_rows)
+    here = shown.dressed(
+        [
+            (Row(row.line, 1, row.total * look.pieces, "", False), row.doubts(look.pieces))
+            for row in table.rows
+        ]
+    )
+    return Page(here, table.total, table.found, table.number, table.size)
+
+
+def _flat_keys(shown: Structure) -> Mapping[str, Callable[[tree.FlatRow], Any]]:
+    def worth(row: tree.FlatRow) -> Worth:
+        return own_worth(shown.parts[row.line.child_id].properties)
+
+    def times(row: tree.FlatRow, value: Decimal | None) -> Decimal | None:
+        return None if value is None else value * as_decimal(row.total)
+
+    return {
+        "number": lambda row: row.line.child_part_number.casefold(),
+        "name": lambda row: row.line.child_name.casefold(),
+        "type": lambda row: row.line.child_item_type,
+        "total": lambda row: row.total,
+        "unit_mass": lambda row: worth(row).mass,
+        "mass": lambda row: times(row, worth(row).mass),
+        "unit_cost": lambda row: _cost_key(worth(row).costs),
+        "cost": lambda row: times(row, _cost_key(worth(row).costs)),
+        "supplier": lambda row: str(
+            shown.parts[row.line.child_id].properties.get("supplier") or ""
+        ).casefold(),
+    }
+
 
 router = APIRouter(include_in_schema=False)
 
@@ -53,15 +337,20 @@ def item_page(
         shown = structure_of(tx, item, look)
         history, revision_count = revisions.list_revisions(tx, item, before=revisions_before)
         used, uses = tree.where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
+        files = documents.shown(tx, documents.holding(tx, item))
+        looked, now = last_look(tx, call.actor.own_id, item), tx.stamp
+    call.server.db.looks[call.actor.own_id, item.id] = now
     return page(
         call,
         "item.html",
+        looked=looked,
         item=item,
         look=look,
         at=look.address(f"/items/{segment(item.part_number)}"),
         types=ITEM_TYPES,
         revisions=history,
         revision_count=revision_count,
+        files=files,
         used=used,
         uses=uses,
         used_from=used_from,
@@ -70,6 +359,15 @@ def item_page(
         upload_key=secrets.token_urlsafe(16),  # a form that is sent twice makes one revision
         **shown,
     )
+
+
+@router.get("/documents/{uuid}")
+def document_page(call: Reader, uuid: str) -> Response:
+    """A file: which items are in it, what it links to, what uses it, and its revisions."""
+    with call.read() as tx:
+        told = told_of(tx, uuid)
+        history, _ = revisions.list_revisions(tx, documents.get(tx, told["id"]), PAGE_SIZE)
+    return page(call, "document.html", file=told, revisions=history)
 
 
 @router.get("/items/{part_number}/print")
@@ -86,37 +384,72 @@ def print_page(call: Reader, part_number: str, look: Asked) -> Response:
 
 def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[str, Any]:
     """What the templates of a BOM over all levels show: table, totals, what the last sync left out."""
+    last = last_sync(tx, item)
+    values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.gaps), "problem": ""}
+    values |= dict.fromkeys(("table", "totals", "of_all")) | dict.fromkeys(("levels", "depth"), 0)
+    values |= {"above": ()} | dict.fromkeys(("has_mass", "has_cost", "has_supplier"), False)
     try:
-        graph, problem = tree.load_graph(tx, item), ""
-    except TooLargeError as error:
-        graph, problem = tree.load_graph(tx, item, 1), str(error)
-    last, marks = last_sync(tx, item), marks_of(tx, graph)
-    values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.gaps), "marks": marks}
-    values |= {
-        "problem": problem,
-        "table": None,
-        "above": (),
-        "levels": 0,
-        "depth": 0,
-        "cost": None,
-        "mass": None,
-    }
-    if problem or item.id not in graph.lines:
-        return values
-    counts = level_counts(graph)
-    depth = look.depth or (len(counts) if size > PAGE_ROWS else usual_depth(counts))
-    look = replace(look, depth=depth)
-    values |= {"levels": len(counts), "occurrences": sum(counts), "depth": depth}
-    try:
-        parts = rollup.parts_of(tx, graph)
-        values |= {"cost": rollup.roll_up_cost(graph, parts), "mass": rollup.roll_up_mass(graph, parts)}
-        shown = Structure(graph, parts, rollup.worths(graph, parts), marks, size)
+        summary = summary_of(tx, item)
+        values |= {"of_all": summary, "totals": Totals.of(summary)}
+        counts = summary.levels
+        if not counts:
+            return values
+        depth = look.depth or (len(counts) if size > PAGE_ROWS else usual_depth(counts))
+        look = replace(look, depth=depth)
+        values |= {"levels": len(counts), "depth": depth}
+        values |= {"has_mass": summary.worth.mass is not None, "has_cost": bool(summary.worth.costs)}
+        whole = look.is_flat or look.is_filtered
+        if whole and summary.lines > MOST_READ:
+            raise TooLargeError(
+                f"this product has {summary.lines} lines over all levels, and a page finds in, or adds up, "
+                f"at most {MOST_READ}; look at one of its sub-assemblies, or take an export"
+            )
+        shown = Structure(tx, summary, tree.load_graph(tx, item, None if whole else depth), size)
+        if look.is_filtered:
+            narrow = tree.narrowed(shown.graph, shown.sought(look), leaves=look.is_flat)
+            values |= {"totals": Totals.narrow(tx, narrow, shown.parts)}
         if look.is_flat:
-            return values | {"table": flat_page(shown, look)}
+            flat = flat_page(shown, look)
+            supplied = any(row.part.properties.get("supplier") for row in flat.rows)
+            return values | {"table": flat, "has_supplier": supplied}
         table, above = tree_page(shown, look, sum(counts))
         return values | {"table": table, "above": above}
     except (ConflictError, TooLargeError) as error:
         return {**values, "problem": str(error)}
+
+
+@dataclass(frozen=True, slots=True)
+class Totals:
+    """What the shown parts weigh [kg] and cost; how many of how many state none, and the first of them."""
+
+    mass: Decimal | float | None
+    costs: Mapping[str, Decimal | float]
+    parts: int
+    no_mass: int
+    no_cost: int
+    mass_missing: Sequence[str]
+    cost_missing: Sequence[str]
+
+    @classmethod
+    def of(cls, summary: Summary) -> Totals:
+        """Return those of a whole product."""
+        same = {name: getattr(summary, name) for name in names_of(cls) if name not in ("mass", "costs")}
+        return cls(summary.worth.mass, summary.worth.costs, **same)
+
+    @classmethod
+    def narrow(cls, tx: Tx, graph: tree.Graph, parts: Mapping[int, Part]) -> Totals:
+        """Return those of what a filter has found."""
+        cost, mass = tree.roll_up_cost(graph, parts), below(tx, graph, parts)
+        weighed = tree.roll_up_mass(graph, parts, mass.standing_alone)
+        return cls(
+            weighed.total or None,
+            cost.totals,
+            len(cost.rows),
+            len(weighed.missing),
+            len(cost.missing),
+            sorted(weighed.missing)[:MOST_NAMED],
+            sorted(cost.missing)[:MOST_NAMED],
+        )
 
 
 PAGE_SIZE = 100

@@ -14,18 +14,18 @@ from typing import Any
 
 from starlette.datastructures import FormData
 
-from silo.bom.diff import same_quantity
-from silo.bom.errors import RejectedError
+from silo.bom.compare import same_quantity
+from silo.bom.errors import RejectedError, counted
 from silo.bom.headers import designators
-from silo.bom.numbers import read_quantity
+from silo.bom.numbers import counts_pieces, read_quantity
 from silo_server.db.engine import Tx
 from silo_server.services.bom import history
-from silo_server.services.bom.changes import ChangeKind
 from silo_server.services.bom.history import Change, ChangedLine
+from silo_server.services.bom.lines import ChangeKind
 from silo_server.services.bom.review import Action, Decision, Review, told_quantities
 from silo_server.values import Item, Line, LineState
 from silo_server.web.forms import Edit, amount, compared, same_text, text, texts, whole
-from silo_server.web.render import isolate, plural, quantity
+from silo_server.web.render import isolate, quantity
 
 # What a person fills in on a line, with its label.
 FIELDS = {
@@ -219,13 +219,17 @@ def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
 
 def _cad_words(line: Line, told: Mapping[int, float], by_hand: Change | None, merge: Change | None) -> str:
     """What CAD says of a line whose quantity a person changed: the same as the conflict above it says."""
-    unit = line.state.unit
     if line.child_id in told:
         said = told[line.child_id]
-        return f"CAD says {quantity(said, unit)}" if said else "CAD has it no more"
+        return f"CAD says {of_cad(said, line.state.unit)}" if said else "CAD has it no more"
     if merge is not None and by_hand is not None and merge.id > by_hand.id:
         return "CAD says the same"
-    return f"CAD said {quantity(line.state.cad_quantity, unit)} before"
+    return f"CAD said {of_cad(line.state.cad_quantity, line.state.unit)} before"
+
+
+def of_cad(said: float | None, unit: str | None) -> str:
+    """Return a quantity of CAD's beside a line with this unit: ``6``, or ``6 pieces`` beside ``0.5 m``."""
+    return quantity(said, unit if counts_pieces(unit) else "piece" if said == 1 else "pieces")
 
 
 def _became(line: ChangedLine) -> str:
@@ -299,7 +303,7 @@ def sentences(
     """The lines of a change, which has ``count`` of them; beyond ``most`` only how many more."""
     told = [sentence(line) for line in lines[:most]]
     rest = (len(lines) if count is None else count) - most
-    return [*told, ("", f"and {plural(rest, 'more line', 'more lines')}")] if rest > 0 else told
+    return [*told, ("", f"and {counted(rest, 'more line', 'more lines')}")] if rest > 0 else told
 
 
 def _shown(value: object) -> str:

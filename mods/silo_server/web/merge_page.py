@@ -14,25 +14,36 @@ from fastapi import APIRouter, Query
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.bom.errors import ConflictError, NotFoundError, RejectedError, SiloError
+from silo.bom.errors import ConflictError, CycleError, NotFoundError, RejectedError, SiloError, counted
 from silo.bom.numbers import whole_number
+from silo_server import events
 from silo_server.db.engine import Tx
-from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.routes.context import Call
-from silo_server.services import events
-from silo_server.services.bom import edits, history
+from silo_server.services.bom import history, review
 from silo_server.services.bom import review as service
-from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
+from silo_server.services.bom.merge import in_sentences, last_sync
 from silo_server.services.bom.review import Decision
+from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
+from silo_server.services.search import fits
+from silo_server.settings import DuplicateError, LinesChangedError, TooLargeError
 from silo_server.values import Line, LineState
 from silo_server.web import line_form
+from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
 from silo_server.web.line_form import FIELDS, LineForm, by_whom, sentences
-from silo_server.web.login_page import Reader, Writer
-from silo_server.web.render import isolate, page, plural, segment, sentence
-from silo_server.web.tables import Address, Page, arranged, fits, page_of
+from silo_server.web.render import (
+    NOTICE,
+    Address,
+    Page,
+    arranged,
+    isolate,
+    page,
+    page_of,
+    segment,
+    sentence,
+)
 
 router = APIRouter(include_in_schema=False)
 
@@ -97,7 +108,7 @@ def merge_page(call: Reader, part_number: str, edit: Annotated[str, Query(max_le
 def decide(call: Writer, part_number: str, form: Form) -> Response:
     """Carry a decision out, for one line or for all chosen ones, if they are as the person saw them."""
     chosen = [value.partition(" ")[0] for value in texts(form, "chosen")]
-    reasons = {chosen[0] if chosen and "bulk" not in form else "": str(form.get("reason", ""))}
+    reasons = {chosen[0] if chosen and "bulk" not in form else "": text(form, "reason")}
     asked = Asked(chosen=chosen, reasons=reasons)
 
     def work(tx: Tx) -> tuple[str, int]:
@@ -111,7 +122,7 @@ def decide(call: Writer, part_number: str, form: Form) -> Response:
         except LinesChangedError as error:
             story = line_form.meanwhile(tx, parent, error.line_ids, whole(form, "at") or 0)
             gone = [names.get(one, "a line that is gone") for one in error.line_ids]
-            count = plural(len(gone), "line was", "lines were")
+            count = counted(len(gone), "line was", "lines were")
             problem = f"Nothing was done: {count} changed while you were deciding. Look again, then decide."
             told = [f"{names.get(one, 'A line')}: {said}" for one in story for said in story[one]] or gone
             left = [one for one in chosen if one not in error.line_ids]
@@ -146,7 +157,7 @@ def add_line(call: Writer, part_number: str, form: Form) -> Response:
             raise RejectedError("part number: wanted the number of an item, got nothing")
         new = LineState(**{"quantity": 1.0, "source": "manual", **line_form.values_of(sent.typed)})
         try:
-            added = edits.add_line(tx, part_number, child, new, why=sent.why or None)
+            added = review.add_line(tx, part_number, child, new, why=sent.why or None)
         except DuplicateError as error:
             parent = get_item(tx, part_number)
             line = component_of(lines_of(tx, parent), child, parent)
@@ -174,7 +185,7 @@ def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
             )
             raise Refused(replace(asked, problem=problem, story=told, clashes=edit.clashes), 412)
         why = sent.why or None
-        edited = edits.change_line(tx, part_number, LineId(line.id), line_form.values_of(edit.mine), why=why)
+        edited = review.change_line(tx, part_number, LineId(line.id), line_form.values_of(edit.mine), why=why)
         also = f" Meanwhile: {'; '.join(told)}." if edit.theirs and told else ""
         if not edited.change_id or edited.line is None:
             return f"Nothing was different, so nothing was changed.{also}", 0
@@ -190,7 +201,7 @@ def remove_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
     def remove(tx: Tx, line: Line, sent: LineForm, asked: Asked, told: list[str]) -> tuple[str, int]:
         seen, why = text(form, "mark") or None, sent.why or None
         try:
-            edited = edits.remove_line(tx, part_number, LineId(line.id), seen=seen, why=why)
+            edited = review.remove_line(tx, part_number, LineId(line.id), seen=seen, why=why)
         except LinesChangedError:
             problem = f"Nothing was removed: {line.child_part_number} was changed by somebody else meanwhile."
             raise Refused(replace(asked, problem=problem, story=told), 412) from None
@@ -230,8 +241,9 @@ def _do_line(
 
 
 def view_of(query: str) -> str:
-    """The query of the page, without the line that is being edited: what the page goes back to."""
-    return urlencode([(name, value) for name, value in parse_qsl(query[:1000]) if name != "edit"])
+    """Return the query that the page goes back to: without the line that is being edited, and the notice."""
+    kept = [pair for pair in parse_qsl(query[:1000]) if pair[0] not in ("edit", NOTICE)]
+    return urlencode(kept)
 
 
 def _do(
@@ -254,7 +266,7 @@ def _do(
         readings = error.readings if isinstance(error, AmbiguousError) else ()
         shown = replace(given, problem=_sentence(error), readings=readings)
         return _show(call, part_number, shown, error.status_hint)
-    return back(bom_path(part_number) + (f"?{view}" if view else ""), notice, undo=change_id)
+    return back(bom_path(part_number) + (f"?{view}" if view else ""), notice, undo=[change_id])
 
 
 def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Response:
@@ -267,6 +279,10 @@ def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Resp
         merged = history.get_change(tx, item, merge.id)[1] if merge else []
         recent = history.list_changes(tx, item, LATER_CHANGES)
         seen = events.head(tx)
+        try:
+            below = summary_of(tx, item).told(item.id)
+        except (CycleError, TooLargeError) as error:
+            below, asked = [], replace(asked, problem=asked.problem or _sentence(error))
         by_hand, cad_words = line_form.disputed(tx, item, lines, found)
     conflicts = {conflict.line.id: conflict for conflict in found.conflicts}
     editing = _editing(lines, asked, item)
@@ -298,6 +314,8 @@ def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Resp
         at=recent[0].id if recent else 0,
         by_hand=by_hand,
         cad_words=cad_words,
+        below=below,
+        of_cad=line_form.of_cad,
         by_sync=by_whom(merge) if merge else "",
         last=last,
         gaps=in_sentences(last.gaps),
@@ -358,7 +376,7 @@ def _editing(lines: list[Line], asked: Asked, item: Any) -> Line | None:
 
 def _done(decisions: list[Decision]) -> str:
     who = isolate(decisions[0].child_part_number)
-    lines = who if len(decisions) == 1 else plural(len(decisions), "line", "lines")
+    lines = who if len(decisions) == 1 else counted(len(decisions), "line", "lines")
     return f"{lines} {line_form.DONE[decisions[0].action]}."
 
 

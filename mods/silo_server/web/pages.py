@@ -19,33 +19,29 @@ from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
-from silo_server.middleware import SECURITY_HEADERS
+from silo_server.http import SECURITY_HEADERS
 from silo_server.routes.context import SAFE_METHODS, find_actor
 from silo_server.values import Actor
 from silo_server.web import (
     accounts,
     activity_page,
-    history_page,
     import_page,
     item_edit_page,
     item_page,
-    login_page,
     merge_page,
     waiting_page,
 )
-from silo_server.web.login_page import LoginNeededError, OldFormError, send_again, to_login
+from silo_server.web.accounts import LoginNeededError, OldFormError, send_again, to_login
 from silo_server.web.render import page_for, sentence
 
 ROUTERS = (
-    login_page.router,
+    accounts.router,
     item_edit_page.router,  # before item_page: /items/new is no part number
     item_page.router,
     merge_page.router,
-    history_page.router,
-    import_page.router,
     activity_page.router,
+    import_page.router,
     waiting_page.router,
-    accounts.router,
 )
 
 

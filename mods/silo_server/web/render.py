@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Templates, and what every page shows: who is logged in, the form secret, a notice of what was just done."""
+"""Templates, and what every page shows: who is logged in, the form secret, a notice of what was just done.
+
+Tables that sort, filter and page. What is shown is in the address: a view can be sent, kept and reloaded.
+
+All of it is done here, on the server, so that a page works without a script; with one (``view.js``) the same
+address is fetched and only the table is replaced.
+"""
 
 from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from decimal import ROUND_HALF_EVEN, Context, Decimal
-from typing import Any
-from urllib.parse import quote, unquote
+from typing import Any, Generic, Protocol, TypeVar
+from urllib.parse import quote, unquote, urlencode
 
 from fastapi import Request
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -15,14 +23,16 @@ from markupsafe import Markup, escape
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import HTMLResponse, Response
 
+from silo.bom.errors import counted
 from silo.bom.numbers import as_decimal, whole_number
-from silo_server.clock import wire
 from silo_server.db.engine import mode_of
 from silo_server.routes.context import Call, masked, server_of
 from silo_server.services.bom.review import waiting_count
+from silo_server.settings import wire
 from silo_server.values import Actor, Role
 
-NOTICE_COOKIE = "silo_notice"
+# The key of a notice in the address of the page that shows it, and the cookies (one for each key) it is in.
+NOTICE, NOTICE_COOKIE = "said", "silo_notice"
 
 # For controls that change an item or a BOM: they are shown, switched off, with the reason.
 SWITCHED_OFF = Markup(' disabled aria-describedby="closed" title="Not now: the server takes no changes"')
@@ -43,18 +53,15 @@ def when(stamp: str | None) -> Markup | str:
     return Markup('<time datetime="{}">{}</time>').format(wire(stamp), stamp[:16].replace("T", " "))
 
 
-def plural(count: int, one: str, many: str) -> str:
-    """``1 item is``, ``3 items are``."""
-    return f"{count} {one if count == 1 else many}"
-
-
 def size(count: int | None) -> str:
-    """``812 bytes``, ``14 kB``, ``3.2 MB``."""
+    """``812 bytes``, ``14 kB``, ``3.2 MB``, ``68.7 GB``."""
     if count is None:
         return ""
     if count < 1000:
         return f"{count} bytes"
-    return f"{count / 1e3:.0f} kB" if count < 1e6 else f"{count / 1e6:.1f} MB"
+    if count < 1e6:
+        return f"{count / 1e3:.0f} kB"
+    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
 
 
 # The characters that turn the direction of the text around them, up to where they are closed.
@@ -151,7 +158,7 @@ def _environment() -> Environment:
     environment.filters.update(
         quantity=quantity, when=when, segment=segment, size=size, bdi=bdi, mass=mass, money=money
     )
-    environment.globals.update(plural=plural)
+    environment.globals.update(plural=counted)
     return environment
 
 
@@ -184,7 +191,8 @@ def page_for(
     Looks into the database for the server's mode, so not to be called on the event loop.
     """
     closed, waiting = _state(request)
-    undo, _, notice = unquote(request.cookies.get(NOTICE_COOKIE, ""))[:800].partition(" ")
+    cookie = f"{NOTICE_COOKIE}_{request.query_params.get(NOTICE, '')}"
+    undo, _, notice = unquote(request.cookies.get(cookie, "")).partition(" ")
     html = _TEMPLATES.get_template(template).render(
         actor=actor,
         may_edit=actor is not None and actor.role.covers(Role.EDITOR),
@@ -195,12 +203,138 @@ def page_for(
         csrf=masked(actor.csrf_token) if actor is not None and actor.csrf_token else "",
         here=request.url.path,
         notice=notice,
-        undo=whole_number(undo) or 0,
+        undo=[change for one in undo.split(",") if (change := whole_number(one, 18))],
         **values,
     )
     # The one place that puts links below the sub-path. What people typed has no bare quote, so is no link.
     root = server_of(request).settings.root_path
     response = HTMLResponse(_LINK.sub(rf"\g<1>{root}/", html) if root else html, status)
     if notice:
-        response.delete_cookie(NOTICE_COOKIE)
+        response.delete_cookie(cookie)
     return response
+
+
+T = TypeVar("T")
+
+# A browser shows a table of so many rows at once.
+PAGE_ROWS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """A page with its view. ``params`` are the parts of the view that are not as usual."""
+
+    path: str
+    params: Mapping[str, str] = field(default_factory=dict)
+
+    def url(self, **changes: object) -> str:
+        """The address with these changes; None, "" and False leave a part out."""
+        changed = {**self.params, **{name: "" if value is None else value for name, value in changes.items()}}
+        kept = {name: str(value) for name, value in changed.items() if value not in ("", False)}
+        return f"{self.path}?{urlencode(kept)}" if kept else self.path
+
+    def query(self, **changes: object) -> str:
+        """The view alone, with its question mark; "" where all is as usual."""
+        return self.url(**changes)[len(self.path) :]
+
+    def but(self, *names: str) -> Mapping[str, str]:
+        """The view without these parts: what a form must carry on beside its own fields."""
+        return {name: value for name, value in self.params.items() if name not in names and value}
+
+
+@dataclass(frozen=True, slots=True)
+class Page(Generic[T]):
+    """One page of a table's rows. ``total``: rows before the filter, ``found``: behind it."""
+
+    rows: Sequence[T]
+    total: int
+    found: int
+    number: int = 1
+    size: int = PAGE_ROWS
+
+    @property
+    def last(self) -> int:
+        """The number of the last page."""
+        return max(1, -(-self.found // self.size))
+
+    @property
+    def start(self) -> int:
+        """How many rows stand before this page."""
+        return (self.number - 1) * self.size
+
+    @property
+    def words(self) -> str:
+        """``12 of 340 lines`` in numbers only: ``12 of 340``, ``1 to 100 of 340``."""
+        if self.found > self.size:
+            shown = f"{self.start + 1} to {self.start + len(self.rows)} of {self.found}"
+            return shown if self.found == self.total else f"{shown} found among {self.total}"
+        return f"{self.found}" if self.found == self.total else f"{self.found} of {self.total}"
+
+
+def page_of(rows: Sequence[T], total: int, number: int, size: int = PAGE_ROWS) -> Page[T]:
+    """The page with this number; the last one where there are fewer."""
+    last = max(1, -(-len(rows) // size))
+    number = min(max(number, 1), last)
+    return Page(rows[(number - 1) * size : number * size], total, len(rows), number, size)
+
+
+def arranged(rows: Sequence[T], sort: str, keys: Mapping[str, Callable[[T], Any]]) -> Sequence[T]:
+    """The rows by the column that ``sort`` names (``mass``, ``-mass`` for the largest first).
+
+    Equal rows stay in their order; rows without a value come last either way. Numbers in texts count as such:
+    M3×6 comes before M3×10.
+    """
+    key = keys.get(sort.removeprefix("-"))
+    if key is None:
+        return rows
+    known = [(value, row) for row in rows if (value := key(row)) not in (None, "")]
+    unknown = [row for row in rows if key(row) in (None, "")]
+    known.sort(key=lambda pair: _natural(pair[0]), reverse=sort.startswith("-"))
+    return [*(row for _, row in known), *unknown]
+
+
+def _natural(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    parts = re.split("([0-9]+)", value)  # at odd places the digits, of any length
+    parts[1::2] = [f"{len(digits):09}{digits}" for part in parts[1::2] for digits in [part.lstrip("0")]]
+    return parts
+
+
+class Numbered(Protocol):
+    """A row with the id that its list is paged by."""
+
+    @property
+    def id(self) -> int: ...
+
+
+N = TypeVar("N", bound=Numbered)
+
+
+@dataclass(frozen=True, slots=True)
+class Part(Generic[N]):
+    """A part of a list that is newest first; the ids to page on from, None at its ends."""
+
+    rows: Sequence[N]
+    older: int | None
+    newer: int | None
+
+
+def part_of(
+    read: Callable[[int, int | None, int | None], Sequence[N]],
+    size: int,
+    before: int | None,
+    after: int | None,
+) -> Part[N]:
+    """The part before an id, or the nearest one after an id; the newest where neither is given.
+
+    read
+        (limit, before, after) → rows, newest first.
+    """
+    if after is not None and (found := read(size + 1, None, after)):
+        rows = found[-size:]
+        return Part(rows, rows[-1].id, rows[0].id if len(found) > size else None)
+    found = read(size + 1, before if after is None else None, None)
+    rows = found[:size]
+    newer = rows[0].id if before is not None and after is None and rows else None
+    return Part(rows, rows[-1].id if len(found) > size else None, newer)

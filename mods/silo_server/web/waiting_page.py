@@ -4,20 +4,26 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
+from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.bom.errors import SiloError, VersionConflictError
+from silo.bom.errors import SiloError, VersionConflictError, counted
+from silo.bom.numbers import whole_number
+from silo_server.db.engine import Tx
 from silo_server.routes.context import Call
-from silo_server.services.bom.review import Waiting, decide_all, waiting
+from silo_server.services.bom import history
+from silo_server.services.bom.review import Action, Waiting, decide_all, lines_for, waiting
+from silo_server.services.search import fits
+from silo_server.values import Line
+from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import Form, back, text, texts
 from silo_server.web.line_form import DONE, decision_of
-from silo_server.web.login_page import Reader, Writer
-from silo_server.web.render import isolate, page, plural
-from silo_server.web.tables import Address, arranged, fits, page_of
+from silo_server.web.render import Address, arranged, isolate, page, page_of
 
 router = APIRouter(include_in_schema=False)
 
@@ -57,31 +63,86 @@ def waiting_page(
 
 @router.post("/waiting/decide")
 def decide(call: Writer, form: Form) -> Response:
-    """One decision about all chosen BOMs. Each is a change of its own; what was not done is named."""
+    """One decision about all chosen BOMs. Each is a change of its own; what was not done is named.
+
+    Nothing is done before a person has seen the list of lines that it removes.
+    """
     action, reason = decision_of(form)
-    lines = boms = 0
-    problems: list[str] = []
-    for value in dict.fromkeys(texts(form, "chosen")):
+    chosen = list(dict.fromkeys(texts(form, "chosen")))
+    view = _view_of(form)
+    if not text(form, "sure") and (gone := _gone(call, action, chosen)):
+        reason, at = text(form, "reason"), Address("/waiting", view)
+        return page(call, "sure.html", at=at, action=action, reason=reason, chosen=chosen, gone=gone)
+    lines = 0
+
+    def work(tx: Tx, value: str) -> int | None:
+        nonlocal lines
         part_number, _, seen = value.rpartition(" ")
-        if not part_number:
+        count, change = decide_all(tx, part_number, action, reason, seen)
+        lines += count
+        return change
+
+    changes, problems = _each(call, chosen, lambda value: value.rpartition(" ")[0], work)
+    if lines:
+        said = f"{counted(lines, 'line')} in {counted(len(changes), 'BOM')} {DONE[action]}."
+    else:
+        said = "Nothing of this kind was open in what was chosen, so nothing was changed."
+    if problems:
+        return _show(call, view, said, problems, text(form, "reason"), 409, changes)
+    return back(Address("/waiting", view).url(), said, undo=changes)
+
+
+@router.post("/waiting/undo")
+def undo(call: Writer, form: Form) -> Response:
+    """Take one decision about many BOMs back: a new change in each of them."""
+    made = list(dict.fromkeys(text(form, "changes", 20_000).split(",")))[::-1]
+
+    def work(tx: Tx, change: str) -> int:
+        number = whole_number(change, 18) or 0
+        return history.undo(tx, history.item_changed_by(tx, number), number, None)[0]
+
+    changes, problems = _each(call, made, lambda change: f"change {change}", work)
+    said, view = f"Undone in {counted(len(changes), 'BOM')}.", _view_of(form)
+    if problems:
+        return _show(call, view, said, problems, status=409)
+    return back(Address("/waiting", view).url(), said)
+
+
+def _view_of(form: FormData) -> dict[str, str]:
+    return dict(Address("/waiting", {n: text(form, n, 1024) for n in ("q", "folder", "kind", "sort")}).but())
+
+
+def _gone(call: Call, action: Action, chosen: Sequence[str]) -> dict[str, Sequence[Line]]:
+    """Part number → the lines that ``action`` would remove; what has changed since is left out here."""
+    found: dict[str, Sequence[Line]] = {}
+    with call.read() as tx:
+        for value in chosen:
+            part_number, _, seen = value.rpartition(" ")
+            with suppress(SiloError):
+                if lines := lines_for(tx, part_number, action, seen)[1]:
+                    found[part_number] = lines
+    return found
+
+
+def _each(
+    call: Call, values: Sequence[str], name: Callable[[str], str], work: Callable[[Tx, str], int | None]
+) -> tuple[list[int], list[str]]:
+    """Do ``work`` for each value in a transaction of its own; return the changes, and what went wrong."""
+    changes: list[int] = []
+    problems: list[str] = []
+    for value in values:
+        if not name(value):
             problems.append(f"{isolate(value[:80])}: this is no BOM of the table; load the page again")
             continue
         try:
             with call.write() as tx:
-                count = decide_all(tx, part_number, action, reason, seen)
-            lines, boms = lines + count, boms + bool(count)
+                change = work(tx, value)
+            changes += [change] if change else []
         except VersionConflictError:
-            problems.append(f"{isolate(part_number)}: it was changed meanwhile, so nothing was done there")
+            problems.append(f"{isolate(name(value))}: it was changed meanwhile, so nothing was done there")
         except SiloError as error:
-            problems.append(f"{isolate(part_number)}: {error}")
-    if lines:
-        said = f"{plural(lines, 'line', 'lines')} in {plural(boms, 'BOM', 'BOMs')} {DONE[action]}."
-    else:
-        said = "Nothing of this kind was open in what was chosen, so nothing was changed."
-    view = dict(Address("/waiting", {n: text(form, n, 1024) for n in ("q", "folder", "kind", "sort")}).but())
-    if problems:
-        return _show(call, view, said, problems, text(form, "reason"), 409)
-    return back(Address("/waiting", view).url(), said)
+            problems.append(f"{isolate(name(value))}: {error}")
+    return changes, problems
 
 
 def _show(
@@ -91,6 +152,7 @@ def _show(
     problems: list[str] | None = None,
     reason: str = "",
     status: int = 200,
+    changes: Sequence[int] = (),
 ) -> Response:
     with call.read() as tx:
         rows = waiting(tx)
@@ -116,6 +178,8 @@ def _show(
         kinds=KINDS,
         totals={name: sum(count(row) for row in rows) for name, (_, count) in KINDS.items()},
         said=said,
+        # What was done beside the problems can be undone as well.
+        done=changes,
         reason=reason,
         problems=(problems or [])[:MOST_TOLD],
         more_problems=max(0, len(problems or []) - MOST_TOLD),

@@ -12,8 +12,7 @@ from freecad_cases.truth import Truth
 
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, Place
-from silo.bom.identity import walk_entries
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.model import BomEntry, Extraction, walk_entries
 from silo.bom.report import to_plain
 
 

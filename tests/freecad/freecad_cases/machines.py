@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -108,3 +109,17 @@ def miss(reason: str) -> NoReturn:
     if os.environ.get("SILO_REQUIRE_FREECAD") == "1":
         pytest.fail(reason)
     pytest.skip(reason)
+
+
+def wheel(folder: Path, name: str, version: str, content: str = "") -> None:
+    """Write a package of one module as pip takes it."""
+    info = f"{name}-{version}.dist-info"
+    files = {
+        f"{name}/__init__.py": content,
+        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    }
+    record = "".join(f"{path},,\n" for path in (*files, f"{info}/RECORD"))
+    with zipfile.ZipFile(folder / f"{name}-{version}-py3-none-any.whl", "w") as packed:
+        for path, text in {**files, f"{info}/RECORD": record}.items():
+            packed.writestr(path, text)

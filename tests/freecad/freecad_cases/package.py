@@ -24,7 +24,9 @@ def as_freecad_reads_it() -> dict[str, Any]:
         "icon": found.Icon,
         "freecad_min": found.FreeCADMin,
         "supports": found.supportsCurrentFreeCAD(),
-        "depend": sorted(one["package"] for one in found.Depend),
+        "depend": sorted(one["package"] for one in found.Depend if not one.get("optional")),
+        "optional": sorted(one["package"] for one in found.Depend if one.get("optional")),
+        "people": [one["name"] for one in (*found.Maintainer, *found.Author)],
         "workbench": [workbench.Name, workbench.Classname, workbench.Subdirectory, workbench.Icon],
         "tags": sorted(workbench.Tag),
     }

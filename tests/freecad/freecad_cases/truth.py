@@ -148,7 +148,7 @@ TRUTH: dict[str, Truth] = {
         live_0_20=_is({BOLT: 2}, consolidated=(BOLT,)),
     ),
     "suppressed_by_property": _is({BOLT: 1}, suppressed=("top.FCStd#Off",)),
-    "in_document_link": _is({BOLT: 1}, in_document_link=("top.FCStd#Reference",)),
+    "in_document_link": _is({BOLT: 1}, local_geometry=("top.FCStd#Top",)),
     "unset_link": _is({BOLT: 1}, unset_link=("top.FCStd#Empty",)),
     "loose_links": _is({BOLT: 2}, consolidated=(BOLT,), no_container=("top.FCStd",)),
     "spares_beside_the_model": _is({BOLT: 1}),
@@ -162,7 +162,7 @@ TRUTH: dict[str, Truth] = {
     "link_into_sub_assembly": _is({BOLT: 1}),
     "link_beside_the_assembly": _is({BOLT: 1}, beside_assembly=("top.FCStd#Loose",)),
     "link_to_a_sheet": _is({BOLT: 1}, no_component=("top.FCStd#SheetLink",)),
-    "a2plus_part": _is({BOLT: 1}, foreign_component=("top.FCStd#Imported",)),
+    "a2plus_part": _is({BOLT: 2}),
     "assembly3_container": _is({BOLT: 2}, consolidated=(BOLT,)),
     "two_models_in_one_file": Truth({}, error="holds 2 assemblies: Top (Top), Second (Second)"),
     # --- standard parts, declared parts, repetition -----------------------------------------------------
@@ -209,7 +209,7 @@ TRUTH: dict[str, Truth] = {
     "array_elements_in_a_link_group": _is({BOLT: 3}, beside_assembly=("top.FCStd#Row",)),
     "container_beside_the_assembly": _is({BOLT: 1}, beside_assembly=("top.FCStd#Spare",)),
     "loose_parts_beside_a_part_of_references": _is(
-        {BOLT: 4}, consolidated=(BOLT,), no_container=("top.FCStd",)
+        {BOLT: 4}, consolidated=(BOLT,), no_container=("top.FCStd",), local_geometry=("top.FCStd",)
     ),
     "mirrored_element_shown": _is({BOLT: 3}, mirrored=("top.FCStd#Row",)),
     "excluded_element": _is({BOLT: 3}, excluded=("top.FCStd#Row_i2",)),

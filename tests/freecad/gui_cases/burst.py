@@ -61,8 +61,9 @@ def one_after_the_other(one: Any, top: Any, bolt: Any) -> None:
 
 
 def told() -> list[str]:
-    """The boxes of our commits, oldest first."""
-    return [box for box in reversed(pane()) if box.startswith(("BOM Updated", "Committed"))]
+    """The boxes of our commits, oldest first; the bolt goes along with the first of them."""
+    ours = [box for box in reversed(pane()) if box.startswith(("BOM Updated", "Committed"))]
+    return [box for box in ours if "Bolt" not in box.splitlines()[0]]
 
 
 def page(one: Any) -> None:

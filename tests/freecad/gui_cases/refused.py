@@ -42,9 +42,17 @@ def held(one: Any) -> bool:
     return any(w.state.value == "held" for w in one.session.shown.waiting)
 
 
-def attempts(one: Any) -> int:
-    """How often the commits that wait were tried: a refusal may be back before anybody saw one on its way."""
-    return sum(w.attempts for w in one.session.shown.waiting)
+def tries(one: Any) -> list[int]:
+    """Grows with each run of sending: a refusal may be back before anybody saw one on its way."""
+    told: list[int] = []
+    original = one.session._sent_all
+
+    def sent_all(result: Any) -> None:
+        told.append(1)
+        original(result)
+
+    one.session._sent_all = sent_all
+    return told
 
 
 def refused(one: Any, gearbox: Any, other: Any) -> None:
@@ -61,9 +69,9 @@ def refused(one: Any, gearbox: Any, other: Any) -> None:
     tell(still=waiting(one))
 
     # Tried again too early: it stays. Mended on the server: it goes.
-    tried = attempts(one)
+    tried = tries(one)
     press_soon(one.dock, "Retry")
-    wait(lambda: attempts(one) > tried and held(one) and settled())
+    wait(lambda: tried and held(one) and settled())
     ask("mend")
     press_soon(one.dock, "Retry")
     wait(lambda: settled() and not waiting(one))

@@ -86,7 +86,7 @@ class Window:
         self.freecad.profile(self.home, dependencies=dependencies)
         (self.home / "user.cfg").write_text(_SEED)
         (self.home / "Mod").mkdir()
-        (self.home / "Mod" / "Silo").symlink_to(REPOSITORY, target_is_directory=True)
+        (self.home / "Mod" / "silo-mod").symlink_to(REPOSITORY, target_is_directory=True)
         self.vault.mkdir()
         (self.folder / "asked").mkdir()
 

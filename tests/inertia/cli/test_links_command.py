@@ -11,14 +11,10 @@ Run = Callable[..., Any]
 
 
 def test_the_map_can_be_used_at_once(run: Run, arm: Path) -> None:
-    """From the URDF's names, with pictures; the masses are those without a map."""
-    ran = run(
-        "links", arm / "arm.step", "--urdf", arm / "arm.urdf",
-        "--preview", arm / "map.png", "--preview", arm / "map.glb",
-    )  # fmt: skip
+    """From the URDF's names, with a scene; the masses are those without a map."""
+    ran = run("links", arm / "arm.step", "--urdf", arm / "arm.urdf", "--preview", arm / "map.glb")
     assert ran.code == 0
     assert "35 of 35 parts by names" in ran.err
-    assert (arm / "map.png").read_bytes().startswith(b"\x89PNG")
     assert (arm / "map.glb").read_bytes().startswith(b"glTF")
     (arm / "map.yaml").write_text(ran.out, "utf-8")
     command = ["inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json"]
@@ -40,7 +36,7 @@ def test_mistakes_are_plain_sentences(run: Run, arm: Path) -> None:
     for words, wanted in (
         (("--clusters", "0"), "above 0"),
         (("--clusters", "2", "--urdf", arm / "arm.urdf"), "one of them"),
-        (("--preview", arm / "x.jpg"), "--preview writes"),
+        (("--preview", arm / "x.png"), "--preview writes"),
         (("--out", arm / "no" / "map.yaml"), "there is no folder"),
     ):
         ran = run("links", arm / "arm.step", *words)

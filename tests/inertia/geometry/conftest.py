@@ -14,7 +14,7 @@ from OCP.gp import gp_Pnt
 from step_writer import StepDocument, trsf_of
 
 from silo.inertia.geometry import ReadOptions, read
-from silo.inertia.model import Assembly, GeometryProblem
+from silo.inertia.model import Assembly, Note
 
 _TESTS = Path(__file__).parents[2]
 for _folder in (_TESTS / "fcstd", _TESTS / "freecad"):
@@ -73,7 +73,7 @@ def _codes_of() -> Callable[..., list[str]]:
     """The codes of an assembly's problems, or of a prototype's."""
 
     def codes_of(thing: Any) -> list[str]:
-        problems: tuple[GeometryProblem, ...] = thing.problems
+        problems: tuple[Note, ...] = thing.problems
         return [str(problem.code) for problem in problems]
 
     return codes_of

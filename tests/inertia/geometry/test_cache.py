@@ -12,10 +12,10 @@ import pytest
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 
 from silo.bom.errors import DocumentError, InputError
-from silo.folders import cache_folder
-from silo.inertia.geometry import Mesh, ReadOptions, read, store
+from silo.inertia.geometry import Mesh, ReadOptions, cache, read
 from silo.inertia.geometry.cache import Cache, default_folder, fingerprint, key_of, key_parts, measured_by
-from silo.inertia.model import Assembly, GeometryProblem, Instance, Prototype
+from silo.inertia.model import Assembly, Instance, Note, Prototype
+from silo.platform import cache_folder
 
 IMPOSSIBLE = 1
 """[MB] of memory with which nothing can be read: what is answered then comes from the cache."""
@@ -172,7 +172,7 @@ def test_the_cache_is_bounded(box: Any, step_part: Any, kept: Any, tmp_path: Pat
     assert read(paths[0], options=kept(memory_mb=IMPOSSIBLE)).instances  # used again
     small = Cache(tmp_path / "cache", max_bytes=2 * max(entries) + 10)
     result = tmp_path / "result.npz"
-    store.save(read(paths[3], options=ReadOptions(cache=False)), result)
+    cache.save(read(paths[3], options=ReadOptions(cache=False)), result)
     small.put("ff" + "0" * 62, result)
     assert len(files(tmp_path / "cache")) == 2
     assert read(paths[0], options=kept(memory_mb=IMPOSSIBLE)).instances
@@ -247,7 +247,7 @@ def assembly() -> Assembly:
     """One with everything in it."""
     part = Prototype(
         "k/1", "Peça ✓", 4e-6, np.array([0.1, 2.0, 3.0]), np.diag([0.1, 2.0, 2.5]), True,
-        (GeometryProblem("name", "said"),), 7850.0, "Steel", 4.1e-6, "F01-1",
+        (Note("name", "said"),), 7850.0, "Steel", 4.1e-6, "F01-1",
         Mesh(np.eye(3), np.array([[0, 1, 2]])),
     )  # fmt: skip
     empty = Prototype("k/2", "empty", has_solid=False)
@@ -257,7 +257,7 @@ def assembly() -> Assembly:
         "top",
         {part.key: part, empty.key: empty},
         (Instance(("a", "b"), ("A", "B"), "k/1", turn), Instance(("c",), ("C",), "k/2")),
-        (GeometryProblem("units", "mm?"),),
+        (Note("units", "mm?"),),
         "where.step",
         "mm",
         {("a",): turn},
@@ -267,8 +267,8 @@ def assembly() -> Assembly:
 def test_a_stored_assembly_comes_back_as_it_was(tmp_path: Path) -> None:
     """All fields, of all kinds; what is kept beside comes along."""
     before = assembly()
-    store.save(before, tmp_path / "x.npz", {"others": {"a": "b"}})
-    after, extra = store.load(tmp_path / "x.npz")
+    cache.save(before, tmp_path / "x.npz", {"others": {"a": "b"}})
+    after, extra = cache.load(tmp_path / "x.npz")
     assert extra == {"others": {"a": "b"}}
     assert (after.name, after.source, after.unit) == (before.name, before.source, before.unit)
     assert after.problems == before.problems
@@ -290,14 +290,14 @@ def test_a_stored_assembly_comes_back_as_it_was(tmp_path: Path) -> None:
 
 def test_an_assembly_without_anything_can_be_stored(tmp_path: Path) -> None:
     """No prototypes, no instances: no error."""
-    store.save(Assembly("empty", {}, ()), tmp_path / "x.npz")
-    assert store.load(tmp_path / "x.npz")[0].instances == ()
+    cache.save(Assembly("empty", {}, ()), tmp_path / "x.npz")
+    assert cache.load(tmp_path / "x.npz")[0].instances == ()
 
 
 def test_a_pickle_in_a_stored_file_is_never_loaded(tmp_path: Path) -> None:
     """An array of objects would run code when it is read: refused."""
     path = tmp_path / "evil.npz"
-    np.savez(path, header=np.array([{"format": store.FORMAT}], dtype=object))
+    np.savez(path, header=np.array([{"format": cache.FORMAT}], dtype=object))
     with pytest.raises(InputError, match="no stored geometry"):
-        store.load(path)
+        cache.load(path)
     assert Cache(tmp_path).get("evil", path) is None

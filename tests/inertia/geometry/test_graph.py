@@ -9,10 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
-from silo.inertia.geometry.graph import Child, Node, bottom_up, count_instances, unfold, unique_names
-from silo.inertia.geometry.labels import clean, is_generic, lost_characters
-from silo.inertia.geometry.step.part21 import Ref, Typed, decoded, scan
-from silo.inertia.geometry.step.product_text import WANTED
+from silo.inertia.geometry.graph import (
+    Child,
+    Node,
+    bottom_up,
+    clean,
+    count_instances,
+    is_generic,
+    lost_characters,
+    unfold,
+    unique_names,
+)
+from silo.inertia.geometry.step.part21 import WANTED, Ref, Typed, decoded, scan
 
 
 def moved(x: float) -> np.ndarray:

@@ -25,9 +25,9 @@ from step_writer import StepDocument, emptied, trsf_of
 from silo.inertia.geometry import ReadOptions, read
 from silo.inertia.geometry.freecad.files import read_freecad
 from silo.inertia.geometry.helpers import LEAST_MB, WORTH_HELP, Helpers, helpers_for, processors
-from silo.inertia.geometry.kernel.brep import measure_all
-from silo.inertia.geometry.step.prepare import begin
+from silo.inertia.geometry.kernel.solids import measure_all
 from silo.inertia.geometry.step.read import read_step
+from silo.inertia.geometry.step.text import begin
 from silo.inertia.model import Assembly, GeometryCode
 
 OPTIONS = ReadOptions(isolate=False, cache=False)
@@ -47,6 +47,13 @@ def _helpers() -> Iterator[Helpers]:
         yield helpers
 
 
+@pytest.fixture(name="nobody")
+def _nobody() -> Iterator[Helpers]:
+    """No helper: everything is done here."""
+    with Helpers() as helpers:
+        yield helpers
+
+
 class Counting(Helpers):
     """Passes everything on, and counts what the helper was sent."""
 
@@ -62,20 +69,20 @@ class Counting(Helpers):
         """See :class:`Helpers`."""
         return self.other.folder()
 
-    def all(self, rows: Any, here: Any, there: Any, done: Any) -> Any:
+    def all(self, rows: Any, task: Any, done: Any) -> Any:
         """See :class:`Helpers`; here it waits until the helper has taken something."""
         taken = threading.Event()
+        reader = threading.current_thread()
 
         def counted(row: Any) -> Any:
-            self.sent += 1
-            taken.set()
-            return there(row)
+            if threading.current_thread() is not reader:
+                self.sent += 1
+                taken.set()
+            elif len(rows) > 1:
+                assert taken.wait(60)
+            return task(row)
 
-        def slow(row: Any) -> Any:
-            assert len(rows) == 1 or taken.wait(60)
-            return here(row)
-
-        return self.other.all(rows, slow, counted, done)
+        return self.other.all(rows, counted, done)
 
 
 def same(one: Assembly, other: Assembly) -> None:
@@ -91,7 +98,7 @@ def same(one: Assembly, other: Assembly) -> None:
     assert [i.path for i in one.instances] == [i.path for i in other.instances]
 
 
-def test_shapes_are_measured_to_the_same_numbers(helpers: Helpers, box: Any, trsf: Any) -> None:
+def test_shapes_are_measured_to_the_same_numbers(helpers: Helpers, nobody: Helpers, box: Any) -> None:
     """Placed, mirrored, several in one product, a product without a solid."""
     builder, two = BRep_Builder(), TopoDS_Compound()
     builder.MakeCompound(two)
@@ -99,7 +106,7 @@ def test_shapes_are_measured_to_the_same_numbers(helpers: Helpers, box: Any, trs
     builder.Add(two, box(1, 2, 3, (50, 0, 0)))
     products = [[two], [box(3, 2, 1), BRepPrimAPI_MakeCylinder(2, 9).Shape()], [], [box(5, 5, 5).Reversed()]]
     counting = Counting(helpers)
-    alone = measure_all(products, options=OPTIONS, helpers=Helpers(), done=quiet)
+    alone = measure_all(products, options=OPTIONS, helpers=nobody, done=quiet)
     together = measure_all(products, options=OPTIONS, helpers=counting, done=quiet)
     assert counting.sent
     for one, other in zip(alone, together, strict=True):
@@ -123,17 +130,18 @@ def split_assembly(folder: Path, count: int) -> Path:
     return emptied(document.write(folder / "top.step"), *(f"p{n}" for n in range(count)))
 
 
-def test_a_split_assembly_is_the_same_assembly(helpers: Helpers, tmp_path: Path) -> None:
+def test_a_split_assembly_is_the_same_assembly(helpers: Helpers, nobody: Helpers, tmp_path: Path) -> None:
     """Files in the same order, whoever read them; a damaged one is reported as it is without help."""
     path = split_assembly(tmp_path, 5)
     counting = Counting(helpers)
-    alone = read_step(path, OPTIONS, quiet)
+    alone = read_step(path, OPTIONS, quiet, nobody)
     together = read_step(path, OPTIONS, quiet, counting)
     assert counting.sent
     same(alone.assembly, together.assembly)
     assert alone.others == together.others
     (tmp_path / "p2.step").write_bytes(b"ISO-10303-21;\nHEADER;")
-    alone, together = read_step(path, OPTIONS, quiet), read_step(path, OPTIONS, quiet, Counting(helpers))
+    alone = read_step(path, OPTIONS, quiet, nobody)
+    together = read_step(path, OPTIONS, quiet, Counting(helpers))
     assert [p.problems for p in together.assembly.prototypes.values()] == [
         p.problems for p in alone.assembly.prototypes.values()
     ]
@@ -180,7 +188,7 @@ def test_helpers_of_a_split_assembly_start_before_the_kernel_is_loaded(tmp_path:
     assert asked(document.write(tmp_path / "whole.step")) == []
 
 
-def test_a_freecad_document_is_the_same_assembly(helpers: Helpers, tmp_path: Path) -> None:
+def test_a_freecad_document_is_the_same_assembly(helpers: Helpers, nobody: Helpers, tmp_path: Path) -> None:
     """Shapes from the entries of its file; one of them is damaged."""
     doc = Doc("many")
     for number in range(5):
@@ -195,7 +203,8 @@ def test_a_freecad_document_is_the_same_assembly(helpers: Helpers, tmp_path: Pat
         doc.add("Part::Feature", f"Body{number}", Shape=shape, Material=material)
     path = doc.save(tmp_path / "many.FCStd")
     counting = Counting(helpers)
-    alone, together = read_freecad(path, OPTIONS, quiet), read_freecad(path, OPTIONS, quiet, counting)
+    alone = read_freecad(path, OPTIONS, quiet, nobody)
+    together = read_freecad(path, OPTIONS, quiet, counting)
     assert counting.sent
     assert len(alone.assembly.prototypes) == 5
     same(alone.assembly, together.assembly)
@@ -216,18 +225,20 @@ def test_a_whole_reading_with_two_processes(tmp_path: Path) -> None:
     )
 
 
-FAILING: list[Callable[[int], Any]] = [
-    lambda row: (int, ("no number",)),
-    lambda row: (os._exit, (3,)),
-    lambda row: (os.abort, ()),
-]
+FAILING: list[Callable[[], Any]] = [lambda: int("no number"), lambda: os._exit(3), os.abort]
 
 
-@pytest.mark.parametrize("there", FAILING)
-def test_what_a_helper_cannot_do_is_done_here(helpers: Helpers, there: Callable[[int], Any]) -> None:
+def failing(how: int, reader: int, row: int) -> int:
+    """A task that only this process can do."""
+    return row * 10 if os.getpid() == reader else FAILING[how]()
+
+
+@pytest.mark.parametrize("how", range(len(FAILING)))
+def test_what_a_helper_cannot_do_is_done_here(helpers: Helpers, how: int) -> None:
     """An error, or the end of the helper: all results are there, in order."""
     counting = Counting(helpers)
-    assert counting.all(range(6), lambda row: row * 10, there, quiet) == [0, 10, 20, 30, 40, 50]
+    found = counting.all(range(6), lambda row: (failing, (how, os.getpid(), row)), quiet)
+    assert found == [0, 10, 20, 30, 40, 50]
     assert counting.sent
     assert helpers.begin(str, 7)() == "7"
 
@@ -237,8 +248,8 @@ def test_nobody_waits_for_a_helper_that_is_not_ready() -> None:
     with Helpers(1, 4000) as helpers:
         helpers.start()
         helpers.begin(time.sleep, 600)
-        found = helpers.all(range(3), lambda row: row, lambda row: (str, (row,)), quiet)
-    assert found == [0, 1, 2]
+        found = helpers.all(range(3), lambda row: (str, (row,)), quiet)
+    assert found == ["0", "1", "2"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited by other means, or not at all")
@@ -256,7 +267,7 @@ def test_an_error_here_ends_everything(helpers: Helpers) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt), helpers:
-        helpers.all(range(100), str, lambda row: (time.sleep, (row,)), done)
+        helpers.all(range(100), lambda row: (time.sleep, (row,)), done)
 
 
 def test_what_the_kernel_says_in_a_helper_is_heard(

@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from silo.bom.errors import CancelledError, ConfigError, DocumentError
-from silo.inertia.geometry import Progress, ReadOptions, isolate, read
+from silo.inertia.geometry import Progress, ReadOptions, read
+from silo.inertia.geometry.read import run
 from silo.inertia.model import GeometryCode
 
 
@@ -121,15 +122,15 @@ def child(code: str) -> list[str]:
 def test_a_crash_of_the_kernel_is_an_error_message(box: Any, step_part: Any, tmp_path: Path) -> None:
     """A segmentation fault ends the child, and the parent says so."""
     path = step_part(box(1, 2, 3))
-    with pytest.raises(DocumentError, match=r"kernel crashed on it \(SIGSEGV\)"):
-        isolate.run(path, options(), tmp_path / "r", child("import os; os.kill(os.getpid(), 11)"))
+    with pytest.raises(DocumentError, match=r"kernel crashed \(SIGSEGV\) on it"):
+        run(path, options(), tmp_path / "r", child("import os; os.kill(os.getpid(), 11)"))
 
 
 def test_an_uncaught_error_in_the_child_gives_its_last_line(box: Any, step_part: Any, tmp_path: Path) -> None:
     """Not a stack trace, its last line."""
     path = step_part(box(1, 2, 3))
     with pytest.raises(DocumentError) as caught:
-        isolate.run(path, options(), tmp_path / "r", child("raise RuntimeError('the spline is sad')"))
+        run(path, options(), tmp_path / "r", child("raise RuntimeError('the spline is sad')"))
     assert caught.value.reason == "the reader stopped with an error: RuntimeError: the spline is sad"
 
 
@@ -139,7 +140,7 @@ def test_a_child_that_hangs_is_ended(box: Any, step_part: Any, tmp_path: Path) -
     code = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(600)"
     path = step_part(box(1, 2, 3))
     with pytest.raises(DocumentError, match=r"could not be read within 5 s; allow more time"):
-        isolate.run(path, options(timeout_s=5), tmp_path / "r", child(code))
+        run(path, options(timeout_s=5), tmp_path / "r", child(code))
     assert not alive(int(pid.read_text()))
 
 
@@ -154,9 +155,7 @@ def test_cancelling_ends_the_child_at_once(box: Any, step_part: Any, tmp_path: P
         return pid.is_file() and pid.read_text() != ""
 
     with pytest.raises(CancelledError, match="cancelled"):
-        isolate.run(
-            step_part(box(1, 2, 3)), options(timeout_s=60, cancelled=cancelled), tmp_path / "r", child(code)
-        )
+        run(step_part(box(1, 2, 3)), options(timeout_s=60, cancelled=cancelled), tmp_path / "r", child(code))
     assert asked
     assert not alive(int(pid.read_text()))
 
@@ -168,7 +167,7 @@ def test_what_the_child_started_ends_with_it(box: Any, step_part: Any, tmp_path:
     sleeper = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(600)"
     code = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {sleeper!r}])"
     with pytest.raises(CancelledError):
-        isolate.run(
+        run(
             step_part(box(1, 2, 3)),
             options(cancelled=lambda: pid.is_file() and pid.read_text() != ""),
             tmp_path / "r",

@@ -20,12 +20,24 @@ from bodies import box, cylinder, placement, shape_only
 from rich.console import Console
 
 from silo.bom.errors import InputError
+from silo.cli import show
 from silo.inertia.core import MassProps, combine
 from silo.inertia.links import ASSEMBLY_FRAME, link_map, origin_frame
-from silo.inertia.output.data import CSV_COLUMNS, report_csv, report_data, report_json
-from silo.inertia.output.snippets import SNIPPETS, document, snippets
-from silo.inertia.output.text import report_markdown, report_tables
-from silo.inertia.output.values import number, settled, writable
+from silo.inertia.output.text import (
+    CSV_COLUMNS,
+    MAX_PART_ROWS,
+    SNIPPETS,
+    document,
+    number,
+    report_csv,
+    report_data,
+    report_json,
+    report_markdown,
+    report_tables,
+    settled,
+    snippets,
+    writable,
+)
 from silo.inertia.report import LinkResult
 
 Fixture = Callable[..., Any]
@@ -191,7 +203,7 @@ def test_case_42_mujoco_loads_every_link(report: Any) -> None:
 
 def test_case_42_mujoco_loads_our_urdf(report: Any) -> None:
     """The same through the URDF that we write."""
-    from silo.inertia.output.urdf import fill_urdf
+    from silo.inertia.output.urdf import Urdf
 
     mujoco = pytest.importorskip("mujoco")
     joint = '<joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint>'
@@ -199,7 +211,7 @@ def test_case_42_mujoco_loads_our_urdf(report: Any) -> None:
     root += '<child link="base"/></joint>'
     urdf = f'<robot name="r">{root}<link name="base"/><link name="arm"/>{joint}</robot>'
     links = real_links(report)
-    model = mujoco.MjModel.from_xml_string(fill_urdf(urdf.encode(), links).data.decode())
+    model = mujoco.MjModel.from_xml_string(Urdf(urdf.encode()).filled(links).data.decode())
     masses = {model.body(i).name: model.body_mass[i] for i in range(model.nbody)}
     for name, props in links.items():
         assert masses[name] == pytest.approx(props.mass)
@@ -347,8 +359,7 @@ def test_csv_does_not_run_part_names(assemble: Fixture, compute: Fixture, name: 
 
 def test_markdown_and_table_hold_the_essentials(report: Any) -> None:
     """Links, sources, rules, materials, warnings; names are text and not markup."""
-    text = report_markdown(report, "picture.png")
-    assert "![" in text
+    text = report_markdown(report)
     assert "loose \\| part" in text
     assert "BOM mass" in text
     assert "assembly frame" in text
@@ -359,6 +370,21 @@ def test_markdown_and_table_hold_the_essentials(report: Any) -> None:
     assert "whole assembly" in shown
     assert "(no link)" in shown
     assert "Unobtainium" in shown
+
+
+def test_a_pipe_gets_every_part_each_on_one_line(assemble: Fixture, compute: Fixture) -> None:
+    """However long the names are; a terminal gets the first ones."""
+    names = [f"{number}: {'a bracket of the left hand side, ' * 5}" for number in range(MAX_PART_ROWS + 5)]
+    report = compute(assemble(*((f"l/{name}", box(name, 0.1, 0.1, 0.1)) for name in names)), None)
+    pipe = io.StringIO()
+    show.console(pipe).print(report_tables(report, whole=True))
+    lines = pipe.getvalue().splitlines()
+    assert [sum(f" {name.strip()} " in line and "│" in line for line in lines) for name in names] == [
+        1
+    ] * len(names)
+    terminal = io.StringIO()
+    Console(width=200, file=terminal).print(report_tables(report))
+    assert "and 5 more" in terminal.getvalue()
 
 
 def test_names_do_not_steer_the_terminal(assemble: Fixture, compute: Fixture) -> None:

@@ -38,15 +38,14 @@ def _page(assemble: Fixture, compute: Fixture) -> str:
 
 
 def test_the_page_holds_all_that_it_needs(page: str) -> None:
-    """Viewer, GLB and PNG are inside; it may load nothing; what a file says ends no element."""
+    """Viewer and GLB are inside; it may load nothing; what a file says ends no element."""
     assert base64.b64decode(element(page, "glb")).startswith(b"glTF")
-    assert base64.b64decode(element(page, "png")).startswith(b"\x89PNG")
     assert "var THREE=" in page
     assert "MIT License" in page
     assert "default-src 'none'" in page
     assert not re.search(r"(src|href)=\"(?!data:)", page)
     assert "/*DATA*/" not in page
-    assert page.count("<script") == 5 == page.count("</script>")
+    assert page.count("<script") == 4 == page.count("</script>")
 
 
 def test_what_the_report_says_is_on_the_page(page: str) -> None:

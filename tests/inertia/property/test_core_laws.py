@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from silo.inertia.core import MassProps, combine, place
 from silo.inertia.links import origin_frame
-from silo.inertia.output.values import settled
+from silo.inertia.output.text import settled
 
 length = st.floats(-5, 5, allow_nan=False)
 positive = st.floats(1e-3, 10)

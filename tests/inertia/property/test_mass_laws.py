@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from silo.inertia.bom import BOMEntry, BomTable
 from silo.inertia.bom.parser import with_structure
 from silo.inertia.codes import Source
+from silo.inertia.matching import bare, plain
 from silo.inertia.model import Assembly, Instance
-from silo.inertia.names import bare, plain
-from silo.inertia.output.data import report_json
+from silo.inertia.output.text import report_json
 
 Compute = Callable[..., Any]
 NAMES = (

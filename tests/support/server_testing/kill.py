@@ -20,7 +20,7 @@ from pathlib import Path
 from server_testing.caller import Api, bom, merge_body
 from server_testing.process import ServerProcess
 
-TOKEN = "silo_kill"
+TOKEN = "silo_kill_0123456789abcdef"
 LINES = 300
 
 

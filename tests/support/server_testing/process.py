@@ -153,7 +153,7 @@ def _loaded() -> ForkServerContext:
     modules = [
         "psycopg",
         "silo.cli.main",
-        "silo.cli.server",
+        "silo.cli.setup",
         "silo_server.operation.backup",
         "silo_server.run",
     ]

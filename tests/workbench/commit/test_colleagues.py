@@ -16,20 +16,18 @@ from fcstd_writer import locals_, part
 
 from silo.api.files import Origin
 from silo.api.wire import Revision
-from silo.bom.changes import ThreeLines
+from silo.bom.compare import ThreeLines
 from silo.bom.errors import ServerFaultError
 from silo.bom.model import BomEntry
-from silo.durable import stamp_of
 from silo.outbox.entry import UNKNOWN, Commit, State
 from silo.outbox.send import send_all
-from silo.workbench.commit.desk import Answer, Look
-from silo.workbench.commit.flow import CommitFlow
+from silo.platform import stamp_of
+from silo.workbench.commit.flow import Answer, Choice, CommitFlow, Look, Theirs, line_words
 from silo.workbench.commit.opened import Opened
 from silo.workbench.commit.plan import Plan, plan
-from silo.workbench.commit.theirs import Choice, Theirs, line_words
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.pane.waiting import rows
-from silo.workbench.session.colleagues import Newer
+from silo.workbench.session.session import Newer
 
 
 @pytest.fixture(name="flow")

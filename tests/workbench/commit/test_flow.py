@@ -10,7 +10,9 @@ from typing import Any
 
 import pytest
 from desk import Office
+from fcstd_writer import Doc, Raw, part
 
+from silo.files import Project
 from silo.outbox.entry import Commit
 from silo.outbox.store import Store
 from silo.registering.journal import Journal
@@ -39,6 +41,51 @@ def test_a_document_and_what_it_links_to(office: Office, flow: CommitFlow) -> No
     assert len(office.desk.asked) == 1
     assert [sent.entry.label for sent in office.sent] == ["Leaf", "Top"]
     assert {sent.entry.comment for sent in office.sent} == {"a comment"}
+
+
+def marked(office: Office, *names: str) -> Doc:
+    """A file with a registered part for each name."""
+    doc = Doc(label="Both")
+    for name in names:
+        uuid = office.silo.create_item("kindred-rd", "M01", name).id
+        own = Raw("App::PropertyString", f'<String value="{uuid}"/>')
+        doc.add("Part::Box", name, Height=1.0, SiloItemId=own)
+    return doc
+
+
+def test_files_without_an_item_go_along(office: Office, flow: CommitFlow) -> None:
+    """A library and a sheet that a part links to, though FreeCAD has neither open; nothing from outside."""
+    vault = office.folder / "vault"
+    marked(office, "Left", "Right").save(vault / "lib" / "Both.FCStd")
+    Doc(label="S").add("Spreadsheet::Sheet", "Sheet").save(vault / "Sheet.FCStd")
+    part("Far", "Box").save(office.folder / "Far.FCStd")
+    Project(str(vault)).note({})
+    top = office.document("Top")
+    doc = Doc(label="Top", meta={"SiloUUID": top.identity}).link("L", "lib/Both.FCStd", "Left")
+    top.content = doc.link("S", "Sheet.FCStd", "Sheet").link("F", "../Far.FCStd", "Box").bytes()
+    flow.start(top)
+    office.settle()
+    files = {stored.revisions[-1].file_path: stored for stored in office.silo.documents.values()}
+    assert set(files) == {"lib/Both.FCStd", "Sheet.FCStd"}
+    assert files["lib/Both.FCStd"].files == {1: (vault / "lib" / "Both.FCStd").read_bytes()}
+    assert {held.object for held in files["lib/Both.FCStd"].held} == {"Left", "Right"}
+    assert office.files("Top") == [top.content]
+    top.changed = True
+    flow.start(top)
+    office.settle()
+    assert [len(stored.files) for stored in files.values()] == [1, 1]
+
+
+def test_a_file_of_several_parts_is_committed_as_it_is(office: Office, flow: CommitFlow) -> None:
+    """It needs no number of its own: nobody is advised to register it."""
+    both = office.document("Both", registered=False)
+    both.content, both.several = marked(office, "Left", "Right").bytes(), True
+    flow.start(both)
+    office.settle()
+    (stored,) = office.silo.documents.values()
+    assert stored.files == {1: both.content}
+    assert titles(office) == ["Committed: Both.FCStd"]
+    assert office.desk.registers == []
 
 
 def test_who_says_no_commits_nothing(office: Office, flow: CommitFlow) -> None:

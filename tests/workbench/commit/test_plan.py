@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import DocumentError
 from silo.workbench.commit.opened import Base
-from silo.workbench.commit.plan import Plan, Row, State, Taken, leaves_first, plan, take_each
-from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.commit.plan import Plan, Row, Snapshot, State, Taken, leaves_first, plan, take_each
 
 
 class Doc:

@@ -9,7 +9,9 @@ import pytest
 from fakes import Doc, edit
 
 from silo.bom.findings import FindingCode
-from silo.workbench.commit.snapshot import Snapshot, is_registered, part_identity, take
+from silo.bom.links import file_item
+from silo.bom.model import sole_identity
+from silo.workbench.commit.plan import Snapshot, take
 
 
 def gearbox() -> tuple[Doc, Doc, Doc]:
@@ -108,7 +110,7 @@ def test_the_hint_does_not_override_the_only_assembly() -> None:
 )
 def test_identity_of_a_file(doc: Doc, identity: str | None) -> None:
     """The document's own."""
-    assert part_identity(doc) == identity
+    assert sole_identity(doc) == identity
 
 
 def test_identity_of_the_only_marked_object() -> None:
@@ -116,9 +118,11 @@ def test_identity_of_the_only_marked_object() -> None:
     doc = Doc("/v/A.FCStd")
     one, other = doc.body("One"), doc.body("Other")
     edit(one, SiloItemId="i")
-    assert part_identity(doc) == "i"
+    assert sole_identity(doc) == "i"
+    assert not take(doc).several
     edit(other, SiloItemId="j")
-    assert part_identity(doc) is None
+    assert sole_identity(doc) is None
+    assert take(doc).several
 
 
 def test_a_document_is_registered_where_a_commit_of_it_has_an_item() -> None:
@@ -131,8 +135,8 @@ def test_a_document_is_registered_where_a_commit_of_it_has_an_item() -> None:
     for name in ("One", "Other"):
         edit(several.body(name), SiloItemId=name)
     docs = (top, sub, bolt, two, marked, several)
-    told = [is_registered(doc) for doc in docs]
+    told = [bool(file_item(doc)) for doc in docs]
     assert told == [bool(take(doc).identity) for doc in docs] == [True, True, True, True, False, False]
     edit(box, SiloItemId="box")
-    assert is_registered(marked)
-    assert is_registered(two, second)
+    assert file_item(marked)
+    assert file_item(two, second)

@@ -11,13 +11,13 @@ from bodies import box
 
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.links import Link, LinkMap
-from silo.inertia.massrule import Options
+from silo.inertia.masses import Options
 from silo.inertia.materials import load_materials
-from silo.inertia.model import Assembly, GeometryProblem, Instance, Prototype
+from silo.inertia.model import Assembly, Instance, Note, Prototype
 from silo.workbench.mass.rows import Shown, mass_text, shown
 
 
-def made(name: str, size: float, density: float | None, *problems: GeometryProblem) -> Prototype:
+def made(name: str, size: float, density: float | None, *problems: Note) -> Prototype:
     """A cube of ``size`` [m]."""
     cube = box(name, size, size, size)
     material = "Steel" if density else None
@@ -65,7 +65,7 @@ def test_without_any_material_there_is_no_sum() -> None:
 
 def test_doubts_about_a_shape_stand_in_its_row() -> None:
     """What the measuring noticed."""
-    seen = window(made("bad", 0.01, 8000, GeometryProblem("invalid_shape", "the shape is invalid")))
+    seen = window(made("bad", 0.01, 8000, Note("invalid_shape", "the shape is invalid")))
     assert seen.rows[0].why == "the shape is invalid"
 
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import pytest
 
 from silo.workbench.pane.activity import Do
-from silo.workbench.pane.banner import banner
-from silo.workbench.session.shown import Shown
+from silo.workbench.pane.waiting import banner
+from silo.workbench.session.session import Shown
 from silo.workbench.settings.server import Server
 
 SERVER = Server("https://silo.example.com")

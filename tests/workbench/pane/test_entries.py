@@ -10,8 +10,8 @@ import pytest
 from activities import activity_of, entry_text
 
 from silo.activity import counts_text, english
-from silo.api.merging import NOT_ATOMIC
-from silo.api.sse import ServerEvent
+from silo.api.boms import NOT_ATOMIC
+from silo.api.events import ServerEvent
 from silo.api.wire import MergeDiff, MergeWarning
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity

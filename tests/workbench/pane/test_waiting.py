@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from silo.bom.changes import ThreeLines
+from silo.bom.compare import ThreeLines
 from silo.bom.model import BomEntry
 from silo.outbox.entry import Commit, Entry, State
 from silo.outbox.store import Store
-from silo.workbench.commit.theirs import of_held
+from silo.workbench.commit.flow import of_held
 from silo.workbench.pane.activity import Do
 from silo.workbench.pane.waiting import can_send, heading, meant_for_another, rows
 
@@ -126,3 +126,9 @@ def test_a_held_commit_shows_what_each_changed(entry: Entry) -> None:
     assert [(a.do, a.text, a.target) for a in row.more] == [(Do.DETAILS, "… and 12 more lines", "1")]
     for known in ({}, {held.id: None}):
         assert rows([held], HERE, known)[0].details == ()
+
+
+def test_what_a_server_that_was_set_back_has_lost_goes_with_retry_all(entry: Entry) -> None:
+    """Also where nothing else waits; a colleague's revision is a question for each commit."""
+    for newer, can in (({"revision_number": 1, "set_back": True}, True), ({"revision_number": 1}, False)):
+        assert can_send([replace(entry, state=State.HELD, newer=newer)], HERE) is can

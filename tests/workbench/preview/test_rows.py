@@ -19,8 +19,8 @@ from silo.bom.model import BomEntry, Extraction
 from silo.cli.common import read_assembly
 from silo.cli.main import main
 from silo.registering.on_disk import proposals_for, register_all
-from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.preview.rows import Kind, Preview, Row, ask, rows, summary, to_sync
+from silo.workbench.commit.plan import Snapshot
+from silo.workbench.preview.flow import Kind, Preview, Row, ask, rows, summary, to_sync
 from silo.workbench.session.jobs import Control
 from silo_server.run import running_server
 

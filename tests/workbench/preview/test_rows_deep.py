@@ -11,8 +11,8 @@ from fcstd_writer import Doc, locals_, part
 
 from silo.fcstd import Library
 from silo.testing import FakeSilo
-from silo.workbench.commit.snapshot import take
-from silo.workbench.preview.rows import MOST_ROWS, Kind, Preview, Row, ask, rows
+from silo.workbench.commit.plan import take
+from silo.workbench.preview.flow import MOST_ROWS, Kind, Preview, Row, ask, rows
 from silo.workbench.session.jobs import Control
 
 CONTROL = Control(lambda _detail, _fraction: None)

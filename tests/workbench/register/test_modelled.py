@@ -16,7 +16,7 @@ from silo.registering.journal import Journal
 from silo.registering.offer import Candidate, Seen, State, offer
 from silo.registering.orders import carry_out
 from silo.testing import FakeSilo
-from silo.workbench.register.rows import APART, NEW, EditedRow, choose, heading
+from silo.workbench.register.flow import APART, NEW, EditedRow, choose, heading
 from silo.workbench.session.jobs import Control
 
 

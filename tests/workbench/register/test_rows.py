@@ -6,9 +6,9 @@ from __future__ import annotations
 import pytest
 
 from silo.bom.model import BomEntry
-from silo.bom.naming import Categories, Proposal
+from silo.bom.resolve import Categories, Proposal
 from silo.registering.offer import Candidate, Offer, Similar, State
-from silo.workbench.register.rows import ASK, NEW, SAME, EditedRow, choose, notices, number_texts, retype
+from silo.workbench.register.flow import ASK, NEW, SAME, EditedRow, choose, notices, number_texts, retype
 
 NUMBERS = {"M01": "M01-0007"}
 

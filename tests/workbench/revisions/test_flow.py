@@ -14,8 +14,7 @@ from fcstd_writer import part
 from other_disk import other_disk
 
 from silo.api.files import Origin
-from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.commit.theirs import Choice, Theirs, of_held
+from silo.workbench.commit.flow import Choice, CommitFlow, Theirs, of_held
 from silo.workbench.revisions.flow import RevisionFlow
 
 

@@ -13,14 +13,16 @@ import pytest
 from desk import Office
 from server_testing import wait_until
 
-from silo.api.sse import RESET, ServerEvent
+from silo.api.events import MERGE, RESET, ServerEvent
+from silo.api.wire import MergeEvent, MergeResult
 from silo.bom.errors import SiloError, UnreachableError
-from silo.durable import stamp_of
-from silo.outbox.database import OutboxError
+from silo.bom_sync import Status
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
-from silo.outbox.send import send_all
-from silo.outbox.store import Store
+from silo.outbox.send import Sent, send_all
+from silo.outbox.store import OutboxError, Store
+from silo.platform import stamp_of
 from silo.workbench.commit.opened import Base
+from silo.workbench.session.online import LastIds
 
 
 def commit(office: Office, name: str, content: bytes = b"content", *, hold: bool = True) -> Commit:
@@ -278,7 +280,7 @@ def test_a_person_saves_a_copy_and_discards(office: Office) -> None:
     entry = store.add(Commit(doc.FileName, 1.0, "Bolt", "no-item", file=Path(doc.FileName)))
     office.session.begin(live=False)
     office.settle()
-    assert [w.state for w in office.session.shown.waiting] == [State.HELD]
+    assert [(w.state, bool(w.reason)) for w in office.session.shown.waiting] == [(State.WAITING, True)]
     target = office.folder / "saved.FCStd"
     office.session.save_copy(entry.id, target)
     office.session.discard(entry.id)
@@ -303,3 +305,40 @@ def test_one_item_in_trouble_holds_up_no_other(office: Office) -> None:
     assert (office.files("One"), office.files("Two"), office.files("Bad")) == ([b"content"], [b"content"], [])
     (waiting,) = office.session.shown.waiting
     assert (waiting.label, waiting.reason) == ("Bad", "500 for this one")
+
+
+def test_a_burst_of_events_is_one_file_written(tmp_path: Path) -> None:
+    """The first is written at once, the others with the end of the connection."""
+    known = LastIds(tmp_path / "last-events.json")
+    for number in range(100):
+        known.set("http://silo", str(number))
+    assert LastIds(tmp_path / "last-events.json").get("http://silo") == "0"
+    known.save()
+    assert LastIds(tmp_path / "last-events.json").get("http://silo") == "99"
+
+
+@pytest.mark.parametrize("event_first", [True, False])
+def test_after_a_crash_the_events_of_our_own_merges_do_not_come_again(
+    office: Office, *, event_first: bool
+) -> None:
+    """Those of colleagues are on disk every ten seconds only; our own at once, before or after the answer."""
+    office.session.begin(live=False)
+    office.settle()
+    online = office.session._need_online()
+    written = online._last_ids._path
+
+    def hear(number: int, sync_id: str) -> None:
+        data = {"type": "bom.merged", "item": "A01-0001", "sync_id": sync_id, "user": "x", "diff": {}}
+        online._heard(ServerEvent(str(number), MERGE, data, MergeEvent.model_validate(data)), online.address)
+
+    def tell() -> None:
+        entry = Store(office.session.outbox.path).add(Commit("", 1.0, part_number="A01-0001", request="{}"))
+        online._tell(Sent(entry, "A01-0001", Status.MERGED, result=MergeResult(), sync_id="mine"))
+
+    hear(1, "theirs")  # the first one is written at once
+    for step in (lambda: hear(2, "mine"), tell)[:: 1 if event_first else -1]:
+        step()
+    assert LastIds(written).get(online.address) == "2"
+    for number in range(3, 9):
+        hear(number, "theirs")
+    assert LastIds(written).get(online.address) == "2"

@@ -7,14 +7,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence, Set
 from enum import Enum, auto
 from functools import lru_cache
 from typing import Any, TypeVar
 
-from silo.bom.document import derived, object_name, own, property_names
-from silo.bom.walk.standard import fastener_type, is_tool
-from silo.bom.walk.targets import first_of
+from silo.bom.document import derived, first_of, object_name, own, property_names
+from silo.bom.walk.standard import fastener_type, is_tool, millimetres
 
 T = TypeVar("T", bound=Hashable)
 
@@ -55,8 +55,22 @@ _NO_FOLDERS = (
 # Draft arrays without links have no count before FreeCAD 1.0, those along paths and points have no type.
 _ARRAY_MARKS = ("Count", "ArrayType", "PathObject", "PointObject")
 _ASSEMBLY3 = ("BuildShape", "Freeze", "Group")
-_ASKED_FOR = (*_ARRAY_MARKS, *_ASSEMBLY3, "Base", "sourceFile", "a2p_Version", "Objects", "Fuse", "Scale")
-_NO_GEOMETRY = ("Part::Part2DObject", "Part::Datum", "PartDesign::SubShapeBinder", "App::DatumElement")
+_ASKED_FOR = (
+    *_ARRAY_MARKS,
+    *_ASSEMBLY3,
+    "Base",
+    "sourceFile",
+    "a2p_Version",
+    "timeLastImport",
+    "Objects",
+    "Fuse",
+    "Scale",
+)
+_NO_GEOMETRY = (
+    *("Part::Part2DObject", "Part::Datum", "PartDesign::SubShapeBinder", "PartDesign::ShapeBinder"),
+    *("App::DatumElement", "Part::Vertex", "Part::Line", "Part::Plane", "Part::Circle", "Part::Ellipse"),
+    *("Part::Polygon", "Part::RegularPolygon", "Part::Helix", "Part::Spiral"),
+)
 _GEOMETRY = ("Part::Feature", "Mesh::Feature", "Points::Feature")
 # What a link may point at without meaning a component, in words for people. (A binder has a shape.)
 _NO_COMPONENTS = {
@@ -146,7 +160,7 @@ def _kind_by_names(names: frozenset[str] | tuple[str, ...]) -> Kind | None:
     has = frozenset(names).issuperset
     if has(("Base",)) and not frozenset(names).isdisjoint(_ARRAY_MARKS):
         return Kind.DRAFT_ARRAY
-    if has(("sourceFile", "a2p_Version")):
+    if has(("sourceFile", "a2p_Version")) or has(("sourceFile", "timeLastImport")):
         return Kind.FOREIGN
     if has(_ASSEMBLY3):
         return Kind.CONTAINER
@@ -197,39 +211,124 @@ def members(container: object) -> Iterable[Any]:
         return getattr(container, "ElementList", None) or ()
     group: Sequence[Any] = getattr(container, "Group", None) or ()
     if is_assembly3(container):
-        return (getattr(group[-1], "Group", None) or ()) if group else ()
+        # A fourth group holds the relations that its command "Go to relation" makes.
+        return next((getattr(parts, "Group", None) or () for parts in (*group[2:3], *group[-1:])), ())
     return group
 
 
-def _shows_all(_obj: object, _kind: Kind) -> bool:
-    return False
+# --- how many an array shows ---
 
 
-def flattened(
-    container: object, key: Callable[[Any], T], closed: Callable[[Any, Kind], bool] = _shows_all
-) -> Iterator[tuple[T, Any, Kind]]:
-    """Everything that lies in a container at any depth within its own file, each object once, with its key.
+def left_out_by(obj: Any) -> str:
+    """The object's own property that leaves it out of every BOM; "" where none does."""
+    if own(obj, "Suppressed") is True:
+        return "Suppressed"
+    return "SiloBomExclude" if own(obj, "SiloBomExclude") is True else ""
 
-    Inline parts, groups and folders come before what they hold. Links are not followed. ``key`` identifies an
-    object; ``closed`` says of an inner container that what it holds is its own affair.
-    """
-    seen: set[T] = set()
-    open_containers = [iter(members(container))]
-    while open_containers:
-        obj = next(open_containers[-1], None)
-        if obj is None:
-            open_containers.pop()
-            continue
-        if (name := key(obj)) in seen:
-            continue
-        seen.add(name)
-        kind = kind_of(obj)
-        # FreeCAD keeps the changed copies of copy-on-change links in a hidden group of this name.
-        if kind is Kind.LINK_GROUP and object_name(obj).startswith("CopyOnChangeGroup"):
-            continue
-        yield name, obj, kind
-        if kind in INLINE and not closed(obj, kind):
-            open_containers.append(iter(members(obj)))
+
+def is_array(link: object) -> bool:
+    """True for a link array, also one with a single element."""
+    count = own(link, "ElementCount", 0)
+    return isinstance(count, int) and count > 0
+
+
+def elements(link: object) -> tuple[Any, ...]:
+    """The elements of a link array that has them as objects; none where the array only has a count."""
+    return tuple(own(link, "ElementList") or ()) if is_array(link) else ()
+
+
+def array_count(link: object) -> int:
+    """Instances of one link object: 1, or the elements of its array that are not left out one by one."""
+    count = own(link, "ElementCount", 0)
+    if not isinstance(count, int) or count <= 0:
+        return 1
+    return max(0, count - sum(1 for element in elements(link) if left_out_by(element)))
+
+
+def draft_count(array: object) -> int | None:
+    """Instances of a Draft array; None where neither its count nor its pattern says."""
+    count = own(array, "Count")
+    if isinstance(count, int) and count > 0:
+        return count
+    pattern = {"ortho": _ortho, "polar": _polar, "circular": _circular}
+    kind = own(array, "ArrayType")
+    return pattern[kind](array) if isinstance(kind, str) and kind in pattern else None
+
+
+def _whole(array: object, name: str) -> int | None:
+    value = own(array, name)
+    return value if isinstance(value, int) and not isinstance(value, bool) else None
+
+
+def _ortho(array: object) -> int | None:
+    numbers = [_whole(array, name) for name in ("NumberX", "NumberY", "NumberZ")]
+    if any(number is None for number in numbers):
+        return None
+    x, y, z = (max(0, number or 0) for number in numbers)
+    # Draft draws the original also where the first number is 0.
+    return x * max(1, y) * max(1, z) if x else 1
+
+
+def _polar(array: object) -> int | None:
+    number = _whole(array, "NumberPolar")
+    return None if number is None else max(1, number)
+
+
+def _circular(array: object) -> int | None:
+    rings, symmetry = _whole(array, "NumberCircles"), _whole(array, "Symmetry")
+    radial, tangential = (millimetres(own(array, name)) for name in ("RadialDistance", "TangentialDistance"))
+    if rings is None or radial is None or not tangential or tangential < 0:
+        return None
+    total, step = 1, max(1, symmetry or 1)
+    for ring in range(1, min(rings, 10_000)):
+        places = math.floor(2 * ring * radial * math.pi / tangential)
+        total += math.floor(places / step) * step
+    return total
+
+
+# --- what a feature consumes ---
+
+_OPERANDS = ("Base", "Tool", "Shapes", "Source", "Sections", "Spine", "Profile", "BaseFeature", "Faces")
+_BY_PYTHON = ("Tool", "Subtractions", "Sources", "Bodies", "Shape1", "Shape2", "baseObject")
+
+
+def consumed(objects: Iterable[Any], key: Callable[[Any], T]) -> dict[T, Any]:
+    """What these features (of kind LOCAL) consume: key → the feature."""
+    eaten: dict[T, Any] = {}
+    for feature in _features(objects):
+        for operand in _operands(feature):
+            eaten.setdefault(key(operand), feature)
+    return eaten
+
+
+def _features(objects: Iterable[Any]) -> Iterator[Any]:
+    for obj in objects:
+        yield obj
+        if derived(obj, "PartDesign::Body"):
+            yield from own(obj, "Group") or ()
+
+
+def _operands(feature: Any) -> Iterator[Any]:
+    if derived(feature, "Part::FeaturePython"):
+        names: tuple[str, ...] = _BY_PYTHON
+        # Fragments, slices and filters of compounds; what only draws others has neither.
+        if own(feature, "Tool") is not None or own(feature, "FilterType") is not None:
+            names = (*names, "Base")
+        if own(feature, "Mode") is not None or own(feature, "Tolerance") is not None:
+            names = (*names, "Objects")
+    elif derived(feature, "PartDesign::Boolean"):
+        names = (*_OPERANDS, "Group")
+    else:
+        names = _OPERANDS
+    for name in names:
+        value = own(feature, name)
+        for one in value if isinstance(value, list | tuple) else (value,):
+            operand = one[0] if isinstance(one, tuple) and one else one
+            if hasattr(operand, "Document"):
+                yield operand
+
+
+# --- a whole document ---
 
 
 class Survey:

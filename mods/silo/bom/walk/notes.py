@@ -6,12 +6,11 @@ A finding reads the same whatever the order in which its objects were met: place
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from silo.bom.document import LinkProblem, label_of, object_name
+from silo.bom.document import LinkProblem, label_of, object_name, saved_by
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry
@@ -38,7 +37,6 @@ _KNOWN_LINKS = frozenset(
 )
 # The newest FreeCAD of the test matrix.
 NEWEST_TESTED = (1, 1)
-_VERSION = re.compile(r"(\d+)\.(\d+)(?:\.\d+)?")
 _BY_OBJECT = (FindingCode.MISSING_OBJECT, FindingCode.LOST_ASSEMBLY)
 
 
@@ -202,11 +200,13 @@ class Notes:
         )
 
     def foreign(self, obj: Any) -> None:
-        self._each(
+        self._add(
             FindingCode.FOREIGN_COMPONENT,
-            obj,
+            self._path_of(obj),
             Severity.WARNING,
-            "was imported by another add-on (A2plus) without a link and is not counted",
+            "A2plus imported parts that name no FreeCAD file; they are own parts of this file",
+            obj,
+            "these are: {users}",
         )
 
     def sub_element(self, link: Any, element: str) -> None:
@@ -226,18 +226,23 @@ class Notes:
         )
 
     def in_document(self, link: Any, target: Any, *, leads_back: bool = False) -> None:
-        """A link within the file that brings no component.
+        """A link within the file that brings nothing.
 
         leads_back
             to what holds the link, which FreeCAD cannot show.
         """
-        what = "what holds it, and brings nothing" if leads_back else "construction geometry, not counted"
-        self._each(
-            FindingCode.IN_DOCUMENT_LINK,
-            link,
-            Severity.WARNING if leads_back else Severity.INFO,
-            f"links to {label_of(target)} in this same file: {what}",
-        )
+        if leads_back:
+            text = f"links to {label_of(target)} in this same file: what holds it, and brings nothing"
+            self._each(FindingCode.IN_DOCUMENT_LINK, link, Severity.WARNING, text)
+        else:
+            self._add(
+                FindingCode.IN_DOCUMENT_LINK,
+                self._path_of(link),
+                Severity.INFO,
+                "Links within the file lead to what is no part: construction geometry, not counted",
+                link,
+                "these are: {users}",
+            )
 
     def consumed(self, obj: Any, feature: Any) -> None:
         self._each(
@@ -290,15 +295,14 @@ class Notes:
 
     def newer(self, document: Any) -> None:
         """A file that a FreeCAD saved which nothing here was tested with."""
-        saved_by = getattr(document, "ProgramVersion", "") or ""
-        found = _VERSION.match(saved_by)
-        if found and (int(found[1]), int(found[2])) > NEWEST_TESTED:
-            major, minor = NEWEST_TESTED
+        version = saved_by(getattr(document, "ProgramVersion", ""))
+        if version > NEWEST_TESTED:
+            texts = [".".join(map(str, one)) for one in (version, NEWEST_TESTED)]
             self._add(
                 FindingCode.NEWER_FREECAD,
                 "",
                 Severity.INFO,
-                f"Saved by FreeCAD {found[0]}, newer than {major}.{minor}, the newest tested",
+                f"Saved by FreeCAD {texts[0]}, newer than {texts[1]}, the newest tested",
                 _Whole(document),
                 "the files: {users}",
             )
@@ -316,20 +320,28 @@ class Notes:
     def _each(self, code: FindingCode, obj: Any, severity: Severity, text: str) -> None:
         self._add(code, str(self._place(obj)), severity, f"{label_of(obj)} {text}.", obj)
 
-    def local_geometry(self, container: Any, objects: Sequence[Any]) -> None:
-        """One finding per assembly: what is modelled in its own file is no component."""
-        if not objects:
+    def own_parts(self, container: Any, lines: Sequence[BomEntry]) -> None:
+        """One finding per assembly: what it shows of its own file is no item yet."""
+        if not lines:
             return
-        labels = sorted(label_of(obj) for obj in objects)
-        what = "object is" if len(labels) == 1 else "objects are"
+        links = sum(line.quantity for line in lines)
+        what = "1 own part is no item" if len(lines) == 1 else f"{len(lines)} own parts are not items"
         self._add(
             FindingCode.LOCAL_GEOMETRY,
             str(self._place(container)),
-            Severity.INFO,
-            f"{len(labels)} {what} modelled in {label_of(container)} itself and not counted: "
-            f"{_names(labels)}.",
+            Severity.WARNING,
+            f"{what} yet in {label_of(container)} (pieces: {links}): "
+            f"{_names(sorted(one.label for one in lines))}. Register them, or set SiloBomExclude on them.",
             container,
         )
+
+    def without_role(self, obj: Any) -> None:
+        """The first law of counting is broken: a fault of this program."""
+        self._each(FindingCode.NO_ROLE, obj, Severity.ERROR, "has no role in the count; please report this")
+
+    def two_roles(self, obj: Any) -> None:
+        """The second law is broken: a fault of this program."""
+        self._each(FindingCode.TWO_ROLES, obj, Severity.ERROR, "counts in two roles; please report this")
 
     def container(self, top: Any) -> None:
         """The links lie in the document itself, in no assembly or part."""
@@ -342,15 +354,8 @@ class Notes:
                 top,
             )
 
-    def empty(self, head: BomEntry, declarable: int = 0) -> None:
-        """``declarable``: objects modelled in the file itself, of which each could be a component."""
+    def empty(self, head: BomEntry) -> None:
         text = f"{head.label} holds no components that are linked from other files, so its BOM is empty."
-        if declarable:
-            what = "1 object is" if declarable == 1 else f"{declarable} objects are"
-            text += (
-                f" {what} modelled in the file itself: declare those that are parts to count them (Register "
-                "Parts in FreeCAD, or silo-mod register)."
-            )
         place = Place(head.doc_path, head.object_name)
         self._notes[FindingCode.EMPTY_BOM, ""] = _Note(Severity.WARNING, text, users={place: head.label})
 

@@ -7,14 +7,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from silo.bom.document import (
     LinkProblem,
     derived,
+    first_of,
     is_element_name,
+    label_of,
     located,
     object_name,
     own,
@@ -22,7 +24,7 @@ from silo.bom.document import (
     split_sub_name,
 )
 from silo.bom.findings import FindingCode
-from silo.bom.walk.arrays import array_count, elements
+from silo.bom.walk.kinds import COMPONENTS, Kind, array_count, elements, is_array, kind_of
 
 Inspect = Callable[[Any], "LinkProblem | None"]
 
@@ -31,11 +33,28 @@ _MAX_HOPS = 256
 _MAX_NESTING = 16
 
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One object on the way of a link: a link, or a container that a sub-name passes through.
+
+    index
+        the one element that is meant of the array ``obj``.
+    by_link
+        its own placement counts only if the link before it says so (``LinkTransform``).
+    """
+
+    obj: Any
+    index: int | None = None
+    by_link: bool = False
+
+
 class Target(NamedTuple):
     """The end of a link. ``obj`` is None where ``problem`` says why.
 
     instances
         every array on the way multiplies, an element of an array is one.
+    variant
+        the changed copy that is shown (copy on change); None where the target itself is.
     element
         the sub-element ("Face1") where the link is a reference to geometry, not a component.
     excluded
@@ -45,10 +64,12 @@ class Target(NamedTuple):
     obj: Any
     instances: int = 1
     mirrored: bool = False
-    variant: bool = False
+    variant: Any = None
     excluded: bool = False
     element: str = ""
     problem: LinkProblem | None = None
+    way: tuple[Step, ...] = ()
+    by_link: bool = False
 
 
 @dataclass(slots=True)
@@ -72,6 +93,7 @@ class _Hop:
     element: str = ""
     index: int | None = None
     problem: LinkProblem | None = None
+    through: tuple[Step, ...] = ()
 
 
 def is_link(obj: object) -> bool:
@@ -82,11 +104,6 @@ def is_link(obj: object) -> bool:
 def is_assembly_link(obj: object) -> bool:
     """An instance of an assembly (FreeCAD >= 1.0); derived from App::Part, so ask this first."""
     return derived(obj, "Assembly::AssemblyLink")
-
-
-def first_of(linked: Any) -> Any:
-    """The object of a ``LinkedObject``, which is a tuple (object, sub-name) where there is a sub-name."""
-    return linked[0] if isinstance(linked, tuple) else linked
 
 
 def is_excluded(obj: object) -> bool:
@@ -154,7 +171,9 @@ def _is_elsewhere(target: Any, link: Any) -> bool:
 def _resolve(link: object, trail: _Trail) -> Target:
     current: Any = link
     index: int | None = None
-    count, mirrored, variant, excluded, element = 1, False, False, False, ""
+    count, mirrored, excluded, element, by_link = 1, False, False, "", False
+    variant: Any = None
+    way: list[Step] = []
     while True:
         if is_link(current):
             count *= array_count(current) if index is None else 1
@@ -162,35 +181,41 @@ def _resolve(link: object, trail: _Trail) -> Target:
         elif derived(current, "App::LinkElement"):
             mirrored ^= _scaled_negative(current)
         elif not is_assembly_link(current):
-            return Target(current, count, mirrored, variant, excluded, element)
+            return Target(current, count, mirrored, variant, excluded, element, None, tuple(way), by_link)
         trail.hops -= 1
         if trail.hops < 0:
             raise _EndlessError
-        hop, is_variant = _next_hop(current, trail)
+        if variant is None:  # which is what is shown, wherever its original leads
+            way.append(Step(current, index, by_link))
+        hop, copy = _next_hop(current, trail)
         if hop.problem is not None:
             return Target(None, count, mirrored, variant, excluded, element, hop.problem)
+        if variant is None:
+            way += hop.through
+            by_link, variant = not hop.through, copy
         current, index = hop.obj, hop.index
-        variant = variant or is_variant
         element = element or hop.element
         excluded = excluded or is_excluded(current)
 
 
-def _next_hop(link: Any, trail: _Trail) -> tuple[_Hop, bool]:
-    """Where a link leads, and whether it shows a variant (a changed copy) of that."""
+def _next_hop(link: Any, trail: _Trail) -> tuple[_Hop, Any]:
+    """Where a link leads, and the changed copy of that which it shows instead."""
     linked = getattr(link, "LinkedObject", None)
-    source = first_of(own(link, "LinkCopyOnChangeSource"))
+    source, copy = first_of(own(link, "LinkCopyOnChangeSource")), first_of(linked)
     if source is not None:
-        # LinkedObject is then a local copy with other parameters (facts §1.2).
-        return _Hop(source), first_of(linked) is not source
+        # LinkedObject is then a changed local copy (facts §1.2): of a standard part another one.
+        if copy is None or copy is source or kind_of(copy) is Kind.STANDARD:
+            return _Hop(source if copy is None else copy), None
+        return _Hop(source), copy
     if linked is None:
-        return _Hop(None, problem=_no_target(link, trail.inspect)), False
+        return _Hop(None, problem=_no_target(link, trail.inspect)), None
     if isinstance(linked, tuple):
         if linked[0] is None:
-            return _Hop(None, problem=_no_target(link, trail.inspect)), False
-        return _follow_sub(linked[0], linked[1], trail), False
+            return _Hop(None, problem=_no_target(link, trail.inspect)), None
+        return _follow_sub(linked[0], linked[1], trail), None
     if _lost_its_source(link, linked):
-        return _Hop(None, problem=_no_source(link, trail.inspect)), True
-    return _Hop(linked), False
+        return _Hop(None, problem=_no_source(link, trail.inspect)), None
+    return _Hop(linked), None
 
 
 def _lost_its_source(link: object, target: object) -> bool:
@@ -227,10 +252,12 @@ def _follow_sub(start: Any, sub: Any, trail: _Trail) -> _Hop:
     """Follow a sub-name such as ``Inner.``, ``Sub.Bolt.``, ``$Label.``, ``3.`` or ``Face1``."""
     steps, element = split_sub_name(sub)
     current, index = start, None
+    through: list[Step] = []
     for step in steps:
         if step.isdigit():
             index = int(step)
             continue
+        through.append(Step(current, index, not through))
         hop = _child(current, step, trail)
         if hop.problem is not None:
             return hop
@@ -241,8 +268,9 @@ def _follow_sub(start: Any, sub: Any, trail: _Trail) -> _Hop:
         and (named := _child(current, element, trail).obj) is not None
     ):
         # FreeCAD writes object names with a dot behind; people and scripts forget it.
+        through.append(Step(current, index, not through))
         current, element = named, ""
-    return _Hop(current, element, index if is_link(current) else None)
+    return _Hop(current, element, index if is_link(current) else None, through=tuple(through))
 
 
 def _child(parent: Any, name: str, trail: _Trail) -> _Hop:
@@ -278,3 +306,89 @@ def _member(holder: Any, name: str) -> Any:
             if getattr(member, attribute, None) == wanted:
                 return member
     return None
+
+
+# --- an AssemblyLink's own ``Group`` ---
+#
+# Copies of what its assembly held when it was last recomputed. They are never counted. Where they differ
+# from the assembly as it is now, what a person sees is old (measured: opening and recomputing the parent does
+# not mend it, facts §1.4). Each copy points at the object that it stands for, except that FreeCAD 1.1 copies
+# a link array as an array of its own of the same part (measured).
+
+
+def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tuple[list[str], list[str]]:
+    """Labels of what the copies still show though it is gone, and of what they lack; sorted.
+
+    link
+        the AssemblyLink.
+    assembly
+        what it stands for in the end.
+    """
+    originals = _originals(link, assembly)
+    own = {key(part) for part in own_parts(link, assembly, key)}
+    copies = [copy for copy in _group(link) if kind_of(copy) in COMPONENTS and key(copy) not in own]
+    if not copies:  # never recomputed: nothing is shown, so nothing is wrong
+        return [], []
+    by_key = {key(original): original for original in originals}
+    arrays = _arrays(originals, key)
+    shown: set[Hashable] = set()
+    gone: list[str] = []
+    for copy in copies:
+        end = first_of(getattr(copy, "LinkedObject", None))
+        if end is not None and key(end) in by_key:
+            shown.add(key(end))
+        elif end is not None and is_array(copy) and (same := arrays.get((key(end), array_count(copy)))):
+            shown.add(same.pop())
+        else:
+            gone.append(label_of(copy))
+    lacking = [
+        label_of(original)
+        for name, original in by_key.items()
+        if name not in shown and kind_of(original) in COMPONENTS
+    ]
+    return sorted(gone), sorted(lacking)
+
+
+def own_parts(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> list[Any]:
+    """What somebody put into a flexible AssemblyLink himself: standard parts, and links that are no copies.
+
+    A copy leads to an object of the assembly's file, most often a link. A link array of FreeCAD 1.1 leads to
+    the part itself, so an array is taken for a copy.
+    """
+    source = first_of(getattr(link, "LinkedObject", None))
+    documents = [one.Document for one in (assembly, source) if one is not None]
+    originals = {key(one) for one in _originals(link, assembly)}
+    parts = []
+    for member in _group(link):
+        kind = kind_of(member)
+        if kind is Kind.STANDARD:
+            parts.append(member)
+        elif kind in COMPONENTS and not is_array(member):
+            end = first_of(getattr(member, "LinkedObject", None))
+            if end is None or key(end) in originals or is_link(end) or is_assembly_link(end):
+                continue
+            if not any(same_document(end.Document, document) for document in documents):
+                parts.append(member)
+    return parts
+
+
+def _originals(link: Any, assembly: Any) -> list[Any]:
+    source = first_of(getattr(link, "LinkedObject", None))
+    return list(_group(source if is_assembly_link(source) else assembly))
+
+
+def _group(container: Any) -> Iterable[Any]:
+    return getattr(container, "Group", None) or ()
+
+
+def _arrays(
+    originals: Iterable[Any], key: Callable[[Any], Hashable]
+) -> dict[tuple[Hashable, int], list[Hashable]]:
+    """Link arrays by what they repeat, and how often."""
+    arrays: dict[tuple[Hashable, int], list[Hashable]] = {}
+    for original in originals:
+        if is_link(original) and is_array(original):
+            ends = (first_of(getattr(original, "LinkedObject", None)), resolve_target(original).obj)
+            for end in {key(end) for end in ends if end is not None}:
+                arrays.setdefault((end, array_count(original)), []).append(key(original))
+    return arrays

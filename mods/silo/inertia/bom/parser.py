@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A BOM CSV → :class:`BomTable`. Tolerant of shapes, strict about meaning: what is unclear is a warning."""
+"""A BOM file → :class:`BomTable`. Tolerant of shapes, strict about meaning: what is unclear is a warning."""
 
 from __future__ import annotations
 
@@ -10,14 +10,183 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-from silo.bom.errors import InputError
+from silo.bom.errors import InputError, counted
 from silo.bom.headers import Role, find_clashes
 from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
-from silo.inertia.bom.masscolumn import MassReader
-from silo.inertia.bom.masses import is_empty, unit_factor
-from silo.inertia.bom.rows import BomCode, BOMEntry, BomTable, BomWarning
-from silo.inertia.bom.sheet import Row, Sheet, read_sheet
-from silo.inertia.wording import counted
+from silo.inertia.bom.masses import (
+    FORCE_UNITS,
+    MassCell,
+    column_mark,
+    is_empty,
+    parse_mass,
+    read_mass_header,
+    unit_factor,
+)
+from silo.inertia.bom.sheet import MASS_COLUMNS, Sheet, read_sheet
+from silo.inertia.bom.table import BomCode, BOMEntry, BomTable, BomWarning
+from silo.inertia.bom.workbook import Row
+
+_TOTAL_TOLERANCE = 1e-3
+"""Relative, beside the rounding of both columns: how far a total may be from quantity times mass."""
+
+
+class MassReader:
+    """Reads the mass of one piece of each row: its own column first, else the total over the quantity.
+
+    ``mark`` and ``unit`` are the user's word; a unit in a header wins over ``unit``, one in a cell over both.
+    Every doubt becomes one of the ``warnings``.
+    """
+
+    def __init__(self, sheet: Sheet, mark: Mark | None, unit: str | None, warnings: list[BomWarning]) -> None:
+        self._columns = sheet.columns
+        self._warnings = warnings
+        self._unit = unit
+        self._marks = {
+            role: mark or column_mark(sheet.columns.cell(row.cells, role) for row in sheet.rows)
+            for role in MASS_COLUMNS
+        }
+        # Without any proof: a file that separates cells by semicolons does so because its commas are decimal.
+        self._likely = Mark.COMMA if sheet.delimiter == ";" else Mark.POINT
+        # Programs that separate by commas write points; nothing else says where a file comes from.
+        self._points_are_decimal = sheet.delimiter == ","
+        self._cells: dict[int, tuple[MassCell, MassCell]] = {}
+        self._reported: set[BomCode] = set()
+        self._unit_role = self._find_units(sheet)
+
+    def _find_units(self, sheet: Sheet) -> Role:
+        """Return the column of the masses' units. A column "Unit" is of the quantities if it has pieces."""
+        cell, at = sheet.columns.cell, sheet.columns.at
+        if Role.MASS_UNIT in at or Role.UNIT not in at or any(h.unit for h in sheet.columns.masses.values()):
+            return Role.MASS_UNIT
+        bare = [row for row in sheet.rows if any(cell(row.cells, role) for role in MASS_COLUMNS)]
+        units = {unit for row in bare if (unit := cell(row.cells, Role.UNIT))}
+        masses = {unit for unit in units if unit_factor(unit) is not None}
+        if not masses:
+            return Role.MASS_UNIT
+        title = sheet.header[at[Role.UNIT]].strip()
+        words = f"the column “{title}” was read as the unit of the masses"
+        if masses != units:
+            words = (
+                f"the column “{title}” has units of mass ({', '.join(sorted(masses))}) beside others; "
+                "it was read as the unit of the quantities, and not of the masses"
+            )
+        self._report(BomCode.FILE, words, sheet.header_line, "")
+        return Role.UNIT if masses == units else Role.MASS_UNIT
+
+    def _report(self, code: BomCode, message: str, line: int, name: str, *, once: bool = False) -> None:
+        if not (once and code in self._reported):
+            self._warnings.append(BomWarning(code, message, line, name))
+            self._reported.add(code)
+
+    def read(self, row: Row, name: str, quantity: float | None) -> MassCell:
+        """Return the mass of one piece."""
+        one, total = (self._cell(role, row, name) for role in MASS_COLUMNS)
+        self._cells[row.line] = one, total
+        if one.kg is not None or total.kg is None:
+            return one
+        if quantity:
+            return replace(total, kg=total.kg / quantity, quantum_kg=total.quantum_kg / quantity)
+        words = "there is a total mass only, and no quantity to divide it by; it is not used"
+        self._report(BomCode.UNREADABLE_MASS, words, row.line, name)
+        return MassCell()
+
+    def to_display_precision(self, rows: Sequence[BOMEntry]) -> list[BOMEntry]:
+        """Return the quantum of the column's finest cell of the same unit, for all: exports trim trailing
+        zeros.
+
+        "0.3 kg" beside "0.009 kg" was shown with three decimals as well, so that it is ± 0.0005 kg.
+        """
+        if self._columns.exact:
+            return [replace(row, quantum_kg=0.0) for row in rows]
+        finest: dict[str, float] = {}
+        for row in rows:
+            unit = self._cells[row.line][0].unit
+            if self._is_own(row) and row.quantum_kg > 0:
+                finest[unit] = min(finest.get(unit, row.quantum_kg), row.quantum_kg)
+        return [
+            replace(row, quantum_kg=finest.get(self._cells[row.line][0].unit, 0.0))
+            if self._is_own(row)
+            else row
+            for row in rows
+        ]
+
+    def _is_own(self, row: BOMEntry) -> bool:
+        """Report whether the mass of one piece stands in the file, and is no share of a total."""
+        return self._cells[row.line][0].kg is not None
+
+    def _cell(self, role: Role, row: Row, name: str) -> MassCell:
+        header = self._columns.masses.get(role)
+        if header is None:
+            return MassCell()
+        text = self._columns.cell(row.cells, role)
+        unit = header.unit or self._columns.cell(row.cells, self._unit_role) or self._unit
+        cell = parse_mass(text, mark=self._marks[role], unit=unit)
+        if cell.ambiguous:
+            cell = self._decide(text, unit, row, name)
+        if cell.doubt:
+            self._report(BomCode.AMBIGUOUS_MASS, f"the mass “{text}” {cell.doubt}", row.line, name)
+        if cell.problem is not None:
+            words = f"the mass “{text}” {cell.problem}; it is not used"
+            self._report(BomCode.UNREADABLE_MASS, words, row.line, name)
+        if cell.kg is None:
+            return cell
+        if not cell.unit:
+            known = f"and “{header.strange}” in its header is no known unit"
+            words = f"the mass “{text}” has no unit, {known if header.strange else 'nor has its header'}"
+            self._report(BomCode.MASS_WITHOUT_UNIT, f"{words}; read as kg", row.line, name, once=True)
+        if cell.unit in FORCE_UNITS:
+            words = f"“{cell.unit}” is a unit of force; masses are what weighs as much at 9.80665 m/s²"
+            self._report(BomCode.FILE, words, row.line, name, once=True)
+        return cell
+
+    def _decide(self, text: str, unit: str | None, row: Row, name: str) -> MassCell:
+        likely, unlikely = (
+            parse_mass(text, mark=mark, unit=unit) for mark in (self._likely, self._likely.other)
+        )
+        if "," not in text and self._points_are_decimal:
+            return likely
+        self._report(
+            BomCode.AMBIGUOUS_MASS,
+            f"the mass “{text}” was read as {likely.kg:.9g} kg but could be {unlikely.kg:.9g} kg, "
+            "and no other mass shows which mark is the decimal one; say so with --decimal",
+            row.line,
+            name,
+        )
+        return replace(likely, ambiguous=True)
+
+    def check_totals(self, table: BomTable) -> tuple[BOMEntry, ...]:
+        """Return the rows; a total that may be of one parent or of the whole product makes a row unsure."""
+        return tuple(self._checked(row, table) for row in table.rows)
+
+    def _checked(self, row: BOMEntry, table: BomTable) -> BOMEntry:
+        total = self._cells[row.line][1]
+        above = table.ancestors(row)
+        if total.kg is None or row.mass_kg is None or not row.quantity:
+            return row
+        if not self._is_own(row):
+            if all(parent.quantity == 1 for parent in above):
+                return row
+            words = (
+                f"the total mass was divided by the {row.quantity:g} pieces in one “{above[0].name}”; "
+                "if it is the total of the whole product, one piece weighs less"
+            )
+            self._report(BomCode.AMBIGUOUS_MASS, words, row.line, row.name)
+            return replace(row, unsure=True)
+        # Of the row, or of the whole product (Silo's own export): what fits is meant.
+        counts = {row.quantity, table.total_quantity(row) or row.quantity}
+        if not any(_agree(row, count, total) for count in counts):
+            words = (
+                f"the total mass says {total.kg:.6g} kg, but {row.quantity:g} times {row.mass_kg:.6g} kg is "
+                f"{row.mass_kg * row.quantity:.6g} kg; the mass of one piece was used"
+            )
+            self._report(BomCode.TOTAL_DIFFERS, words, row.line, row.name)
+        return row
+
+
+def _agree(row: BOMEntry, count: float, total: MassCell) -> bool:
+    expected = (row.mass_kg or 0.0) * count
+    allowed = row.quantum_kg * count + total.quantum_kg + _TOTAL_TOLERANCE * expected
+    return abs(expected - (total.kg or 0.0)) <= allowed
 
 
 class BOMParser:
@@ -32,7 +201,7 @@ class BOMParser:
     decimal
         "." or ",".
     mass_unit
-        of mass cells without a unit, where the header states none either (else kg, with a warning).
+        of mass cells without a unit, if the header states none either (else kg, with a warning).
     """
 
     def __init__(
@@ -47,7 +216,7 @@ class BOMParser:
         if decimal not in (None, ".", ","):
             raise InputError(f"the decimal mark is “.” or “,”, got “{decimal}”")
         if mass_unit is not None and unit_factor(mass_unit) is None:
-            raise InputError(f"“{mass_unit}” is no unit of mass; known are kg, g, mg, t, lb, oz, slug")
+            raise InputError(f"“{mass_unit}” is no unit of mass; known are kg, g, mg, t, lb, oz")
         self._columns = columns
         self._encoding = encoding
         self._delimiter = delimiter
@@ -55,7 +224,7 @@ class BOMParser:
         self._mass_unit = mass_unit
 
     def parse(self, path: Path | str) -> BomTable:
-        """Read a file. InputError where it is absent, or has no header with names; all else is a warning."""
+        """Read a file. InputError if it is absent, or has no header with names; all else is a warning."""
         try:
             data = Path(path).read_bytes()
         except OSError as error:
@@ -63,7 +232,7 @@ class BOMParser:
         return self.parse_bytes(data, str(path))
 
     def parse_bytes(self, data: bytes, source: str = "BOM") -> BomTable:
-        """As :meth:`parse`, from bytes."""
+        """Do as :meth:`parse`, from bytes."""
         sheet = read_sheet(
             data,
             source,
@@ -114,7 +283,7 @@ def _entry(
 
 
 def _indented(rows: list[BOMEntry], sheet: Sheet, warnings: list[BomWarning]) -> list[BOMEntry]:
-    """The rows with levels by the spaces before their names, where nothing else gives a structure.
+    """Return the rows with levels by the spaces before their names, if nothing else gives a structure.
 
     Steps of two spaces or more, never two steps down at once: a stray space makes no sub-assembly.
     """
@@ -152,7 +321,7 @@ def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> fl
 
 
 def _item_role(sheet: Sheet) -> Role:
-    """The column of item numbers; some tools call it the level: 1, 1.1, 1.1.2."""
+    """Return the column of item numbers; some tools call it the level: 1, 1.1, 1.1.2."""
 
     def dotted(role: Role) -> bool:
         return any(re.fullmatch(r"\d+(?:\.\d+)+", sheet.columns.cell(r.cells, role)) for r in sheet.rows)
@@ -161,7 +330,7 @@ def _item_role(sheet: Sheet) -> Role:
 
 
 def _level(text: str, item_role: Role, line: int, name: str, warnings: list[BomWarning]) -> int:
-    """ "2", "..2" and "+2" are one below "1". Item numbers (1.1) are no levels."""
+    """Read a level: "2", "..2" and "+2" are one below "1". Item numbers (1.1) are no levels."""
     found = re.fullmatch(r"[\s.+>·-]*(\d{1,3})[\s.]*", text)
     if found is None and text and item_role is not Role.LEVEL:
         words = f"the level “{text}” cannot be read; the row is taken to stand at the top"
@@ -170,13 +339,15 @@ def _level(text: str, item_role: Role, line: int, name: str, warnings: list[BomW
 
 
 def _check_length(sheet: Sheet, row: Row, name: str, warnings: list[BomWarning]) -> None:
+    if not sheet.delimiter:
+        return  # a workbook's cells stand where they stand
     if any(cell.strip() for cell in row.cells[len(sheet.header) :]):
         what = "a comma without quotes shifts the columns"
     elif len(row.cells) <= max(sheet.columns.at.values()):
         what = "the missing ones count as empty"
     else:
         return
-    words = f"has {counted(len(row.cells), 'cell')} where the header has {len(sheet.header)}; {what}"
+    words = f"has {counted(len(row.cells), 'cell')}, and the header has {len(sheet.header)}; {what}"
     warnings.append(BomWarning(BomCode.ROW_LENGTH, words, row.line, name))
 
 
@@ -184,18 +355,31 @@ def _doubtful_columns(sheet: Sheet) -> Iterator[BomWarning]:
     at = sheet.columns.at
     for role, header in sheet.columns.masses.items():
         if header.rate:
-            words = f"“{sheet.header[at[role]].strip()}” is no mass by its header, and was taken for one"
+            words = f"“{sheet.header[at[role]].strip()}” is no mass by its header, and was used as one"
             yield BomWarning(BomCode.FILE, words, sheet.header_line)
     seen = ", ".join(cell.strip() for cell in sheet.header if cell.strip())
+    unused = [
+        index
+        for index in sheet.columns.unused
+        if any(parse_mass(cell).kg is not None for row in sheet.rows for cell in row.cells[index : index + 1])
+    ]
+    titles = [sheet.header[index].strip() for index in unused]
     for what, known in (("mass", sheet.columns.masses), ("material", Role.MATERIAL in at)):
         if not known:
             words = f"there is no {what} column (the columns are {seen}); "
-            words += f"if one of them is it, say --column {what}=…"
+            words += (
+                f"if one of them is it, say --column {what}={titles[0] if what == 'mass' and titles else '…'}"
+            )
             yield BomWarning(BomCode.MISSING_COLUMN, words, sheet.header_line)
+    for title in titles if sheet.columns.masses else ():
+        words = f"the column “{title}” may hold masses, and was not used; --column mass={title} takes it"
+        if read_mass_header(title).rate:
+            words = f"the column “{title}” holds no masses of one piece, and was not used"
+        yield BomWarning(BomCode.UNUSED_COLUMN, words, sheet.header_line)
 
 
 def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
-    """Columns that mean the same as one that is used, and say something else somewhere."""
+    """Warn of columns that mean the same as one that is used, and say something else somewhere."""
     cells = [row.cells for row in sheet.rows]
     for one in find_clashes(sheet.header, cells, sheet.columns.at, sheet.columns.others, is_empty):
         yield BomWarning(
@@ -208,7 +392,10 @@ def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
 
 
 def _doubtful_items(rows: Sequence[BOMEntry]) -> Iterator[BomWarning]:
-    """Item numbers that a spreadsheet may have changed: 1.10 to 1.1, and 1.2 to the second of January."""
+    """Warn of item numbers that a spreadsheet may have changed.
+
+    1.10 to 1.1, and 1.2 to the second of January.
+    """
     if not any("." in row.item for row in rows):
         return
     first: dict[str, int] = {}
@@ -244,7 +431,7 @@ _ITEM = re.compile(r"\d+(?:\.\d+)*")
 
 
 def with_structure(rows: Sequence[BOMEntry]) -> tuple[BOMEntry, ...]:
-    """The rows with ``parent``, ``level`` and ``has_children`` filled in.
+    """Return the rows with ``parent``, ``level`` and ``has_children`` filled in.
 
     Item numbers win over levels. A row whose parent is not in the file (a flattened list, a cut-out) stands
     at the top: nothing is invented for it.
@@ -275,7 +462,7 @@ def _by_item(rows: Sequence[BOMEntry]) -> list[int | None]:
 
 
 def _by_level(rows: Sequence[BOMEntry]) -> list[int | None]:
-    """A row's parent is the last row above it that is one level up (levels may start at 0 or 1)."""
+    """Return parents: the last row above that is one level up (levels may start at 0 or 1)."""
     stack: list[tuple[int, int]] = []
     parents: list[int | None] = []
     for index, row in enumerate(rows):

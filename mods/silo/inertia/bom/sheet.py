@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Bytes of a CSV export or a workbook → a header and rows with their line numbers.
+"""Bytes of a CSV export or a workbook → a header, rows with their line numbers, what each column holds.
 
-Encoding and delimiter are found out; a workbook's sheets become CSV first. The order of the tries: a byte
-order mark decides; then UTF-8; then the Windows code pages. A delimiter is right when a line under it reads
-as a header; nothing is concluded from counting commas.
+Encoding and delimiter of a CSV file are found out. The order of the tries: a byte order mark decides; then
+UTF-8; then the Windows code pages. A delimiter is right if a line under it reads as a header; nothing is
+concluded from counting commas. Columns are found by :mod:`silo.bom.headers`, or by the user's word.
 """
 
 from __future__ import annotations
@@ -11,14 +11,15 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, replace
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import islice, zip_longest
 
-from silo.bom.errors import InputError
-from silo.bom.headers import Role
-from silo.inertia.bom.columns import Columns, find_columns, read_mass_header
-from silo.inertia.bom.workbook import STARTS, SheetText, read_workbook
+from silo.bom.errors import InputError, counted, listed
+from silo.bom.headers import Role, alias, normal, plain_cell
+from silo.inertia.bom.masses import MassHeader, read_mass_header
+from silo.inertia.bom.workbook import STARTS, Grid, Row, read_workbook
 
 MAX_BYTES = 64 * 1024 * 1024
 HEADER_WITHIN = 40
@@ -28,13 +29,97 @@ DELIMITERS = ",;\t|"
 _NUMBER = re.compile(r"[\s+\-−~(]*[\d.,]")
 _CODE_PAGES = ("cp1252", "cp932", "gb18030", "latin-1")
 
+ROLES = (
+    *(Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION, Role.MATERIAL, Role.MASS, Role.TOTAL_MASS),
+    *(Role.QUANTITY, Role.ITEM, Role.LEVEL, Role.FIND_NUMBER, Role.MASS_UNIT, Role.UNIT),
+)
+"""What a mass calculation reads of a BOM."""
+
+MASS_COLUMNS = (Role.MASS, Role.TOTAL_MASS)
+_ONE_ONLY = (*MASS_COLUMNS, Role.MATERIAL, Role.QUANTITY)
+_NAMES = (Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION)
+_SILOS_OWN = {"part number", "total quantity", "unreferenced since"}
+
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """Cells of one record and the line of the file that it begins on (1 = first)."""
+class Columns:
+    """Where each role is (column index), and what the headers of the mass columns say.
 
-    line: int
-    cells: tuple[str, ...]
+    others
+        columns that mean a quantity, a mass or a material as well, and lost to the one that is used.
+    unused
+        columns that may hold masses by their headers, and whose role nobody knows.
+    exact
+        masses are written in full (Silo's own export does so): a short one was not rounded.
+    """
+
+    at: Mapping[Role, int]
+    masses: Mapping[Role, MassHeader]
+    others: tuple[tuple[Role, int], ...]
+    unused: tuple[int, ...]
+    exact: bool
+
+    def cell(self, row: Sequence[str], role: Role) -> str:
+        """Return the row's cell for a role; "" if there is no such column or the row is too short.
+
+        An apostrophe that keeps a spreadsheet from running the cell as a formula is no part of it.
+        """
+        index = self.at.get(role)
+        return plain_cell(row[index].strip()) if index is not None and index < len(row) else ""
+
+    @property
+    def usable(self) -> bool:
+        """Report whether rows can be distinguished: by name, part number or description."""
+        return not self.at.keys().isdisjoint(_NAMES)
+
+
+def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) -> Columns:
+    """Find the roles of a header line. ``given``: role → header text, from the user; it wins over aliases.
+
+    A role found twice goes to the column whose name fits best, then to the first. Raises
+    InputError for a role that does not exist.
+    """
+    unknown = sorted((given or {}).keys() - ROLES)
+    if unknown:
+        raise InputError(
+            f"unknown column role {', '.join(unknown)}; the roles are {', '.join(sorted(ROLES))}"
+        )
+    wanted = {Role(role): normal(text) for role, text in (given or {}).items()}
+    plain = [normal(cell) for cell in header]
+    at = {role: plain.index(text) for role, text in wanted.items() if text in plain}
+    taken = set(at.values())
+    best: dict[Role, int] = {}
+    seen: list[tuple[Role, int]] = []
+    unused: list[int] = []
+    for index, cell in enumerate(header):
+        found = _role_of(cell)
+        if index in taken:
+            continue
+        if found is None:
+            if read_mass_header(cell).names_masses:
+                unused.append(index)
+        elif found[0] not in wanted:
+            role, rank = found
+            seen.append((role, index))
+            if rank < best.get(role, sys.maxsize):
+                at[role], best[role] = index, rank
+    masses = {role: read_mass_header(header[at[role]]) for role in MASS_COLUMNS if role in at}
+    others = tuple((role, i) for role, i in seen if role in _ONE_ONLY and at[role] != i)
+    return Columns(at, masses, others, tuple(unused), set(plain) >= _SILOS_OWN)
+
+
+def _role_of(cell: str) -> tuple[Role, int] | None:
+    """Return role and rank of a header: "Mass", "Mass (g)", "mass_kg", "Gewicht in kg", "Summe Masse"."""
+    found = alias(normal(cell.replace("/", " per ")))  # "Mass/unit" is no unit of a mass
+    if found is not None and found[0] not in MASS_COLUMNS:
+        return found if found[0] in ROLES else None
+    header = read_mass_header(cell)
+    if header.unit and not header.title and (found is None):
+        found = Role.MASS, sys.maxsize - 1  # "kg", "[g/pc]", "Total kg"
+    found = found or alias(header.title)
+    if found is None or found[0] not in MASS_COLUMNS or header.rate:
+        return None
+    return (Role.TOTAL_MASS, found[1]) if header.total else found
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +134,13 @@ class Sheet:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class _Header:
+    delimiter: str
+    index: int
+    columns: Columns
+
+
 def read_sheet(
     data: bytes,
     source: str,
@@ -61,140 +153,162 @@ def read_sheet(
 
     ``columns``, ``encoding``, ``delimiter``: the user's word, else found out.
 
-    Raises InputError where there is no header line with a column to tell parts apart by, or where the given
+    Raises InputError if there is no header line with a column that distinguishes parts, or if the given
     encoding does not fit; the message lists what was seen.
     """
     if len(data) > MAX_BYTES:
         raise InputError(f"{source}: {len(data) / 1e6:.0f} MB is no BOM (limit {MAX_BYTES / 1e6:.0f} MB)")
     if delimiter is not None and len(delimiter) != 1:
         raise InputError(f"a delimiter is one character, got “{delimiter}”")
-    workbook = data.startswith(STARTS)
-    marks = "," if workbook else delimiter or DELIMITERS
-    texts = _workbook(data, source, columns) if workbook else _decodings(data, encoding, source)
-    first_lines = ""
-    for found in texts:
-        text = found.text
+    first_lines: list[str] = []
+    if data.startswith(STARTS):
+        sheets = [(grid, grid.rows()) for grid in read_workbook(data, source)]
+        usable = [
+            (grid, rows, best)
+            for grid, rows in sheets
+            if (best := _best_header([("", rows[:HEADER_WITHIN])], columns)) is not None
+        ]
+        if usable:
+            notes = []
+            if usable[1:]:
+                others = ", ".join(f"sheet “{grid.name}”" for grid, _, _ in usable[1:])
+                notes = [f"sheet “{usable[0][0].name}” of the workbook was read; not read: {others}"]
+            grid, rows, best = usable[0]
+            return _sheet(rows, best, columns, notes, grid)
+        first_lines = [", ".join(row.cells) for _, rows in sheets for row in rows]
+    for name, text in () if data.startswith(STARTS) else _decodings(data, encoding, source):
         if text.lstrip()[:1] == "<":
             raise InputError(f"{source}: this is HTML or XML and no table; export it as CSV or XLSX")
-        first_lines = first_lines or text
-        best = _best_header(text, marks, columns)
+        first_lines = first_lines or text.splitlines()
+        tables = ((mark, _first_records(text, mark)) for mark in delimiter or DELIMITERS)
+        best = _best_header(tables, columns)
         if best is not None:
-            return _sheet(found, best, data, columns)
-    raise InputError(_no_header(source, first_lines))
+            notes = []
+            if name in _CODE_PAGES and not data.isascii():
+                notes.append(
+                    f"the file is not UTF-8; it was read as {name}. If names look wrong, "
+                    "export it as UTF-8 or say which encoding it has"
+                )
+            bad = _bad_quotes(text, best.delimiter)
+            if bad is not None:
+                words = "the quotes do not match; rows from here on may be read wrongly or be missing"
+                notes.append(f"line {bad}: {words}")
+            return _sheet(list(_records(text, best.delimiter)), best, columns, notes)
+    raise InputError(f"{source}: {_no_header(first_lines)}")
 
 
-def _workbook(data: bytes, source: str, given: Mapping[str, str] | None) -> Iterator[SheetText]:
-    """The sheets; the first one that holds a BOM names the others that do."""
-    sheets = list(read_workbook(data, source))
-    usable = [sheet.name for sheet in sheets if _best_header(sheet.text, ",", given)]
-    for sheet in sheets:
-        if usable[1:] and sheet.name == usable[0]:
-            note = f"{sheet.name} of the workbook was read; not read: {', '.join(usable[1:])}"
-            sheet = sheet._replace(notes=(*sheet.notes, note))
-        yield sheet
-
-
-@dataclass(frozen=True, slots=True)
-class _Header:
-    delimiter: str
-    index: int
-    columns: Columns
-
-
-def _sheet(found: SheetText, best: _Header, data: bytes, given: Mapping[str, str] | None) -> Sheet:
-    records = list(_records(found.text, best.delimiter))
-    header = records[best.index]
-    columns = best.columns
-    below = records[best.index + 1 : best.index + 2]
-    if below and _continues(header, columns, below[0]):
+def _sheet(
+    records: list[Row],
+    best: _Header,
+    given: Mapping[str, str] | None,
+    notes: list[str],
+    grid: Grid | None = None,
+) -> Sheet:
+    header, columns, first = records[best.index], best.columns, best.index + 1
+    if _continues(header, columns, records[first:][:1]):
         # "Mass" over "[g]", or over "each" and "total": a merged cell has its text in the first one.
         filled = [next(filter(None, reversed(header.cells[: i + 1])), "") for i in range(len(header.cells))]
+        below = records[first].cells
+        filled += [filled[-1]] * (len(below) - len(filled))
         cells = [
             f"{above} ({under})" if under.strip() else own
-            for above, own, under in zip_longest(filled, header.cells, below[0].cells, fillvalue="")
+            for above, own, under in zip_longest(filled, header.cells, below, fillvalue="")
         ]
-        header = Row(header.line, tuple(cells))
-        columns = find_columns(cells, given)
-        best = replace(best, index=best.index + 1, columns=columns)
-    notes = [*_notes(found.name, data, header, columns, given), *found.notes]
-    notes += _unmerged(records, found.merged, records[best.index].line, set(columns.at.values()))
-    bad = _bad_quotes(found.text, best.delimiter)
-    if bad is not None:
-        notes.append(
-            f"line {bad}: the quotes do not match; rows from here on may be read wrongly or be missing"
-        )
+        header, columns = Row(header.line, tuple(cells)), find_columns(cells, given)
+        first += 1
+    seen = ", ".join(cell.strip() for cell in header.cells if cell.strip())
+    notes += [
+        f"there is no column “{text}” for {role} in line {header.line} ({seen})"
+        for role, text in (given or {}).items()
+        if role not in columns.at
+    ]
+    if grid is not None:
+        records, more = _as_shown(records, grid, header, columns)
+        notes += more
     rows = tuple(
-        r for r in records[best.index + 1 :] if any(c.strip() for c in r.cells) and r.cells != header.cells
+        row for row in records[first:] if any(map(str.strip, row.cells)) and row.cells != header.cells
     )
-    delimiter = "" if data.startswith(STARTS) else best.delimiter
-    return Sheet(header.cells, header.line, columns, rows, delimiter, tuple(notes))
+    return Sheet(header.cells, header.line, columns, rows, best.delimiter, tuple(notes))
 
 
-def _unmerged(
-    records: list[Row], merged: Sequence[tuple[int, int, int]], header: int, used: Set[int]
-) -> Iterator[str]:
-    """Give each line of a merged cell its text. A number may be of all lines together: the first keeps it."""
+def _as_shown(records: list[Row], grid: Grid, header: Row, columns: Columns) -> tuple[list[Row], list[str]]:
+    """Return the records with the texts of merged cells in each of their lines, and what a reader must know.
+
+    A number in a merged cell may be of all lines together: the first keeps it.
+    """
+    used = sorted(columns.at.values())
+    facts = {
+        place: cell for place, cell in grid.cells.items() if place[0] + 1 > header.line and place[1] in used
+    }
+    covered = sorted(grid.covered() & facts.keys())
     at = {row.line: index for index, row in enumerate(records)}
     texts, numbers = [], []
-    for first, last, column in merged:
-        text = (
-            records[at[first]].cells[column].strip()
-            if first > header and first in at and column in used
-            else ""
-        )
-        if not text:
+    for top, column, bottom, _ in sorted(grid.merged):
+        cell = facts.get((top, column))
+        if cell is None or bottom == top:
             continue
-        what = f"“{text}” in lines {first} to {last}"
-        if _NUMBER.match(text):
+        what = f"“{cell.text.strip()}” in lines {top + 1} to {bottom + 1}"
+        if _NUMBER.match(cell.text):
             numbers.append(what)
             continue
         texts.append(what)
-        for index in range(at[first] + 1, min(at[first] + 1 + last - first, len(records))):
+        for index in range(at[top + 1] + 1, len(records)):
             row = records[index]
-            records[index] = replace(row, cells=(*row.cells[:column], text, *row.cells[column + 1 :]))
-    if texts:
-        yield f"merged cells: {_some(texts)}; each of these lines was given the text"
-    if numbers:
-        yield f"merged cells: {_some(numbers)}; only the first of these lines has the number"
+            if row.line > bottom + 1:
+                break
+            cells = [*row.cells, *[""] * (column + 1 - len(row.cells))]
+            cells[column] = cell.text
+            records[index] = Row(row.line, tuple(cells))
+    hidden = sorted({row for row, _ in grid.cells if row in grid.hidden_rows})
+    struck = sorted({row for (row, _), cell in facts.items() if cell.struck})
+    uncalculated = sum(cell.uncalculated for cell in grid.cells.values())
+    hidden_columns = [header.cells[column].strip() for column in used if column in grid.hidden_columns]
+    under = [f"“{facts[place].text.strip()}” in line {place[0] + 1}" for place in covered]
+    like_others = "in the workbook; {} read like all others"
+    notes = {
+        f"{counted(uncalculated, 'formula')} without a value; "
+        "open and save the workbook in a program that calculates them": uncalculated,
+        f"{_lines(hidden)} hidden {like_others.format('hidden lines are')}": hidden,
+        f"{_columns(hidden_columns)} hidden {like_others.format('hidden columns are')}": hidden_columns,
+        f"{_lines(struck, 'has', 'have')} struck-out text {like_others.format('it is')}": struck,
+        f"merged cells: {listed(texts)}; each of these lines was given the text": texts,
+        f"merged cells: {listed(numbers)}; only the first of these lines has the number": numbers,
+        f"under merged cells, where no program shows it: {listed(under)}; it is not used": under,
+    }
+    return records, [note for note, there in notes.items() if there]
 
 
-def _some(words: Sequence[str]) -> str:
-    return ", ".join(words[:4]) + (f" and {len(words) - 4} more" if len(words) > 4 else "")
+def _lines(rows: Sequence[int], one: str = "is", many: str = "are") -> str:
+    numbers = listed([str(row + 1) for row in rows], 8)
+    return f"lines {numbers} {many}" if len(rows) > 1 else f"line {numbers} {one}"
 
 
-def _continues(header: Row, columns: Columns, below: Row) -> bool:
-    """True where the record below a header is its second line: no name, and a unit or the like for masses."""
-    if any(columns.cell(below.cells, role) for role in (Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION)):
+def _columns(names: Sequence[str]) -> str:
+    shown = listed([f"“{name}”" for name in names], 8)
+    return f"the columns {shown} are" if len(names) > 1 else f"the column {shown} is"
+
+
+def _continues(header: Row, columns: Columns, below: Sequence[Row]) -> bool:
+    """Report whether the record below a header is its second line: no name, and units for masses."""
+    if not below or any(columns.cell(below[0].cells, role) for role in _NAMES):
         return False
-    if any(letter.isdigit() for cell in below.cells for letter in cell):
+    if any(letter.isdigit() for cell in below[0].cells for letter in cell):
         return False
-    places = [columns.at[role] for role in (Role.MASS, Role.TOTAL_MASS) if role in columns.at]
-    cells = [below.cells[i].strip() for i in places if i < len(below.cells)]
+    places = [columns.at[role] for role in MASS_COLUMNS if role in columns.at]
     read = [
-        read_mass_header(f"mass ({cell.strip('[](){}')})") for cell in cells if any(map(str.isalpha, cell))
+        read_mass_header(f"mass ({cell.strip('[](){} ')})")
+        for place in places
+        for cell in below[0].cells[place : place + 1]
+        if any(map(str.isalpha, cell))
     ]
     return bool(read) and not any(one.strange or one.rate for one in read)
 
 
-def _notes(
-    encoding: str, data: bytes, header: Row, columns: Columns, given: Mapping[str, str] | None
-) -> Iterator[str]:
-    if encoding in _CODE_PAGES and not data.isascii():
-        yield (
-            f"the file is not UTF-8; it was read as {encoding}. If names look wrong, "
-            "export it as UTF-8 or say which encoding it has"
-        )
-    for role, text in (given or {}).items():
-        if Role(role) not in columns.at:
-            seen = ", ".join(c.strip() for c in header.cells if c.strip())
-            yield f"there is no column “{text}” for {role} in line {header.line} ({seen})"
-
-
-def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[SheetText]:
-    """The text by each encoding that may be meant; its name is the encoding's."""
+def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[tuple[str, str]]:
+    """Yield the name of each encoding that may be meant, and the text by it."""
     if encoding is not None:
         try:
-            yield SheetText(encoding, data.decode(encoding))
+            yield encoding, data.decode(encoding)
         except (UnicodeDecodeError, LookupError) as error:
             raise InputError(f"{source}: cannot be read as {encoding}: {error}") from error
         return
@@ -207,11 +321,11 @@ def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[Sheet
         (start.count(0) > len(start) // 4, wide),
     ):
         if found:
-            yield SheetText(name, data.decode(name, errors="replace"))
+            yield name, data.decode(name, errors="replace")
             return
     for name in ("utf-8", *_CODE_PAGES):
         try:
-            yield SheetText(name, data.decode(name))
+            yield name, data.decode(name)
         except UnicodeDecodeError:
             continue
 
@@ -225,7 +339,7 @@ def _records(text: str, delimiter: str, *, strict: bool = False) -> Iterator[Row
 
 
 def _bad_quotes(text: str, delimiter: str) -> int | None:
-    """The line from which quotes do not match, None where all is well.
+    """Return the line from which quotes do not match, None if all is well.
 
     Without this look, a quote that is never closed would swallow all rows below it in silence.
     """
@@ -238,17 +352,20 @@ def _bad_quotes(text: str, delimiter: str) -> int | None:
     return None
 
 
-def _best_header(text: str, delimiters: str, given: Mapping[str, str] | None) -> _Header | None:
-    """The (delimiter, line) that names most roles; None where no line names a usable set."""
+def _best_header(
+    tables: Iterable[tuple[str, Sequence[Row]]], given: Mapping[str, str] | None
+) -> _Header | None:
+    """Return the (delimiter, line) that names most roles; None if no line names a usable set."""
     best: _Header | None = None
     score = (0, 0)
-    for delimiter in delimiters:
-        for index, row in enumerate(_first_records(text, delimiter)):
+    for delimiter, rows in tables:
+        for index, row in enumerate(rows):
             columns = find_columns(row.cells, given)
             # A column of its own beside the name keeps a title ("Name") from passing as a header, unless
             # the file has that one column only.
             here = (len(columns.at), -index)
-            if columns.usable and here > score and (len(columns.at) > 1 or _single(row)):
+            single = len([cell for cell in row.cells if cell.strip()]) == 1
+            if columns.usable and here > score and (len(columns.at) > 1 or single):
                 best, score = _Header(delimiter, index, columns), here
     return best
 
@@ -260,17 +377,12 @@ def _first_records(text: str, delimiter: str) -> list[Row]:
         return []
 
 
-def _single(row: Row) -> bool:
-    return len([cell for cell in row.cells if cell.strip()]) == 1
-
-
-def _no_header(source: str, text: str) -> str:
-    lines = [line.strip() for line in text.splitlines() if line.strip()][:3]
+def _no_header(text: Sequence[str]) -> str:
+    lines = [line.strip() for line in text if line.strip()][:3]
     if not lines:
-        return f"{source}: the file is empty; a BOM needs a header line and rows"
+        return "the file is empty; a BOM needs a header line and rows"
     seen = "; ".join(f"“{line[:80]}”" for line in lines)
     return (
-        f"{source}: found no header line with a column of names or part numbers. "
-        f"The file begins with {seen}. "
+        f"found no header line with a column of names or part numbers. The file begins with {seen}. "
         "Name the columns yourself, for example: --column name=Bauteil --column mass=Gewicht"
     )

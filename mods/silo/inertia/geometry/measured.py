@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What measuring a product's solids gives, and what is said of them; the same for every engine."""
+"""What measuring a product's solids gives, and what is said of them; the same for every engine. Pure.
+
+Also what any file may have wrong: its unit, placements that scale or coincide.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from silo.inertia.geometry.labels import lost_characters
-from silo.inertia.geometry.mesh import Mesh
-from silo.inertia.geometry.together import Together, combined
-from silo.inertia.model import GeometryCode, GeometryProblem, Prototype, SolidProps
-from silo.inertia.wording import counted
+import numpy as np
+
+from silo.bom.errors import counted, listed
+from silo.inertia.core import rigid_mask
+from silo.inertia.geometry.graph import Unfolded, lost_characters
+from silo.inertia.geometry.together import Mesh, Together, combined
+from silo.inertia.model import Assembly, GeometryCode, Instance, Note, Prototype, SolidProps
 
 STATED = 5e-5
 """Relative: what the volume may depend on the way that it is taken, and no farther in silence."""
@@ -25,14 +31,11 @@ FAR_AWAY = 1e4
 """Distance from the origin, in sizes of the solid, from where coordinates themselves lose digits."""
 
 
-Note = tuple[GeometryCode, str]
-Notes = list[Note]
-
-NO_VOLUME: Note = (
+NO_VOLUME = Note(
     GeometryCode.INVALID_SHAPE,
     "the solid has no volume that can be computed; it is left out",
 )
-INVALID: Note = (GeometryCode.INVALID_SHAPE, "the geometry kernel's own check finds this shape invalid")
+INVALID = Note(GeometryCode.INVALID_SHAPE, "the geometry kernel's own check finds this shape invalid")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,15 +43,18 @@ class Measured:
     """What was found in one prototype; ``has_faces``, ``has_wires``: what there is without a solid."""
 
     solids: tuple[SolidProps, ...]
-    problems: tuple[GeometryProblem, ...]
+    problems: tuple[Note, ...]
     mesh: Mesh | None
     has_faces: bool
     has_wires: bool = False
 
     def prototype(
-        self, key: str, name: str, *more: GeometryProblem, empty: GeometryProblem | None = None, **stated: Any
+        self, key: str, name: str, *more: Note, empty: Note | None = None, **stated: Any
     ) -> Prototype:
-        """The product with these solids; ``empty`` says why there is none, ``stated`` what the file gives."""
+        """Return the product with these solids.
+
+        ``empty`` says why there is none, ``stated`` what the file gives.
+        """
         whole = combined(self.solids)
         problems = [*self.problems, *more]
         if not self.solids:
@@ -68,77 +74,87 @@ class Measured:
 
 def integration_notes(
     volume_m3: float, error: float, eps: float, *, distance_m: float, size_m: float
-) -> Notes:
-    """What is to be said of one solid's integration.
+) -> list[Note]:
+    """Report what is doubtful about the integration of a solid.
 
     error, eps
         estimated and wanted, relative to the volume (which is signed here).
     distance_m
         of the solid from the origin of its coordinates.
     """
-    notes: Notes = []
+    notes: list[Note] = []
     if error > CONVERGED:
         message = f"the volume integration stopped at a relative error of {error:.1g}, wanted {eps:.1g}"
-        notes.append((GeometryCode.NOT_CONVERGENT, message))
+        notes.append(Note(GeometryCode.NOT_CONVERGENT, message))
     if distance_m > FAR_AWAY * size_m > 0:
         message = (
             f"the geometry lies {distance_m:.3g} m from its own origin, {distance_m / size_m:.0f} times its "
             "size; its coordinates have lost digits"
         )
-        notes.append((GeometryCode.BAKED, message))
+        notes.append(Note(GeometryCode.BAKED, message))
     if volume_m3 < 0:
         message = f"the solid is inside out (volume {volume_m3:.6g} m3); its sign was turned"
-        notes.append((GeometryCode.NEGATIVE_VOLUME, message))
+        notes.append(Note(GeometryCode.NEGATIVE_VOLUME, message))
     return notes
 
 
 def differing_note(difference: float) -> Note:
-    """Two integrations that both converged, and differ."""
+    """Report two integrations that both converged, and differ."""
     words = (
         f"two exact integrations differ by {difference:.1g}: its edges do not quite meet, by the file's own "
         "tolerances, and no finer integration helps"
     )
-    return (GeometryCode.NOT_CONVERGENT, words)
+    return Note(GeometryCode.NOT_CONVERGENT, words)
 
 
-def mesh_notes(deviation: float | None, missing: int) -> Notes:
-    """What the mesh says of a solid: its relative deviation in volume (None: not closed), missing faces."""
+def mesh_notes(deviation: float | None, missing: int) -> list[Note]:
+    """Return what the mesh says of a solid.
+
+    Its relative deviation in volume (None: not closed), missing faces.
+    """
     if deviation is not None and deviation > MESH_TOLERANCE:
         message = (
             f"its surface mesh encloses a volume that differs by {deviation:.1%}: the geometry is bad, "
             "and so may be its mass"
         )
-        return [(GeometryCode.MESH_MISMATCH, message)]
+        return [Note(GeometryCode.MESH_MISMATCH, message)]
     if deviation is None and missing:
         message = f"{missing} of its faces cannot be meshed, so its volume could not be cross-checked"
-        return [(GeometryCode.MESH_MISMATCH, message)]
+        return [Note(GeometryCode.MESH_MISMATCH, message)]
     return []
 
 
-def no_solid(measured: Measured) -> GeometryProblem:
-    """Why a product has no volume."""
+def no_solid(measured: Measured) -> Note:
+    """Report why a product has no volume."""
     if measured.has_faces or measured.has_wires:
         what = "surfaces that enclose no solid" if measured.has_faces else "curves only"
-        return GeometryProblem(GeometryCode.NO_SOLID, f"it consists of {what}, so it has no volume")
-    return GeometryProblem(GeometryCode.NO_GEOMETRY, "the file holds no solid and no surface for it")
+        return Note(GeometryCode.NO_SOLID, f"it consists of {what}, so it has no volume")
+    return Note(GeometryCode.NO_GEOMETRY, "the file holds no solid and no surface for it")
 
 
-def shell_note(shells: int, solids: int) -> GeometryProblem:
-    """Surfaces that close were taken for solids."""
+def shell_note(shells: int, solids: int) -> Note:
+    """Report surfaces that close and were taken for solids."""
     what = counted(shells, "closed surface", "closed surfaces")
     beside = ", beside its solids" if solids else ""
     words = f"{what}, no solid in the file{beside}: the volume inside was taken"
-    return GeometryProblem(GeometryCode.SHELL_VOLUME, words)
+    return Note(GeometryCode.SHELL_VOLUME, words)
+
+
+def loose_note(surfaces: int, volume: float) -> Note:
+    """Say that open surfaces beside solids may be a body that is not counted."""
+    what = counted(surfaces, "surface that does not close", "surfaces that do not close")
+    words = f"beside its solids there are {what}: if they are a body, some {volume * 1e6:.3g} cm³ are missing"
+    return Note(GeometryCode.BODY_MISSING, words)
 
 
 def open_note(edges: int) -> Note:
-    """A solid whose faces do not close, or disagree on what is outside."""
+    """Report a solid whose faces do not close, or disagree on what is outside."""
     words = f"its faces do not close ({counted(edges, 'open edge')}), so it has no exact volume"
-    return (GeometryCode.OPEN_SHELL, words)
+    return Note(GeometryCode.OPEN_SHELL, words)
 
 
 def drift_note(drift: float) -> Note | None:
-    """A solid whose edges are shared but whose faces do not meet there; None where they do.
+    """Report a solid whose edges are shared but whose faces do not meet there; None if they do.
 
     drift
         how far its volume depends on the way that it is taken, relative.
@@ -149,17 +165,92 @@ def drift_note(drift: float) -> Note | None:
         "its faces do not meet at their edges, by the file's own tolerances: its volume may be off by "
         f"{drift:.1g} of it"
     )
-    return (GeometryCode.NOT_CONVERGENT if drift <= TORN else GeometryCode.OPEN_SHELL, words)
+    return Note(GeometryCode.NOT_CONVERGENT if drift <= TORN else GeometryCode.OPEN_SHELL, words)
 
 
 TORN = 1e-3
 """Relative: as open as a solid with a missing face, for a mass."""
 
 
-def cavity_note(found: Together) -> GeometryProblem:
-    """Some solids were taken as cavities of others."""
+def cavity_note(found: Together) -> Note:
+    """Report solids that were taken as cavities of others."""
     words = (
         "some solids of this product are inside out and some are not: "
         f"{found.cavities} taken as cavities of the solid around them, {found.turned} as bodies"
     )
-    return GeometryProblem(GeometryCode.NEGATIVE_VOLUME, words)
+    return Note(GeometryCode.NEGATIVE_VOLUME, words)
+
+
+LARGE_M, SMALL_M = 20.0, 5e-4
+"""A part whose largest extent [m] is outside of this was probably meant in another unit."""
+
+
+def implausible_size(prototypes: Mapping[str, Prototype], unit: str) -> list[Note]:
+    """Report parts of 30 km or of a grain of dust: the file's unit is not the one that its numbers are in."""
+    extents = [float(p.mesh.extents.max()) for p in prototypes.values() if isinstance(p.mesh, Mesh)]
+    extents = extents or [p.volume_m3 ** (1 / 3) for p in prototypes.values() if p.volume_m3 > 0]
+    if not extents or SMALL_M <= max(extents) <= LARGE_M:
+        return []
+    return [
+        Note(
+            GeometryCode.UNITS,
+            f"read in {unit}, the largest part measures {max(extents):.3g} m: was another unit meant?",
+        )
+    ]
+
+
+def placement_problems(instances: Sequence[Instance]) -> list[Note]:
+    """Report placements that scale (mirrored ones are rigid), and parts that are placed twice at one
+    place.
+    """
+    if not instances:
+        return []
+    placements = np.array([instance.transform for instance in instances])
+    scaled = [i.name for i, rigid in zip(instances, rigid_mask(placements), strict=True) if not rigid]
+    seen: set[tuple[str, bytes]] = set()
+    twice = []
+    # 0.1 µm and 1e-7 of a turn; adding 0 makes -0 the 0 that it is.
+    for instance, place in zip(instances, np.round(placements, 7) + 0.0, strict=True):
+        here = (instance.prototype, place.tobytes())
+        if here in seen:
+            twice.append(instance.name)
+        seen.add(here)
+    problems = []
+    if scaled:
+        words = (
+            f"placements that scale their part: {_some(scaled)}; "
+            "volume and inertia are scaled with it, a mass from the BOM is not"
+        )
+        problems.append(Note(GeometryCode.SCALED, words))
+    if twice:
+        words = (
+            f"parts that stand exactly where the same part stands already: {_some(twice)}; "
+            "all of them are counted"
+        )
+        problems.append(Note(GeometryCode.COINCIDENT_PARTS, words))
+    return problems
+
+
+def _some(names: Sequence[str]) -> str:
+    return f"{len(names)} ({listed(names, 3)})"
+
+
+def assembled(
+    unfolded: Unfolded,
+    prototypes: Mapping[str, Prototype],
+    problems: Sequence[Note],
+    *,
+    name: str,
+    source: str,
+    unit: str,
+) -> Assembly:
+    """Return what a reader found, as an assembly; the problems of its placements are added."""
+    return Assembly(
+        name=name,
+        prototypes=prototypes,
+        instances=tuple(unfolded.instances),
+        problems=(*problems, *placement_problems(unfolded.instances)),
+        source=source,
+        unit=unit,
+        frames=unfolded.frames,
+    )

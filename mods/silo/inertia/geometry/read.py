@@ -1,29 +1,165 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Read the geometry of any file we know: from the cache, in a child process, or here."""
+"""Read the geometry of any file we know: from the cache, in a child process, or here.
+
+Reading in a child process: the geometry kernel may crash, hang or eat memory, and only the child does.
+
+The child (:func:`read.main`) gets its task as one JSON line, answers with JSON lines (progress, then done or
+error), and leaves the result in a file in a folder that is ours. Its standard error is kept for the message.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import queue
 import re
+import subprocess
 import sys
 import tempfile
+import threading
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
-from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError
-from silo.folders import scratch_folder
-from silo.inertia.geometry import isolate, store
+from silo import platform
+from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError, counted
+from silo.inertia.geometry import cache as store
 from silo.inertia.geometry.cache import Cache, changed_since, default_folder, key_of, provenance
-from silo.inertia.geometry.detect import Kind, detect
+from silo.inertia.geometry.graph import Kind, Progress, Reading, ReadOptions, Report, detect
 from silo.inertia.geometry.helpers import Helpers, helpers_for
-from silo.inertia.geometry.options import Progress, Reading, ReadOptions, Report
-from silo.inertia.geometry.step.prepare import begin
-from silo.inertia.model import Assembly, GeometryCode, GeometryProblem
-from silo.inertia.wording import counted
-from silo.platform import limit_this_process
+from silo.inertia.model import Assembly, GeometryCode, Note
+from silo.platform import limit_this_process, scratch_folder
+
+POLL_SECONDS = 0.05
+_OUT_OF_MEMORY = ("MemoryError", "bad_alloc", "Cannot allocate memory", "failed to map segment")
+_WORKER = "from silo.inertia.geometry.read import main; main()"
+
+
+def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] = ()) -> None:
+    """Read ``path`` in a child process; the stored geometry is at ``result`` afterwards.
+
+    ``command`` starts another child than the usual worker, speaking like it.
+
+    Raises DocumentError (bad file, crash, time or memory limit), ConfigError (kernel not installed) and
+    CancelledError.
+    """
+    task = {
+        "path": str(path),
+        "result": str(result),
+        "options": options.content_options(),
+        "memory_mb": options.memory_mb,
+        "processes": options.processes,
+        "cpu_s": options.timeout_s,
+    }
+    command = command or [python(), "-c", _WORKER]
+    with tempfile.TemporaryFile() as errors, _child(command, errors) as process:
+        answer = _talk(process, path, options, task)
+        process.wait()
+        if answer is None:
+            raise DocumentError(str(path), _death(process.returncode, errors, options))
+    if answer.get("event") == "error":
+        if answer.get("config"):
+            raise ConfigError(str(answer["reason"]))
+        raise DocumentError(str(path), str(answer["reason"]))
+
+
+def _talk(
+    process: subprocess.Popen[bytes], path: Path, options: ReadOptions, task: dict[str, Any]
+) -> dict[str, Any] | None:
+    """Return the child's last word, None if it ended without one."""
+    lines: queue.Queue[bytes | None] = queue.Queue()
+    threading.Thread(target=_pump, args=(process.stdout, lines), daemon=True).start()
+    if process.stdin is not None:
+        try:
+            process.stdin.write(json.dumps(task).encode("utf-8") + b"\n")
+            process.stdin.close()
+        except BrokenPipeError:
+            return None
+    deadline = time.monotonic() + options.timeout_s if options.timeout_s else None
+    while True:
+        if options.cancelled is not None and options.cancelled():
+            raise CancelledError(f"{path}: reading was cancelled")
+        if deadline is not None and time.monotonic() > deadline:
+            raise DocumentError(
+                str(path),
+                f"could not be read within {options.timeout_s:g} s; allow more time, or simplify it",
+            )
+        try:
+            line = lines.get(timeout=POLL_SECONDS)
+        except queue.Empty:
+            continue
+        if line is None:
+            return None
+        event: dict[str, Any] = json.loads(line)
+        if event.get("event") != "progress":
+            return event
+        if options.progress is not None:
+            options.progress(Progress(str(event["stage"]), int(event["done"]), int(event["total"])))
+
+
+def _pump(stream: IO[bytes] | None, lines: queue.Queue[bytes | None]) -> None:
+    for line in stream or ():
+        lines.put(line)
+    lines.put(None)
+
+
+@contextmanager
+def _child(command: Sequence[str], errors: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        env=_environment(),
+        **platform.child_options(group=True),
+    )
+    try:
+        yield process
+    finally:
+        platform.end(process)
+        process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+
+
+def python() -> str:
+    """Return a Python interpreter to start. Inside FreeCAD ``sys.executable`` is FreeCAD itself."""
+    if "python" in Path(sys.executable or "").name.lower():
+        return sys.executable
+    for found in platform.python_beside(sys.base_exec_prefix):
+        if os.path.isfile(found):
+            return found
+    raise ConfigError(
+        f"no Python interpreter was found beside {sys.executable} to read geometry with; "
+        "read it with isolate=False"
+    )
+
+
+def _environment() -> dict[str, str]:
+    # The child must find the same modules, however this process found them.
+    paths = os.pathsep.join(p for p in sys.path if p)
+    # One thread: numpy's pool would reserve memory for each core, which counts against the limit.
+    one = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    # What the kernel prints is written at once, and not lost when the child ends itself.
+    return {**os.environ, **one, "PYTHONPATH": paths, "PYTHONUNBUFFERED": "1"}
+
+
+def _death(code: int, errors: IO[bytes], options: ReadOptions) -> str:
+    errors.seek(0)
+    words = errors.read()[-4000:].decode("utf-8", errors="replace")
+    if any(sign in words for sign in _OUT_OF_MEMORY):
+        return f"needs more than the {options.memory_mb} MB allowed to read it; allow more memory"
+    if code < 0:
+        return (
+            f"the geometry kernel {platform.how_it_ended(code)} on it; the file is damaged, or trips "
+            "a bug of the kernel. Export it again, or with another application protocol"
+        )
+    last = next((line for line in reversed(words.splitlines()) if line.strip()), f"exit code {code}")
+    return f"the reader stopped with an error: {last.strip()}"
+
 
 ATTEMPTS = 3
 """Readings of a file that changes meanwhile, before that is an error."""
@@ -32,7 +168,8 @@ _COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
 
 
 def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
-    """The geometry of a STEP, BREP, FreeCAD or mesh file: prototypes measured once, and where they are.
+    """Return the geometry of a STEP, BREP, FreeCAD or mesh file: prototypes measured once, and where they
+    are.
 
     Example::
 
@@ -47,7 +184,7 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
     path = Path(path)
     kind = detect(path)
     if not options.isolate:
-        if not detect(path).is_mesh:
+        if not kind.is_mesh:
             from silo.inertia.geometry.kernel import occt
 
             occt.quiet()
@@ -62,7 +199,7 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
         begin = time.time_ns()
         with scratch_folder("silo-geometry-") as folder:
             result = Path(folder) / "result.npz"
-            isolate.run(path, options, result)
+            run(path, options, result)
             assembly, extra = store.load(result)
             if key_of(path, _content(kind, options)) != key or changed_since(begin, extra, path):
                 continue
@@ -75,11 +212,14 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
 
 
 def _content(kind: Kind, options: ReadOptions) -> dict[str, Any]:
-    """What a result depends on besides the file: for FreeCAD documents also the cards that hold densities."""
+    """Return what a result depends on besides the file.
+
+    For FreeCAD documents also the cards that hold densities.
+    """
     content = options.content_options()
     if kind is not Kind.FREECAD:
         return content
-    from silo.inertia.materials.cards import cards_fingerprint
+    from silo.inertia.materials import cards_fingerprint
 
     return {**content, "cards": cards_fingerprint()}
 
@@ -97,16 +237,19 @@ def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers
 def _reading(path: Path, options: ReadOptions, report: Report, helpers: Helpers) -> Reading:
     kind = detect(path)
     if kind is Kind.STEP:
+        # The kernel is not there inside FreeCAD, which reads the other formats; the text does without it.
+        from silo.inertia.geometry.step.text import begin
+
         text = begin(path, options, helpers)
         from silo.inertia.geometry.step.read import read_step
 
         return read_step(path, options, report, helpers, text)
     if kind.is_mesh:
-        from silo.inertia.geometry.meshes.meshfile import read_mesh
+        from silo.inertia.geometry.meshes import read_mesh
 
         return read_mesh(path, kind, options, report)
     if kind is Kind.BREP:
-        from silo.inertia.geometry.kernel.brep import read_brep
+        from silo.inertia.geometry.kernel.solids import read_brep
 
         return read_brep(path, options, report)
     from silo.inertia.geometry.freecad.files import read_freecad
@@ -128,7 +271,8 @@ def _reporter(path: Path, options: ReadOptions) -> Report:
 
 
 def main() -> None:
-    """The child: read the task from standard input, do it, say how it went. Exit code 0 unless it crashed.
+    """Run as the child: read the task from standard input, do it, say how it went. Exit code 0 unless it
+    crashed.
 
     Standard output is the line to the parent, so the kernel, which prints there too, gets a file instead;
     what it wrote is counted and becomes a problem of the assembly.
@@ -157,7 +301,7 @@ def without(*packages: str) -> None:
 
 
 def limit(memory_mb: int, cpu_s: float) -> None:
-    """Limits of this process, where the platform has them; no core files."""
+    """Set limits of this process, if the platform has them; no core files."""
     # Time is limited only for the case that the parent died: its own clock is the one that counts.
     limit_this_process(memory=memory_mb * 1024**2, cpu_s=int(cpu_s) + 30 if cpu_s else 0)
 
@@ -178,10 +322,10 @@ def _read(task: dict[str, Any], parent: IO[str], noise: IO[bytes]) -> None:
 
 
 def with_complaints(reading: Reading, lines: list[str]) -> Reading:
-    """What the kernel printed, as one problem of the assembly."""
+    """Return what the kernel printed, as one problem of the assembly."""
     if not lines:
         return reading
-    problem = GeometryProblem(
+    problem = Note(
         GeometryCode.READER,
         f"the geometry kernel complained {counted(len(lines), 'time')} while reading: {lines[0]}",
     )

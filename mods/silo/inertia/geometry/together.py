@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The bodies of one product together: copies, cavities and overlaps. The same for every engine.
-
-What a mesh encloses is decided here, too, wherever its triangles are from.
+"""The bodies of one product together: copies, cavities and overlaps; what a mesh encloses. For every engine.
 
 Nesting and orientation decide together. A body inside of another one with the opposite orientation is its
 cavity, whichever of the two is inside out: mirrored housings have both turned. A body inside of another one
 with the same orientation adds nothing, for the space is filled already; that, and bodies that overlap, is a
 problem. A copy that lies exactly on a body is counted once.
+
+Triangles are from a tessellation or a mesh file. trimesh integrates them, and stands as the independent
+witness against the geometry kernel: both look at the same part, by different code and different
+mathematics.
 """
 
 from __future__ import annotations
@@ -15,22 +17,244 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from silo.bom.errors import counted
 from silo.inertia.core import combine_arrays
-from silo.inertia.geometry.mesh import (
-    Floats,
-    Mesh,
-    components,
-    is_inside,
-    mesh_solid,
-    open_edges,
-    without_doubled,
-)
-from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
-from silo.inertia.wording import counted
+from silo.inertia.model import GeometryCode, Note, SolidProps
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+PICTURE_TRIANGLES = 120_000
+"""The most triangles that are kept of one prototype; a populated circuit board has millions."""
+
+
+WELD = 1e-6
+"""Share of a mesh's size; vertices that are closer may be made one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """The triangles of one prototype, in the prototype's axes.
+
+    vertices : (n, 3) float [m]
+    faces : (m, 3) int, rows of vertex indices, counter-clockwise seen from outside
+    """
+
+    vertices: Floats
+    faces: Indices
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", np.asarray(self.vertices, dtype=np.float64).reshape(-1, 3))
+        object.__setattr__(self, "faces", np.asarray(self.faces, dtype=np.int64).reshape(-1, 3))
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    @property
+    def extents(self) -> Floats:
+        """Return (3,) [m], sizes of the axis-aligned box; zeros for no triangles."""
+        if not len(self.vertices):
+            return np.zeros(3)
+        size: Floats = np.ptp(self.vertices, axis=0)
+        return size
+
+    def moved(self, matrix: Floats) -> Mesh:
+        """Return the same triangles after a placement ((4, 4) [m]); one that mirrors turns them over."""
+        mirrored = np.linalg.det(matrix[:3, :3]) < 0
+        faces = self.faces[:, ::-1] if mirrored else self.faces
+        return Mesh(self.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces)
+
+
+def joined(parts: list[Mesh]) -> Mesh:
+    """Return several meshes as one, in order."""
+    if not parts:
+        return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    starts = np.cumsum([0, *(len(p.vertices) for p in parts)])
+    faces = [p.faces + start for p, start in zip(parts, starts, strict=False)]
+    return Mesh(np.concatenate([p.vertices for p in parts]), np.concatenate(faces))
+
+
+def mesh_volume(mesh: Mesh) -> float:
+    """Return the signed volume [m^3]; negative if the faces look inwards.
+
+    Without trimesh, which FreeCAD lacks.
+    """
+    if not len(mesh):
+        return 0.0
+    a, b, c = np.moveaxis(_centred(mesh)[0][mesh.faces], 1, 0)
+    return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
+
+
+def mesh_solid(mesh: Mesh) -> SolidProps:
+    """Return the volume, centre and tensor of a closed mesh (exact for its polyhedron), the sign turned if
+    need be.
+
+    A mesh without volume has its middle as centre, and no tensor.
+    """
+    from trimesh.triangles import mass_properties
+
+    vertices, centre = _centred(mesh)
+    with np.errstate(all="ignore"):
+        moments = mass_properties(vertices[mesh.faces], density=1.0)
+    volume = float(moments.volume)
+    if volume == 0.0 or not np.isfinite(moments.center_mass).all():
+        return SolidProps(0.0, centre, np.zeros((3, 3)))
+    sign = -1.0 if volume < 0 else 1.0
+    com = np.asarray(moments.center_mass, dtype=np.float64) + centre
+    inertia = sign * np.asarray(moments.inertia, dtype=np.float64)
+    return SolidProps(sign * volume, com, inertia, reversed=volume < 0)
+
+
+def _centred(mesh: Mesh) -> tuple[Floats, Floats]:
+    # The integrals are sums of differences; taken about the mesh's own middle they keep their digits for a
+    # small part that lies far from its origin.
+    centre = (mesh.vertices.max(axis=0) + mesh.vertices.min(axis=0)) / 2
+    return mesh.vertices - centre, centre
+
+
+def welded(vertices: Floats, faces: Indices) -> Mesh:
+    """Make equal vertices one (an STL repeats each six times); leave out triangles without area.
+
+    Where edges are open then, vertices closer than a millionth of the mesh are made one as well.
+    """
+    mesh = _merged(vertices, faces)
+    if not len(mesh) or not open_edges(mesh):
+        return mesh
+    step = float(mesh.extents.max()) * WELD
+    if step == 0.0:
+        return mesh
+    grid = np.round(mesh.vertices / step)
+    _, first, place = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    return _merged(mesh.vertices[first[place.reshape(-1)]], mesh.faces)
+
+
+def _merged(vertices: Floats, faces: Indices) -> Mesh:
+    unique, place = np.unique(vertices, axis=0, return_inverse=True)
+    faces = place.reshape(-1)[faces]
+    flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+    return Mesh(unique, faces[~flat])
+
+
+def without_doubled(mesh: Mesh) -> tuple[Mesh, int]:
+    """Return the mesh with each triangle once, and how many were repeated.
+
+    Triangles that stand there twice are a copy; a triangle and the same turned over enclose nothing.
+    """
+    order = np.argsort(mesh.faces, axis=1)
+    rows = np.take_along_axis(mesh.faces, order, axis=1)
+    even = np.isin(order @ np.array([9, 3, 1]), _EVEN)
+    kinds, kind = np.unique(rows, axis=0, return_inverse=True)
+    kind = kind.reshape(-1)
+    if len(kinds) == len(mesh.faces):
+        return mesh, 0
+    forward = np.bincount(kind, weights=even, minlength=len(kinds))
+    backward = np.bincount(kind, weights=~even, minlength=len(kinds))
+    kept = np.zeros(len(mesh.faces), dtype=bool)
+    # The first triangle that looks to the side of which there are more.
+    for number in np.nonzero(forward != backward)[0]:
+        side = even if forward[number] > backward[number] else ~even
+        kept[np.nonzero((kind == number) & side)[0][0]] = True
+    met = 2 * int(np.minimum(forward, backward).sum())
+    return Mesh(mesh.vertices, mesh.faces[kept]), int(len(mesh.faces) - kept.sum()) - met
+
+
+_EVEN = [0 * 9 + 1 * 3 + 2, 1 * 9 + 2 * 3 + 0, 2 * 9 + 0 * 3 + 1]
+
+
+def open_edges(mesh: Mesh) -> int:
+    """Return how many edges are not used exactly twice, once in each direction."""
+    directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    ends = np.sort(directed, axis=1)
+    _, number = np.unique(ends, axis=0, return_inverse=True)
+    forward = directed[:, 0] == ends[:, 0]
+    ups = np.bincount(number.reshape(-1), weights=forward)
+    downs = np.bincount(number.reshape(-1), weights=~forward)
+    return int(((ups != 1) | (downs != 1)).sum())
+
+
+def components(mesh: Mesh, most: int) -> list[Mesh]:
+    """Return the mesh cut into pieces that share no edge; whole if there are more than ``most``.
+
+    Pieces that touch in a corner only are two: each may be inside out by itself.
+    """
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, number = np.unique(edges, axis=0, return_inverse=True)
+    rows = number.reshape(-1, 3)
+    face_labels = _labels(rows, int(rows.max()) + 1 if len(rows) else 0)[rows[:, 0]]
+    labels = np.unique(face_labels)
+    if not 1 < len(labels) <= most:
+        return [mesh]
+    return [_compact(mesh.vertices, mesh.faces[face_labels == label]) for label in labels]
+
+
+def _compact(vertices: Floats, faces: Indices) -> Mesh:
+    used, place = np.unique(faces, return_inverse=True)
+    return Mesh(vertices[used], place.reshape(-1, 3))
+
+
+def _labels(rows: Indices, count: int) -> Indices:
+    """Return (count,) for each thing the lowest one that it is connected to by ``rows`` (n, 3)."""
+    labels = np.arange(count)
+    while True:
+        lowest = labels[rows].min(axis=1)
+        before = labels.copy()
+        for column in range(3):
+            np.minimum.at(labels, rows[:, column], lowest)
+        # Following labels to their own label halves the number of rounds that long strips would need.
+        labels = labels[labels]
+        if np.array_equal(labels, before):
+            return labels
+
+
+def winding_number(mesh: Mesh, point: Floats) -> float:
+    """Return how often the mesh goes round ``point`` ((3,) [m]): 1 inside a closed outward mesh, 0 outside.
+
+    The generalised winding number: the solid angles of all triangles, added (Van Oosterom and Strackee 1983).
+    """
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] - point for i in range(3))
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    numerator = np.einsum("ij,ij->i", a, np.cross(b, c))
+    denominator = (
+        la * lb * lc
+        + np.einsum("ij,ij->i", a, b) * lc
+        + np.einsum("ij,ij->i", b, c) * la
+        + np.einsum("ij,ij->i", c, a) * lb
+    )
+    return float(np.arctan2(numerator, denominator).sum() / (2 * np.pi))
+
+
+def is_inside(inner: Mesh, outer: Mesh) -> bool:
+    """Report whether ``inner`` begins inside ``outer`` (their surfaces are taken not to cross)."""
+    point = inner.vertices[inner.faces[0]].mean(axis=0)
+    return abs(winding_number(outer, point)) > 0.5
+
+
+def simplified(mesh: Mesh, most: int) -> Mesh:
+    """Return the mesh for a picture, with about ``most`` triangles at most: near vertices made one
+    (clustering).
+
+    Its volume is not to be trusted any more; small meshes are left as they are.
+    """
+    cells = 512
+    while len(mesh) > most and cells >= 8:
+        low = mesh.vertices.min(axis=0)
+        grid = np.floor((mesh.vertices - low) / max(float(mesh.extents.max()) / cells, 1e-12)).astype(
+            np.int64
+        )
+        code = (grid[:, 0] * (cells + 1) + grid[:, 1]) * (cells + 1) + grid[:, 2]
+        _, first, place = np.unique(code, return_index=True, return_inverse=True)
+        faces = place.reshape(-1)[mesh.faces]
+        flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+        mesh = Mesh(mesh.vertices[first], np.unique(faces[~flat], axis=0))
+        cells //= 2
+    return mesh
+
 
 SAME = 1e-9
 """Relative: two bodies with moments closer than this may be one."""
@@ -50,11 +274,11 @@ class Body:
     """One closed body where it stands, as if it were alone.
 
     props
-        its moments, the volume positive; ``reversed`` where the file has it inside out.
+        its moments, the volume positive; ``reversed`` if the file has it inside out.
     low, high
         (3,) [m], its box, which may be too large and never too small.
     mesh, exact
-        its triangles, None where there are none; whether they are the very body or only near it.
+        its triangles, None if there are none; whether they are the very body or only near it.
     shape
         what its engine needs to compare it with another one.
     """
@@ -68,7 +292,7 @@ class Body:
 
 
 Common = Callable[[Body, Body], SolidProps | None]
-"""What two bodies have in common, whatever their orientation: volume 0 for nothing, None where it cannot be
+"""What two bodies have in common, whatever their orientation: volume 0 for nothing, None if it cannot be
 found out."""
 
 
@@ -88,12 +312,12 @@ class Together:
 
     @property
     def mixed(self) -> bool:
-        """True where some bodies are inside out and some are not."""
+        """Report whether some bodies are inside out and some are not."""
         return self.cavities > 0 or 0 < self.turned < len(self.solids)
 
 
-def together(bodies: Sequence[Body], common: Common, problems: list[GeometryProblem]) -> Together:
-    """The solids of one product; what is wrong with them is added to ``problems``."""
+def together(bodies: Sequence[Body], common: Common, problems: list[Note]) -> Together:
+    """Return the solids of one product; what is wrong with them is added to ``problems``."""
     bodies = _without_copies(bodies, problems)
     if len(bodies) < 2:
         return Together(tuple(b.props for b in bodies), 0, sum(b.props.reversed for b in bodies))
@@ -116,7 +340,7 @@ def together(bodies: Sequence[Body], common: Common, problems: list[GeometryProb
     return Together(tuple(kept), sum(role is _Role.CAVITY for role in roles), turned)
 
 
-def _without_copies(bodies: Sequence[Body], problems: list[GeometryProblem]) -> list[Body]:
+def _without_copies(bodies: Sequence[Body], problems: list[Note]) -> list[Body]:
     kept: list[Body] = []
     by_volume: dict[float, list[Body]] = {}
     copies = 0
@@ -130,7 +354,7 @@ def _without_copies(bodies: Sequence[Body], problems: list[GeometryProblem]) -> 
         by_volume.setdefault(near[1], []).append(body)
     if copies:
         words = f"{counted(copies, 'solid lies', 'solids lie')} exactly on another one; each is counted once"
-        problems.append(GeometryProblem(GeometryCode.COINCIDENT_SOLIDS, words))
+        problems.append(Note(GeometryCode.COINCIDENT_SOLIDS, words))
     return kept
 
 
@@ -162,7 +386,7 @@ class _Relations:
     holders
         for each body those that it lies inside of.
     partial
-        (one, other) → what both have in common, where neither holds the other.
+        (one, other) → what both have in common, if neither holds the other.
     unknown
         pairs of which that cannot be found out.
     """
@@ -192,7 +416,7 @@ class _Relations:
 
 
 def _near(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
-    """Pairs whose boxes share more than a face."""
+    """Yield pairs whose boxes share more than a face."""
     low = np.array([body.low for body in bodies])
     high = np.array([body.high for body in bodies])
     for one in range(len(bodies) - 1):
@@ -203,7 +427,9 @@ def _near(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
 
 
 def _roles(bodies: Sequence[Body], holders: list[list[int]]) -> tuple[list[_Role], list[int]]:
-    """What each body is, and the number of the body around it, its own for those that nothing holds."""
+    """Return what each body is, and the number of the body around it, its own for those that nothing
+    holds.
+    """
     roles: list[_Role] = []
     hosts: list[int] = []
     for number, body in enumerate(bodies):
@@ -228,7 +454,7 @@ def _tell(
     swallowed: list[Body],
     crossing: list[SolidProps],
     unknown: list[tuple[int, int]],
-    problems: list[GeometryProblem],
+    problems: list[Note],
 ) -> None:
     reasons = []
     if swallowed:
@@ -244,7 +470,7 @@ def _tell(
         reasons.append(f"{what} may overlap, which could not be found out")
     if reasons:
         words = "; ".join(reasons) + ". Is it one part? Its volume is in doubt"
-        problems.append(GeometryProblem(GeometryCode.OVERLAPPING_SOLIDS, words))
+        problems.append(Note(GeometryCode.OVERLAPPING_SOLIDS, words))
 
 
 def _minus(body: SolidProps, cavity: SolidProps) -> SolidProps:
@@ -253,7 +479,7 @@ def _minus(body: SolidProps, cavity: SolidProps) -> SolidProps:
 
 
 def combined(solids: Sequence[SolidProps]) -> SolidProps:
-    """All solids as one; no volume at the origin where there is none."""
+    """Return all solids as one; no volume at the origin if there is none."""
     if not solids:
         return NOTHING
     whole = combine_arrays(
@@ -271,10 +497,10 @@ class MeshCommon:
     """Compares the meshes of bodies; each is prepared once."""
 
     def __init__(self) -> None:
-        self._known: dict[int, Any] = {}
+        self._manifold = cache(_closed)
 
     def __call__(self, one: Body, other: Body) -> SolidProps | None:
-        """The moments of what both have in common; None where a mesh is not closed."""
+        """Return the moments of what both have in common; None if a mesh is not closed."""
         a, b = self._manifold(one), self._manifold(other)
         if a is None or b is None:
             return None
@@ -283,12 +509,6 @@ class MeshCommon:
             return NOTHING
         found = both.to_mesh64()
         return mesh_solid(Mesh(found.vert_properties[:, :3], found.tri_verts.astype(np.int64)))
-
-    def _manifold(self, body: Body) -> Any:
-        key = id(body)
-        if key not in self._known:
-            self._known[key] = _closed(body)
-        return self._known[key]
 
 
 def _closed(body: Body) -> Any:
@@ -308,13 +528,22 @@ def _closed(body: Body) -> Any:
     return found if sound else None
 
 
-def enclosed(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
-    """The moments of a part's triangles; every doubt is added to ``problems``."""
+def without(mesh: Mesh, cut: Mesh) -> Mesh | None:
+    """Return what is left of a mesh when another one is cut away; None if one of them does not close."""
+    one, other = _closed(_body(mesh)), _closed(_body(cut))
+    if one is None or other is None:
+        return None
+    left = (one - other).to_mesh64()
+    return Mesh(left.vert_properties[:, :3], left.tri_verts.astype(np.int64))
+
+
+def enclosed(mesh: Mesh, problems: list[Note]) -> SolidProps:
+    """Return the moments of a part's triangles; every doubt is added to ``problems``."""
     mesh, repeated = without_doubled(mesh)
     if repeated:
         what = counted(repeated, "of its triangles is", "of its triangles are")
         words = f"{what} there more than once; each is counted once"
-        problems.append(GeometryProblem(GeometryCode.COINCIDENT_SOLIDS, words))
+        problems.append(Note(GeometryCode.COINCIDENT_SOLIDS, words))
     if not len(mesh):
         return NOTHING
     edges = open_edges(mesh)
@@ -326,12 +555,12 @@ def enclosed(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
         words = (
             f"its triangles are in more than {MAX_COMPONENTS} pieces, which may overlap; they were added up"
         )
-        problems.append(GeometryProblem(GeometryCode.OVERLAPPING_SOLIDS, words))
+        problems.append(Note(GeometryCode.OVERLAPPING_SOLIDS, words))
     found = together([_body(piece) for piece in pieces], MeshCommon(), problems)
     if found.turned:
         which = "the mesh is" if len(pieces) == 1 else f"{found.turned} of its {len(pieces)} pieces are"
         words = f"{which} inside out; the sign was turned"
-        problems.append(GeometryProblem(GeometryCode.NEGATIVE_VOLUME, words))
+        problems.append(Note(GeometryCode.NEGATIVE_VOLUME, words))
     return replace(combined(found.solids), reversed=found.turned > 0)
 
 
@@ -339,11 +568,14 @@ def _body(piece: Mesh) -> Body:
     return Body(mesh_solid(piece), piece.vertices.min(axis=0), piece.vertices.max(axis=0), piece)
 
 
-def _not_closed(mesh: Mesh, edges: int) -> GeometryProblem:
-    """Holes, or triangles that disagree; either way the volume depends on the point that it is taken from."""
+def _not_closed(mesh: Mesh, edges: int) -> Note:
+    """Report holes, or triangles that disagree.
+
+    Either way the volume depends on the point that it is taken from.
+    """
     undirected = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     if (np.unique(undirected, axis=0, return_counts=True)[1] == 2).all():
         words = "its triangles do not agree on what is outside; its volume cannot be trusted"
-        return GeometryProblem(GeometryCode.WINDING, words)
+        return Note(GeometryCode.WINDING, words)
     words = f"the mesh is open ({edges} free or shared edges), so it has no exact volume"
-    return GeometryProblem(GeometryCode.NOT_WATERTIGHT, words)
+    return Note(GeometryCode.NOT_WATERTIGHT, words)

@@ -3,26 +3,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from silo.inertia.materials.cards import installed_cards
-from silo.inertia.materials.files import package_rows, user_rows
-from silo.inertia.materials.table import Material, MaterialHit, MaterialMiss, MaterialTable
+from silo.inertia.materials.table import (
+    DENSEST,
+    LIGHTEST,
+    Material,
+    MaterialHit,
+    MaterialMiss,
+    MaterialTable,
+    card_of,
+    cards_fingerprint,
+    checked_density,
+    load_materials,
+    package_rows,
+    parse_density,
+)
 
 if TYPE_CHECKING:
     MATERIAL_DENSITIES: Mapping[str, float]
 
 __all__ = [
+    "DENSEST",
+    "LIGHTEST",
     "MATERIAL_DENSITIES",
     "Material",
     "MaterialHit",
     "MaterialMiss",
     "MaterialTable",
+    "card_of",
+    "cards_fingerprint",
+    "checked_density",
     "load_materials",
+    "parse_density",
 ]
 
 
@@ -38,10 +54,3 @@ def __getattr__(name: str) -> Any:
     if name == "MATERIAL_DENSITIES":
         return _densities()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def load_materials(paths: Iterable[Path | str] = (), *, freecad: bool = True) -> MaterialTable:
-    """The usual table. ``paths``: user tables, the last one wins; ``freecad``: look at installed cards."""
-    layers = [user_rows(path) for path in paths]
-    layers.reverse()
-    return MaterialTable((*layers, package_rows()), installed_cards if freecad else lambda: ())

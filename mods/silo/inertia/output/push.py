@@ -11,15 +11,18 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from silo.api.policy import ends_run
 from silo.bom.errors import NotFoundError, SiloError
-from silo.inertia.bom.rows import BomCode
+from silo.inertia.bom.table import BomCode
 from silo.inertia.codes import MassCode, Source
 from silo.inertia.model import GeometryCode
-from silo.inertia.output.values import number
+from silo.inertia.output.text import number
 from silo.inertia.report import InertiaReport, PartResult, SubAssemblyResult
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
 
 DOUBTS = (
     MassCode.AMBIGUOUS,
@@ -27,6 +30,7 @@ DOUBTS = (
     MassCode.IMPLAUSIBLE,
     MassCode.GUESSED_MATERIAL,
     BomCode.AMBIGUOUS_MASS,
+    GeometryCode.BODY_MISSING,
     GeometryCode.INVALID_SHAPE,
     GeometryCode.MESH_MISMATCH,
     GeometryCode.OPEN_SHELL,
@@ -37,13 +41,6 @@ DOUBTS = (
 """Warnings under which a number is not written: it may well be another part's, or in another unit."""
 
 VOUCHED = (Source.BOM_MASS, Source.MATERIAL, Source.STEP_DENSITY)
-
-
-class Items(Protocol):
-    """What a push needs of a server; :class:`silo.api.client.SiloClient` has it."""
-
-    def get_properties(self, part_number: str, /) -> Mapping[str, Any]: ...
-    def update_item(self, part_number: str, /, **changes: Any) -> object: ...
 
 
 @dataclass(frozen=True)
@@ -86,20 +83,22 @@ class Pushed:
 def plan_push(
     report: InertiaReport, part_numbers: Mapping[str, str] | None = None, top: str | None = None
 ) -> PushPlan:
-    """What a report says of each item. Pure.
+    """Return what a report says of each item. Pure.
 
     part_numbers
-        prototype key → number, where neither BOM nor geometry file has it (a FreeCAD document's identities).
+        prototype key → number, if neither BOM nor geometry file has it (a FreeCAD document's identities).
     top
-        part number of the whole assembly; its mass and centre are pushed as well, where no part is a gap.
+        part number of the whole assembly; its mass and centre are pushed as well, if no part is a gap.
     """
     known = part_numbers or {}
     by_number: dict[str, list[PartResult]] = defaultdict(list)
     found: list[PushItem | Skipped] = []
     unsure: dict[str, str] = {}
     gaps = 0
+    lost = next((str(w.code) for w in report.warnings if w.code in DOUBTS and not w.part_name), "")
+    doubt = f"the whole file is in doubt ({lost}), and so may be this part" if lost else ""
     for _, part in report.parts():
-        gap = _gap(part)
+        gap = doubt or _gap(part)
         gaps += gap is not None
         numbers = [part.part_number] if part.part_number else [known[k] for k in part.products if k in known]
         if gap is not None or not numbers:
@@ -121,7 +120,8 @@ def plan_push(
         else:
             found.append(PushItem(part_number, parts[0].name, values[0]))
     for one in report.sub_assemblies:
-        found.append(_sub_assembly(one, {item.part_number for item in found if isinstance(item, PushItem)}))
+        taken = {item.part_number for item in found if isinstance(item, PushItem)}
+        found.append(Skipped(one.name, doubt) if doubt else _sub_assembly(one, taken))
     for warning in report.warnings:
         if warning.code == MassCode.ROW_UNUSED:
             found.append(Skipped(warning.part_name, "no part of the geometry belongs to its row"))
@@ -132,7 +132,7 @@ def plan_push(
     return PushPlan(items, tuple(skipped), _comment(report))
 
 
-def push(items: Items, plan: PushPlan, told: Callable[[str], None] = lambda part_number: None) -> Pushed:
+def push(items: SiloClient, plan: PushPlan, told: Callable[[str], None] = lambda part_number: None) -> Pushed:
     """Write a plan. Other properties of an item stay; an item that has the numbers already is left alone.
 
     An item whose properties cannot be read is not written. An error that concerns all items ends the run: the
@@ -158,8 +158,8 @@ def push(items: Items, plan: PushPlan, told: Callable[[str], None] = lambda part
     return Pushed(tuple(written), tuple(unchanged), tuple(unknown), tuple(failed), plan)
 
 
-def _write(items: Items, wanted: PushItem, comment: str) -> bool:
-    """False where the item has these numbers already."""
+def _write(items: SiloClient, wanted: PushItem, comment: str) -> bool:
+    """Write the numbers; return False if the item has them already."""
     known = items.get_properties(wanted.part_number)
     # The server replaces properties as a whole, so that what others wrote goes along.
     merged = {**known, **wanted.properties}
@@ -172,6 +172,8 @@ def _write(items: Items, wanted: PushItem, comment: str) -> bool:
 def _gap(part: PartResult) -> str | None:
     if part.source is Source.SUB_ASSEMBLY_MASS:
         return "its mass is a share of its sub-assembly's, which is written to that one's item"
+    if part.source is Source.TARGET_MASS:
+        return "its mass is a share of what was weighed, and the scale's reading is of no item"
     if part.source not in VOUCHED:
         return "neither BOM nor material gives its mass"
     if part.mass <= 0:
@@ -200,7 +202,7 @@ def _sub_assembly(one: SubAssemblyResult, taken: Set[str]) -> PushItem | Skipped
 def _whole(report: InertiaReport, top: str, gaps: int) -> PushItem | Skipped:
     total = report.total
     if total is None or total.mass <= 0 or gaps:
-        return Skipped(report.assembly, f"{gaps} of its parts have no mass that can be vouched for")
+        return Skipped(report.assembly, f"{gaps} of its parts have no sure mass")
     com = [_rounded(value) for value in total.com]
     return PushItem(top, report.assembly, {"mass_kg": _rounded(total.mass), "com_m": com})
 
@@ -226,7 +228,7 @@ def _comment(report: InertiaReport) -> str:
 
 
 def describe(item: PushItem) -> str:
-    """One line for people."""
+    """Return a line for people."""
     volume = item.properties.get("volume_m3")
     text = f"{item.part_number}  {item.name}: {number(item.properties['mass_kg'])} kg"
     return text + (f", {volume * 1e6:.6g} cm³" if volume else "")

@@ -7,10 +7,12 @@ whole file. So the places are found with expat, which gives byte positions, and 
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
@@ -20,8 +22,7 @@ import numpy as np
 from silo.bom.errors import InputError
 from silo.inertia.core import Floats, MassProps
 from silo.inertia.links import MOST_RAD, ROOT_LINK, origin_frame
-from silo.inertia.output.files import write_whole
-from silo.inertia.output.snippets import urdf_inertial
+from silo.inertia.output.text import inertial, write_whole
 
 MAX_BYTES = 64 * 1024 * 1024
 
@@ -51,72 +52,22 @@ class Filled:
     untouched: tuple[str, ...]
 
 
-def fill_urdf(data: bytes, links: Mapping[str, MassProps], source: str = "URDF") -> Filled:
-    """Replace or insert ``<inertial>`` of the named links; the rest of the file stays byte for byte.
-
-    Raises InputError where ``data`` is no URDF that can be read (also for DOCTYPE: not needed in a URDF, and
-    a way to attack its reader).
-    """
-    spans = _links_of(data, source)
-    by_name = {span.name: span for span in spans}
-    newline = b"\r\n" if b"\r\n" in data else b"\n"
-    edits: list[tuple[int, int, bytes]] = []
-    for name, props in links.items():
-        if name in by_name:
-            edits.append(_edit(data, by_name[name], props, newline))
-    result = data
-    for start, end, text in sorted(edits, key=lambda edit: edit[0], reverse=True):
-        result = result[:start] + text + result[end:]
-    return Filled(
-        result,
-        tuple(name for name in links if name in by_name),
-        tuple(name for name in links if name not in by_name),
-        tuple(span.name for span in spans if span.name not in links),
-    )
-
-
-def write_urdf(path: Path | str, links: Mapping[str, MassProps], target: Path | str | None = None) -> Filled:
-    """Fill a URDF file in place, or into ``target``; whole or not at all.
-
-    Where it has none of ``links``, nothing is written, and ``Filled.written`` is empty.
-    """
-    filled = fill_urdf(read_urdf(path), links, str(path))
-    if filled.written:
-        write_whole(target if target is not None else path, filled.data, like=path)
+def write_urdf(urdf: Urdf, links: Mapping[str, MassProps], target: Path | str | None) -> Filled:
+    """Fill a URDF into ``target``, whole or not at all; without any of ``links``, do nothing."""
+    filled = urdf.filled(links)
+    if filled.written and target is not None:
+        write_whole(target, filled.data, like=urdf.source)
     return filled
 
 
-def link_names(data: bytes, source: str = "URDF") -> tuple[str, ...]:
-    """The links of a URDF, in its order. InputError as :func:`fill_urdf`."""
-    return tuple(span.name for span in _links_of(data, source))
-
-
-def link_meshes(data: bytes, source: str = "URDF") -> dict[str, tuple[str, ...]]:
-    """Link → file names of its visual and collision meshes. InputError as :func:`fill_urdf`."""
-    return {span.name: tuple(span.meshes) for span in _links_of(data, source)}
-
-
-def read_urdf(path: Path | str) -> bytes:
-    """The file's bytes; InputError where it is absent or far too large."""
+def read_urdf(path: Path | str) -> Urdf:
+    """Read a URDF file; InputError if it is absent or far too large, or no URDF that can be read."""
     try:
         if Path(path).stat().st_size > MAX_BYTES:
             raise InputError(f"{path}: larger than {MAX_BYTES // 2**20} MB, which no URDF is")
-        return Path(path).read_bytes()
+        return Urdf(Path(path).read_bytes(), str(path))
     except OSError as error:
         raise InputError(f"{path}: the URDF cannot be read ({error.strerror or error})") from error
-
-
-def _links_of(data: bytes, source: str) -> Sequence[_Span]:
-    """The links, each once. Two of one name, or two inertials in one link: nobody knows which one counts."""
-    spans = _Reader(data, source).links
-    count = Counter(span.name for span in spans)
-    problems = [f"has {number} links named {name}" for name, number in count.items() if number > 1]
-    problems += [
-        f"the link {span.name} has {span.inertials} <inertial>" for span in spans if span.inertials > 1
-    ]
-    if problems:
-        raise InputError(f"{source}: {'; '.join(problems)}; a link and its inertial are there once")
-    return spans
 
 
 def _edit(data: bytes, span: _Span, props: MassProps, newline: bytes) -> tuple[int, int, bytes]:
@@ -124,7 +75,7 @@ def _edit(data: bytes, span: _Span, props: MassProps, newline: bytes) -> tuple[i
     inner = indent + b"  "
     if span.first_child is not None:
         inner = _indent_before(data, span.first_child) or inner
-    text = (newline + inner).join(line.encode("ascii") for line in urdf_inertial(props).split("\n"))
+    text = (newline + inner).join(line.encode("ascii") for line in inertial(props).split("\n"))
     if span.inertial is not None:
         return (*span.inertial, text)
     if span.closed:
@@ -150,13 +101,18 @@ class _Joint:
 
 
 @dataclass(eq=False)
-class _Reader:
-    """Positions of links, and joints, of one URDF."""
+class Urdf:
+    """One URDF: its links with their places in the text, and its joints.
+
+    Raises InputError if ``data`` is no URDF that can be read (also for DOCTYPE: not needed in a URDF, and
+    a way to attack its reader), and for two links of one name or two inertials in one link: nobody knows
+    which one counts.
+    """
 
     data: bytes
-    source: str
-    links: list[_Span] = field(default_factory=list)
-    joints: list[_Joint] = field(default_factory=list)
+    source: str = "URDF"
+    _links: list[_Span] = field(default_factory=list)
+    _joints: list[_Joint] = field(default_factory=list)
     _stack: list[str] = field(default_factory=list)
     _open: _Span | None = None
     _joint: _Joint | None = None
@@ -173,6 +129,120 @@ class _Reader:
             parser.Parse(self.data, True)
         except expat.ExpatError as error:
             raise InputError(f"{self.source}: this is no XML that can be read ({error})") from error
+        count = Counter(self.names)
+        problems = [f"has {number} links named {name}" for name, number in count.items() if number > 1]
+        problems += [
+            f"the link {one.name} has {one.inertials} <inertial>" for one in self._links if one.inertials > 1
+        ]
+        if problems:
+            raise InputError(f"{self.source}: {'; '.join(problems)}; a link and its inertial are there once")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the links, in the file's order."""
+        return tuple(span.name for span in self._links)
+
+    @property
+    def meshes(self) -> dict[str, tuple[str, ...]]:
+        """Return link → file names of its visual and collision meshes."""
+        return {span.name: tuple(span.meshes) for span in self._links}
+
+    def filled(self, links: Mapping[str, MassProps]) -> Filled:
+        """Replace or insert ``<inertial>`` of the named links; the rest of the file stays byte for byte."""
+        newline = b"\r\n" if b"\r\n" in self.data else b"\n"
+        result = self.data
+        for span in sorted(self._links, key=lambda span: -span.start):
+            if span.name in links:
+                start, end, text = _edit(self.data, span, links[span.name], newline)
+                result = result[:start] + text + result[end:]
+        return Filled(
+            result,
+            tuple(name for name in links if name in self.names),
+            tuple(name for name in links if name not in self.names),
+            tuple(name for name in self.names if name not in links),
+        )
+
+    @cached_property
+    def frames(self) -> dict[str, Floats]:
+        """Return link → (4, 4) placement of its frame in the root link's frame, joints at position zero [m].
+
+        None of them if there is a :attr:`problem`.
+        """
+        return {} if self.problem else self._placements
+
+    @cached_property
+    def problem(self) -> str:
+        """Return why the joints do not say where the links are: no tree, or no numbers; else ""."""
+        try:
+            self._placements  # noqa: B018 - asked for what it raises
+        except InputError as error:
+            return str(error)
+        return ""
+
+    @cached_property
+    def _placements(self) -> dict[str, Floats]:
+        return {name: self._placement(name) for name in self.names}
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """Report what is odd about the joints' origins though it can be read: more than a turn is degrees."""
+        turned = [
+            f"{joint.parent} → {joint.child} (rpy=“{joint.rpy}”)"
+            for joint in self._joints
+            if np.abs(_numbers(joint.rpy)).max() > MOST_RAD
+        ]
+        if not turned:
+            return ()
+        words = f"joints that turn by more than a whole turn: {', '.join(turned)}; rpy is in rad"
+        return (f"{self.source}: {words}",)
+
+    @cached_property
+    def root(self) -> str:
+        """Return the link that all others hang on: ``base_link`` if there is one, else the tree's root."""
+        below = {joint.child for joint in self._joints}
+        roots = [name for name in self.names if name not in below]
+        return roots[0] if len(roots) == 1 and ROOT_LINK not in self.names else ROOT_LINK
+
+    @cached_property
+    def loose(self) -> frozenset[str]:
+        """Return the links from which no joints lead to the root: where their frames are, nobody knows."""
+        if self.problem:
+            return frozenset()
+        tops = {name: [name, *(j.parent for j in self._way_up(name))][-1] for name in self.names}
+        often = [top for top, _ in Counter(tops.values()).most_common(1)]
+        return frozenset(name for name, top in tops.items() if top != tops.get(self.root, *often))
+
+    @cached_property
+    def _above(self) -> dict[str, _Joint]:
+        above: dict[str, _Joint] = {}
+        for joint in self._joints:
+            if joint.child in above:
+                raise InputError(f"{self.source}: the link {joint.child} has two parents; a URDF is a tree")
+            above[joint.child] = joint
+        return above
+
+    def _way_up(self, link: str) -> Iterator[_Joint]:
+        seen = {link}
+        while link in self._above:
+            joint = self._above[link]
+            yield joint
+            link = joint.parent
+            if link in seen:
+                raise InputError(f"{self.source}: the joints form a ring through {link}; a URDF is a tree")
+            seen.add(link)
+
+    def _placement(self, link: str) -> Floats:
+        result: Floats = np.eye(4)
+        for joint in self._way_up(link):
+            xyz, rpy = _numbers(joint.xyz), _numbers(joint.rpy)
+            if len(xyz) != 3 or len(rpy) != 3 or not np.isfinite([*xyz, *rpy]).all():
+                raise InputError(
+                    f"{self.source}: the joint {joint.parent} → {joint.child} has the origin "
+                    f"xyz=“{joint.xyz}” rpy=“{joint.rpy}”, wanted three numbers each; "
+                    "a xacro file must be expanded first"
+                )
+            result = origin_frame(xyz, rpy) @ result
+        return result
 
     def _doctype(self, *_: Any) -> None:
         raise InputError(f"{self.source}: has a DOCTYPE, which a URDF does not need and which is not read")
@@ -218,90 +288,26 @@ class _Reader:
             self._open.inertials += 1
         elif self._open is not None and tag == "link":
             self._open.end = here
-            self.links.append(self._open)
+            self._links.append(self._open)
             self._open = None
         elif self._joint is not None and tag == "joint":
             if self._joint.parent and self._joint.child:
-                self.joints.append(self._joint)
+                self._joints.append(self._joint)
             self._joint = None
 
     def _tag_end(self, start: int) -> tuple[int, bool]:
-        """Where the tag that begins at ``start`` ends, and whether it closes itself; a quoted ">" is none."""
+        """Return where the tag that begins at ``start`` ends, and whether it closes itself.
+
+        A quoted ">" is none.
+        """
         found = re.compile(rb"<(?:\"[^\"]*\"|'[^']*'|[^>\"'])*>").match(self.data, start)
         if found is None:
             raise InputError(f"{self.source}: a tag at byte {start} has no end")
         return found.end(), found[0].endswith(b"/>")
 
 
-def urdf_frames(data: bytes, source: str = "URDF") -> dict[str, Floats]:
-    """Link → (4, 4) placement of its frame in the root link's frame, all joints at position zero [m].
-
-    Raises InputError where joints do not form a tree, or their origins are no numbers (xacro: expand first).
-    """
-    reader = _Reader(data, source)
-    above = _parents(reader)
-    return {span.name: _placement(span.name, above, source) for span in reader.links}
-
-
-def frame_doubts(data: bytes, source: str = "URDF") -> tuple[str, ...]:
-    """What is odd about the joints' origins though it can be read: more than a turn is degrees."""
-    turned = [
-        f"{joint.parent} → {joint.child} (rpy=“{joint.rpy}”)"
-        for joint in _Reader(data, source).joints
-        if _turns(joint.rpy) > MOST_RAD
-    ]
-    if not turned:
-        return ()
-    return (f"{source}: joints that turn by more than a whole turn: {', '.join(turned)}; rpy is in rad",)
-
-
-def _turns(rpy: str) -> float:
+def _numbers(text: str) -> list[float]:
     try:
-        return max((abs(float(value)) for value in rpy.split()), default=0.0)
+        return [float(value) for value in text.split()] or [math.nan]
     except ValueError:
-        return 0.0
-
-
-def root_link(data: bytes, source: str = "URDF") -> str:
-    """The link that everything else hangs on: ``base_link`` where there is one, else the tree's root."""
-    reader = _Reader(data, source)
-    names = [span.name for span in reader.links]
-    above = _parents(reader)
-    roots = [name for name in names if name not in above]
-    return roots[0] if len(roots) == 1 and ROOT_LINK not in names else ROOT_LINK
-
-
-def _parents(reader: _Reader) -> dict[str, _Joint]:
-    above: dict[str, _Joint] = {}
-    for joint in reader.joints:
-        if joint.child in above:
-            raise InputError(f"{reader.source}: the link {joint.child} has two parents; a URDF is a tree")
-        above[joint.child] = joint
-    return above
-
-
-def _placement(link: str, above: Mapping[str, _Joint], source: str) -> Floats:
-    result: Floats = np.eye(4)
-    seen = {link}
-    while link in above:
-        joint = above[link]
-        result = _origin(joint, source) @ result
-        link = joint.parent
-        if link in seen:
-            raise InputError(f"{source}: the joints form a ring through {link}; a URDF is a tree")
-        seen.add(link)
-    return result
-
-
-def _origin(joint: _Joint, source: str) -> Floats:
-    try:
-        xyz = [float(value) for value in joint.xyz.split()]
-        rpy = [float(value) for value in joint.rpy.split()]
-    except ValueError:
-        xyz, rpy = [], []
-    if len(xyz) != 3 or len(rpy) != 3 or not np.isfinite([*xyz, *rpy]).all():
-        raise InputError(
-            f"{source}: the joint {joint.parent} → {joint.child} has the origin xyz=“{joint.xyz}” "
-            f"rpy=“{joint.rpy}”, wanted three numbers each; a xacro file must be expanded first"
-        )
-    return origin_frame(xyz, rpy)
+        return [math.nan]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Pictures of the links: PNG and GLB."""
+"""The links to look at: a GLB file and one HTML page."""

@@ -1,32 +1,303 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """A report as one HTML page that needs nothing else: a 3D view, masses by source, warnings, tables.
 
-The page holds three.js, the GLB, and a PNG for browsers without WebGL. It loads nothing from anywhere, and
-its content security policy says so.
+The page holds three.js and the GLB. It loads nothing from anywhere, and its content security policy says so.
+
+The 3D scene shows links in colours, their centres of mass, their inertia as ellipsoids. As GLB (glTF 2.0
+binary) it has every mesh once, instances as nodes, one material per link. Written here: a general writer
+repeats a mesh for each colour it has, or each use of it. Here the meshes of two links share vertices and
+triangles and differ in the material only, so 10 000 instances stay a few MB.
 """
 
 from __future__ import annotations
 
 import base64
+import colorsys
 import json
 import math
-from collections.abc import Iterable, Sequence
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from silo.bom.errors import counted
 from silo.inertia.codes import Source
-from silo.inertia.model import Assembly
+from silo.inertia.core import MassProps
+from silo.inertia.geometry.together import Floats, Mesh
+from silo.inertia.model import Assembly, Instance
 from silo.inertia.output.text import NOISE, SOURCE_WORDS, how, material_of
-from silo.inertia.preview.glb import write_glb
-from silo.inertia.preview.picture import write_picture
-from silo.inertia.preview.scene import UNCLAIMED, Colour, LinkView, colour_of, meshes_of, views_of
-from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning
-from silo.inertia.wording import counted
+from silo.inertia.preview.shading import ellipsoid, shaded
+from silo.inertia.report import InertiaReport, LinkResult, PartResult
+
+Colour = tuple[float, float, float]
+
+_BASE: tuple[Colour, ...] = (
+    (0.26, 0.52, 0.80),
+    (0.92, 0.57, 0.20),
+    (0.36, 0.66, 0.38),
+    (0.80, 0.36, 0.36),
+    (0.55, 0.45, 0.75),
+    (0.85, 0.73, 0.25),
+    (0.30, 0.67, 0.70),
+    (0.80, 0.48, 0.66),
+)
+UNCLAIMED: Colour = (0.72, 0.72, 0.70)
+
+
+@dataclass(frozen=True, eq=False)
+class LinkView:
+    """One link: the instances that belong to it, and its mass properties in the assembly's frame.
+
+    ``props`` None draws the parts alone (parts that no link has, or a link without mass).
+    """
+
+    name: str
+    instances: tuple[Instance, ...]
+    props: MassProps | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoid:
+    """The solid ellipsoid of even density with a link's mass and moments of inertia.
+
+    centre (3,) [m]; axes (3, 3), columns, right-handed; radii (3,) [m]. All in the assembly's frame.
+    """
+
+    centre: Floats
+    axes: Floats
+    radii: Floats
+
+    @property
+    def placement(self) -> Floats:
+        """Return (4, 4) from the unit sphere to the ellipsoid."""
+        result = np.eye(4)
+        result[:3, :3] = self.axes * self.radii
+        result[:3, 3] = self.centre
+        return result
+
+
+def inertia_ellipsoid(props: MassProps) -> Ellipsoid | None:
+    """Return the semi-axes; a body of mass m has I_a = m/5 (b² + c²), so a² = 5/(2m) (I_b + I_c - I_a).
+
+    None without a mass.
+    """
+    if props.mass <= 0 or not np.isfinite(props.inertia).all():
+        return None
+    moments, axes = props.principal()
+    squares = 5 / (2 * props.mass) * (moments.sum() - 2 * moments)
+    return Ellipsoid(props.com, axes, np.sqrt(np.clip(squares, 0.0, None)))
+
+
+def colour_of(number: int) -> Colour:
+    """Return a colour for the n-th link.
+
+    Colour-blind people can distinguish the first eight as well as can be.
+    """
+    if number < len(_BASE):
+        return _BASE[number]
+    hue = (number * 0.618033988749895) % 1.0
+    return colorsys.hls_to_rgb(hue, 0.45 + 0.15 * (number % 2), 0.5)
+
+
+def meshes_of(assembly: Assembly, views: Sequence[LinkView]) -> Mapping[str, Mesh]:
+    """Return the meshes of the prototypes that are shown, by key."""
+    shown = dict.fromkeys(instance.prototype for view in views for instance in view.instances)
+    return {
+        key: mesh for key in shown if isinstance(mesh := assembly.prototypes[key].mesh, Mesh) and len(mesh)
+    }
+
+
+def views_of(report: InertiaReport, assembly: Assembly) -> list[LinkView]:
+    """Return the links of a report, in its order, then what no link has."""
+    by_path = {instance.name: instance for instance in assembly.instances}
+    views = []
+    for link in report.links.values():
+        members = tuple(by_path[path] for part in link.parts for path in part.paths if path in by_path)
+        props = link.props.transformed(link.frame.placement) if link.props.mass > 0 else None
+        views.append(LinkView(link.name, members, props))
+    loose = tuple(by_path[path] for part in report.unclaimed for path in part.paths if path in by_path)
+    if loose:
+        views.append(LinkView("", loose))
+    return views
+
+
+_FLOAT, _UINT = 5126, 5125
+_VERTICES, _INDICES = 34962, 34963
+_Z_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
+"""glTF has Y up, our assemblies Z: a quarter turn about X."""
+
+MARKER = 0.008
+"""Radius of the mark of a centre of mass, in diagonals of the assembly."""
+
+
+def write_glb(assembly: Assembly, views: Sequence[LinkView]) -> bytes:
+    """Return the scene: one node per link, below it its instances, its centre of mass and its ellipsoid."""
+    return _Writer(assembly, views).run()
+
+
+class _Writer:
+    def __init__(self, assembly: Assembly, views: Sequence[LinkView]) -> None:
+        self._assembly = assembly
+        self._views = views
+        self._blob = bytearray()
+        self._doc: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "silo-mod"},
+            "scene": 0,
+            "scenes": [{"name": assembly.name, "nodes": [0]}],
+            "nodes": [{"name": assembly.name, "rotation": _Z_UP, "children": []}],
+            "meshes": [],
+            "materials": [],
+            "accessors": [],
+            "bufferViews": [],
+            "buffers": [],
+        }
+        self._shapes: dict[str, tuple[int, int, int]] = {}
+        self._uses: dict[tuple[str, int], int] = {}
+
+    def run(self) -> bytes:
+        meshes = meshes_of(self._assembly, self._views)
+        for key, mesh in meshes.items():
+            self._shapes[key] = self._shape(mesh)
+        self._shapes[""] = self._shape(ellipsoid())
+        size = scene_size(self._assembly, self._views)
+        for number, view in enumerate(self._views):
+            colour = UNCLAIMED if view.props is None and not view.name else colour_of(number)
+            self._link(view, colour, size)
+        self._doc["buffers"] = [{"byteLength": len(self._blob)}]
+        return self._packed()
+
+    def _link(self, view: LinkView, colour: Colour, size: float) -> None:
+        children: list[int] = []
+        material = self._material(view.name or "no link", colour)
+        for instance in view.instances:
+            if instance.prototype in self._shapes:
+                mesh = self._mesh(instance.prototype, material)
+                children.append(self._node(instance.name, mesh, instance.transform))
+        node: dict[str, Any] = {"name": view.name or "no link", "children": children}
+        if view.props is not None:
+            children += self._mass(view, colour, size)
+            node["extras"] = {
+                "mass_kg": view.props.mass,
+                "com_m": view.props.com.tolist(),
+                "inertia_kg_m2": view.props.inertia.tolist(),
+            }
+        if not children:
+            del node["children"]
+        self._doc["nodes"].append(node)
+        self._doc["nodes"][0]["children"].append(len(self._doc["nodes"]) - 1)
+
+    def _mass(self, view: LinkView, colour: Colour, size: float) -> list[int]:
+        shape = inertia_ellipsoid(view.props) if view.props is not None else None
+        if shape is None:
+            return []
+        clear = self._material(f"{view.name} inertia", colour, alpha=0.35)
+        dark = self._material(f"{view.name} centre of mass", (0.05, 0.05, 0.05))
+        mark = np.diag([MARKER * size] * 3 + [1.0])
+        mark[:3, 3] = shape.centre
+        return [
+            self._node(f"{view.name} centre of mass", self._mesh("", dark), mark),
+            self._node(f"{view.name} inertia ellipsoid", self._mesh("", clear), shape.placement),
+        ]
+
+    def _node(self, name: str, mesh: int, matrix: Floats) -> int:
+        columns = [float(f"{value:.8g}") for value in matrix.T.ravel()]
+        self._doc["nodes"].append({"name": name, "mesh": mesh, "matrix": columns})
+        return len(self._doc["nodes"]) - 1
+
+    def _mesh(self, key: str, material: int) -> int:
+        if (key, material) not in self._uses:
+            position, normal, index = self._shapes[key]
+            primitive = {
+                "attributes": {"POSITION": position, "NORMAL": normal},
+                "indices": index,
+                "material": material,
+            }
+            self._doc["meshes"].append({"primitives": [primitive]})
+            self._uses[key, material] = len(self._doc["meshes"]) - 1
+        return self._uses[key, material]
+
+    def _material(self, name: str, colour: Colour, alpha: float = 1.0) -> int:
+        # glTF wants linear values; ours are meant as a screen shows them.
+        linear = [round(float(c) ** 2.2, 4) for c in colour]
+        material: dict[str, Any] = {
+            "name": name,
+            "doubleSided": True,
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [*linear, alpha],
+                "metallicFactor": 0.1,
+                "roughnessFactor": 0.7,
+            },
+        }
+        if alpha < 1:
+            material["alphaMode"] = "BLEND"
+        self._doc["materials"].append(material)
+        return len(self._doc["materials"]) - 1
+
+    def _shape(self, mesh: Mesh) -> tuple[int, int, int]:
+        body = shaded(mesh)
+        points = body.vertices.astype("<f4")
+        position = self._accessor(points, "VEC3", _VERTICES)
+        self._doc["accessors"][position]["min"] = [float(v) for v in points.min(axis=0)]
+        self._doc["accessors"][position]["max"] = [float(v) for v in points.max(axis=0)]
+        normal = self._accessor(body.normals.astype("<f4"), "VEC3", _VERTICES)
+        index = self._accessor(body.faces.astype("<u4").ravel(), "SCALAR", _INDICES)
+        return position, normal, index
+
+    def _accessor(self, values: NDArray[Any], kind: str, target: int) -> int:
+        data = values.tobytes()
+        view = {
+            "buffer": 0,
+            "byteOffset": len(self._blob),
+            "byteLength": len(data),
+            "target": target,
+        }
+        self._blob += data
+        self._doc["bufferViews"].append(view)
+        self._doc["accessors"].append(
+            {
+                "bufferView": len(self._doc["bufferViews"]) - 1,
+                "componentType": _FLOAT if values.dtype.kind == "f" else _UINT,
+                "count": len(values),
+                "type": kind,
+            }
+        )
+        return len(self._doc["accessors"]) - 1
+
+    def _packed(self) -> bytes:
+        text = json.dumps(self._doc, separators=(",", ":")).encode("utf-8")
+        text += b" " * (-len(text) % 4)
+        blob = bytes(self._blob) + b"\0" * (-len(self._blob) % 4)
+        header = struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(blob))
+        chunks = (
+            struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(blob), b"BIN\0") + blob
+        )
+        return header + chunks
+
+
+def scene_size(assembly: Assembly, views: Sequence[LinkView]) -> float:
+    """Return the diagonal [m] of the box around everything that is shown."""
+    corners = {}
+    for key, mesh in meshes_of(assembly, views).items():
+        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        corners[key] = np.array([[(low, high)[(n >> axis) & 1][axis] for axis in range(3)] for n in range(8)])
+    rows = [
+        corners[i.prototype] @ i.transform[:3, :3].T + i.transform[:3, 3]
+        for view in views
+        for i in view.instances
+        if i.prototype in corners
+    ]
+    return float(np.linalg.norm(np.ptp(np.concatenate(rows), axis=0))) if rows else 1.0
+
 
 _SOURCE_COLOURS = {
     Source.BOM_MASS: "#2f7d4f",
     Source.MATERIAL: "#3d7ac0",
+    Source.TARGET_MASS: "#1b6e8c",
     Source.SUB_ASSEMBLY_MASS: "#7fb7d6",
     Source.STEP_DENSITY: "#8b79c9",
     Source.DEFAULT_DENSITY: "#d9982f",
@@ -35,17 +306,15 @@ _SOURCE_COLOURS = {
 
 
 def report_html(report: InertiaReport, assembly: Assembly) -> str:
-    """The page, as text."""
+    """Return the page, as text."""
     views = views_of(report, assembly)
     shapes = bool(meshes_of(assembly, views))
     glb = base64.b64encode(write_glb(assembly, views)).decode() if shapes else ""
-    png = base64.b64encode(write_picture(assembly, views)).decode() if shapes else ""
     page = _file("report.html")
     for mark, text in (
         ("/*THREE*/", _file("three.min.js") if shapes else ""),
         ("/*VIEWER*/", _file("report.js")),
         ("/*GLB*/", glb),
-        ("/*PNG*/", png),
         # Last: what a file says must not be searched for marks.
         ("/*DATA*/", _json(_data(report, views, shapes))),
     ):
@@ -60,7 +329,7 @@ def _file(name: str) -> str:
 
 
 def _json(data: Any) -> str:
-    """JSON that cannot end the element it stands in."""
+    """Return JSON that cannot end the element it stands in."""
     return json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
@@ -114,30 +383,17 @@ def _sources(parts: Sequence[PartResult]) -> list[dict[str, Any]]:
 
 
 def _warnings(report: InertiaReport) -> list[dict[str, Any]]:
-    """By code; those that concern the most mass first."""
-    masses: dict[tuple[str, str], float] = {}
-    for link, part in report.parts():
-        masses[link, part.name] = masses.get((link, part.name), 0.0) + part.total_mass
-    groups: dict[str, list[PartWarning]] = {}
-    for warning in report.warnings:
-        groups.setdefault(str(warning.code), []).append(warning)
-    rows = []
-    for code, warnings in groups.items():
-        places = {(w.link_name, w.part_name) for w in warnings}
-        rows.append(
-            {
-                "title": code.replace("_", " "),
-                "mass": _finite(sum(masses.get(place, 0.0) for place in places)),
-                "items": [
-                    {
-                        "where": " / ".join(w for w in (one.link_name, one.part_name) if w),
-                        "message": one.message,
-                    }
-                    for one in warnings
-                ],
-            }
-        )
-    return sorted(rows, key=lambda row: -(row["mass"] or 0.0))
+    return [
+        {
+            "title": cause.code.replace("_", " "),
+            "mass": _finite(cause.mass),
+            "items": [
+                {"where": " / ".join(w for w in (one.link_name, one.part_name) if w), "message": one.message}
+                for one in cause.warnings
+            ],
+        }
+        for cause in report.causes()
+    ]
 
 
 def _link(link: LinkResult) -> dict[str, Any]:
@@ -161,6 +417,7 @@ def _part(link: str, part: PartResult) -> dict[str, Any]:
         "link": link or "(no link)",
         "name": part.name,
         "number": part.part_number,
+        "paths": part.paths,
         "quantity": part.quantity,
         "mass": _finite(part.mass),
         "total": _finite(part.total_mass),
@@ -175,12 +432,12 @@ def _part(link: str, part: PartResult) -> dict[str, Any]:
 
 
 def _vector(values: Iterable[float], size: float) -> list[float | None]:
-    """What is noise against ``size`` is 0, as in the other reports."""
+    """Round what is noise against ``size`` to 0, as in the other reports."""
     return [0.0 if abs(value) <= NOISE * size else _finite(value) for value in values]
 
 
 def _finite(value: float) -> float | None:
-    """JSON has no NaN; the page shows such a value as one that is not finite."""
+    """Replace NaN, which JSON lacks; the page shows such a value as not finite."""
     number = float(value)
     return number if math.isfinite(number) else None
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from trimesh import creation
 
-from silo.inertia.geometry.mesh import Floats, Indices, Mesh
+from silo.inertia.geometry.together import Floats, Indices, Mesh
 
 CREASE = np.cos(np.radians(38.0))
 """Faces that meet at more than this angle keep their edge."""
@@ -27,7 +27,7 @@ class Shaded:
 
 
 def shaded(mesh: Mesh) -> Shaded:
-    """The mesh with normals; a vertex on an edge becomes several."""
+    """Return the mesh with normals; a vertex on an edge becomes several."""
     if not len(mesh):
         return Shaded(mesh.vertices, np.zeros_like(mesh.vertices), mesh.faces)
     place = np.unique(mesh.vertices, axis=0, return_inverse=True)[1].reshape(-1)
@@ -42,7 +42,8 @@ def shaded(mesh: Mesh) -> Shaded:
 
 
 def _smoothed(vertex: Indices, areas: Floats) -> Floats:
-    """(3 m, 3): for each corner the mean normal of the faces at its vertex that look about its own way.
+    """Return (3 m, 3): for each corner the mean normal of the faces at its vertex that look about its own
+    way.
 
     ``vertex`` (3 m,) of each corner, ``areas`` (m, 3) normals as long as the faces are large.
     """
@@ -69,6 +70,6 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def ellipsoid(rings: int = 20, sectors: int = 32) -> Mesh:
-    """A unit sphere; scaled by three semi-axes it is any ellipsoid."""
+    """Return a unit sphere; scaled by three semi-axes it is any ellipsoid."""
     ball = creation.uv_sphere(radius=1.0, count=(rings, sectors))
     return Mesh(np.asarray(ball.vertices), np.asarray(ball.faces))

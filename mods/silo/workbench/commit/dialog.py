@@ -9,9 +9,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from silo.workbench.commit.desk import Answer
+from silo.workbench.commit.flow import Answer, Choice, Theirs, choice_texts, line_texts, more_text
 from silo.workbench.commit.plan import Plan, Row, State
-from silo.workbench.commit.theirs import Choice, Theirs, choice_texts, line_texts, more_text
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone

@@ -7,33 +7,446 @@
              refused: warn   └ no: nothing happens      └ a failure: a box, and the next document
 
 Each document has a turn of the event loop of its own, so that the window stays alive between them. FreeCAD
-and Qt come in through the :class:`~silo.workbench.commit.desk.Desk` only.
+and Qt come in through the :class:`~silo.workbench.commit.flow.Desk` only.
+
+What a person decided once and is not to be asked again: files that are the same part on purpose.
+
+One small JSON file in the user's data folder. Losing it costs a repeated question, no more.
+
+What a colleague did to a file since it was opened here: the look at Silo, and its words. No widgets.
+
+The look belongs in a worker; what it finds are values.
+
+What the flows need of FreeCAD and of the person in front of it; :mod:`silo.workbench.freecad.live_desk`
+has it.
+
+With a desk of a test's own the flows run without FreeCAD and Qt. All calls are made in the GUI thread.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
-from silo.bom.changes import Assembly
-from silo.bom.errors import DocumentError, SiloError
+from silo.bom.compare import Assembly, ThreeLines
+from silo.bom.errors import DocumentError, NotFoundError, RouteMissingError, SiloError
+from silo.bom.findings import Finding, FindingCode
+from silo.bom.model import Extraction, walk_entries
+from silo.bom.resolve import display_name
 from silo.outbox.entry import UNKNOWN, Commit, new_key
 from silo.outbox.store import on_top, seen
-from silo.spelling import one_path
-from silo.workbench.commit.decisions import Decisions
-from silo.workbench.commit.desk import Answer, Desk
-from silo.workbench.commit.plan import Plan, Row, State, Taken, is_edited, plan, refusal, take_each
-from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.commit.theirs import Asked, Choice, Theirs, look
+from silo.platform import data_folder, one_path, read_memory, write_memory
+from silo.workbench.commit.opened import Base
+from silo.workbench.commit.plan import (
+    Documents,
+    Plan,
+    Row,
+    Snapshot,
+    State,
+    Taken,
+    is_edited,
+    plan,
+    refusal,
+    take_each,
+)
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, not_in_silo_key
 from silo.workbench.session.session import Session
 from silo.workbench.settings.preferences import ALLOW, Preferences
-from silo.workbench.words import translate
+from silo.workbench.words import counted, plain, quantity, translate
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+    from silo.api.files import Standing
+    from silo.api.transport import Cancel
+    from silo.outbox.entry import Entry as QueueEntry
+    from silo.outbox.store import Store
+    from silo.registering.offer import Candidate, Seen
+    from silo.workbench.preview.flow import PreviewFlow
+    from silo.workbench.preview.flow import Window as Preview
+    from silo.workbench.register.flow import RegisterFlow
+    from silo.workbench.register.flow import Window as Registering
+    from silo.workbench.session.session import Newer
+
+
+class Decisions:
+    """Identities that may occur in several files: identity → the files."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        self._path = path or data_folder() / "same-parts.json"
+
+    def accept(self, identity: str, files: Iterable[str]) -> None:
+        """These files are the same part, says a person."""
+        known = self._read()
+        known[identity.lower()] = sorted({*known.get(identity.lower(), ()), *files})
+        write_memory(self._path, known)
+
+    def without_accepted(self, extraction: Extraction) -> Extraction:
+        """The extraction without the copied-identity findings that a person has accepted."""
+        if not any(f.code is FindingCode.COPIED_IDENTITY for f in extraction.findings):
+            return extraction
+        known = self._read()
+        identities = {
+            entry.key: (entry.silo_uuid or "").lower()
+            for entry in walk_entries((extraction.assembly, *extraction.entries))
+        }
+
+        def accepted(finding: Finding) -> bool:
+            if finding.code is not FindingCode.COPIED_IDENTITY or not finding.where:
+                return False
+            first = finding.where[0]
+            files = {place.doc_path for place in finding.where}
+            return files <= set(known.get(identities.get((first.doc_path, first.obj), ""), ()))
+
+        kept = tuple(f for f in extraction.findings if not accepted(f))
+        return replace(extraction, findings=kept)
+
+    def _read(self) -> dict[str, list[str]]:
+        known = read_memory(self._path)
+        return {key: [str(file) for file in files] for key, files in known.items() if isinstance(files, list)}
+
+
+class Choice(StrEnum):
+    """What a person wants to be done about a file that a colleague has changed."""
+
+    LEAVE = "leave"  # leave mine out of this commit
+    OPEN = "open"  # open theirs beside mine
+    TAKE = "take"  # take theirs; mine is kept aside
+    ON_TOP = "on top"  # commit mine on top of theirs
+
+
+def choice_texts() -> dict[Choice, str]:
+    """The choices in words, the harmless one first."""
+    return {
+        Choice.LEAVE: translate("Silo", "leave out"),
+        Choice.OPEN: translate("Silo", "open theirs beside mine"),
+        Choice.TAKE: translate("Silo", "take theirs"),
+        Choice.ON_TOP: translate("Silo", "commit mine on top"),
+    }
+
+
+@dataclass(frozen=True)
+class Theirs:
+    """A colleague's state of a file.
+
+    part_number, revision
+        theirs in Silo; "" and 0 where it is only the file on disk that is another one.
+    base
+        the number of the revision that mine was made from; None where nobody knows.
+    lines
+        the BOM base → theirs → mine, for assemblies.
+    """
+
+    path: str
+    part_number: str = ""
+    revision: int = 0
+    who: str = ""
+    when: float | None = None
+    comment: str = ""
+    base: int | None = None
+    lines: tuple[ThreeLines, ...] = ()
+    newer: Mapping[str, Any] | None = None
+
+    @property
+    def headline(self) -> str:
+        """Who committed which revision, and what mine was made from."""
+        if not self.revision:
+            return translate("Silo", "the file on disk was changed since you opened it")
+        text = translate("Silo", "{who} committed revision {n}; yours was made from {base}")
+        if self.base is None:
+            base = translate("Silo", "a file that is no revision in Silo")
+        else:
+            base = translate("Silo", "revision {n}").replace("{n}", str(self.base))
+        who = plain(self.who, 60) or translate("Silo", "Somebody")
+        return text.replace("{base}", base).replace("{n}", str(self.revision)).replace("{who}", who)
+
+
+def of_held(entry: QueueEntry) -> Theirs:
+    """The revision that a held commit of the outbox would undo, as it was when the commit was to be sent."""
+    newer = entry.newer
+    return Theirs(
+        entry.path,
+        entry.part_number,
+        newer["revision_number"],
+        newer.get("created_by") or "",
+        comment=newer.get("comment") or "",
+        newer=newer,
+    )
+
+
+def line_words(line: ThreeLines, *, known: bool = True) -> str:
+    """``Bolt: 6 → 4 by them, 8 by you``; ``known``: the base is."""
+    base, theirs, mine = (quantity(value) for value in line.quantities)
+    name = plain(display_name(line.entry) or line.entry.object_name, 60)
+    if not known:
+        text = translate("Silo", "{name}: {theirs} in theirs, {mine} in yours")
+    elif line.by_them and line.by_me and theirs == mine:
+        text = translate("Silo", "{name}: {base} → {mine} by both of you")
+    elif line.by_them and line.by_me:
+        text = translate("Silo", "{name}: {base} → {theirs} by them, {mine} by you")
+    elif line.by_them:
+        text = translate("Silo", "{name}: {base} → {theirs} by them, as before in yours")
+    else:
+        text = translate("Silo", "{name}: {base} → {mine} by you, as before in theirs")
+    for key, value in (("{base}", base), ("{theirs}", theirs), ("{mine}", mine)):
+        text = text.replace(key, value)
+    return text.replace("{name}", name)
+
+
+def line_texts(theirs: Theirs, most: int | None = None) -> list[str]:
+    """Its lines in words; not more than ``most``."""
+    return [line_words(line, known=theirs.base is not None) for line in theirs.lines[:most]]
+
+
+def more_text(left: int) -> str:
+    """The text of the button that shows the rest."""
+    return counted(left, translate("Silo", "… and {n} more line"), translate("Silo", "… and {n} more lines"))
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A file to look at: its path, the identity of its item, and what the document was made from."""
+
+    path: str
+    identity: str
+    base: Base
+
+
+def look(
+    client: SiloClient,
+    outbox: Store,
+    asked: Iterable[Asked],
+    mine: Callable[[str], Assembly | None],
+    cancelled: Cancel | None = None,
+) -> dict[str, Theirs]:
+    """Path → what a colleague committed since, for the files where that is so. For a worker.
+
+    mine
+        the BOM of the document of a path as it is now.
+    """
+    files = [one for one in asked if one.identity]
+    items = client.get_items_by_uuid([one.identity for one in files], cancelled=cancelled)
+    found: dict[str, Theirs] = {}
+    for one in files:
+        if (item := items.get(one.identity)) is None:
+            continue
+        file = _File(one.path, item.part_number, one.identity, one.base.settle(outbox))
+        if (stands := file.standing(client, outbox)) is not None:
+            lines: tuple[ThreeLines, ...] = ()
+            with suppress(SiloError):  # the question stands without its details
+                lines = file.lines(client, stands, mine(one.path), cancelled)
+            found[one.path] = file.theirs(stands, lines)
+    return found
+
+
+def gone(client: SiloClient, announced: Mapping[str, Newer], cancelled: Cancel | None = None) -> list[str]:
+    """The items of which the server no longer has the announced commit. For a worker: a request for each."""
+    from silo.api.files import newest_number
+    from silo.api.transport import stop_if
+
+    found = []
+    for identity, newer in announced.items():
+        stop_if(cancelled)
+        try:
+            known = client.revisions(newer.part_number, newest=1)
+        except RouteMissingError:
+            continue
+        except NotFoundError:
+            known = []
+        if newest_number(known) < newer.revision:
+            found.append(identity)
+    return found
+
+
+def look_held(
+    client: SiloClient, outbox: Store, entry: QueueEntry, cancelled: Cancel | None = None
+) -> Theirs | None:
+    """The newest revision that a held commit would undo, with the BOM base → theirs → mine; None for a part,
+    for another server's, and where nothing would be undone any more. For a worker.
+
+    Raises SiloError where the server or a file does not answer.
+    """
+    from silo.api.config import canonical
+    from silo.bom.report import from_plain
+    from silo.vault.pull import top_of
+
+    extraction = outbox.bom(entry.id)[0]
+    if not extraction or entry.server != canonical(client.base_url):
+        return None
+    try:
+        mine = top_of(from_plain(json.loads(extraction)))
+    except ValueError:
+        return None  # sending it says so
+    file = _File(entry.path, entry.part_number, entry.identity, entry.origin)
+    stands = file.standing(client, outbox)
+    return None if stands is None else file.theirs(stands, file.lines(client, stands, mine, cancelled))
+
+
+@dataclass(frozen=True)
+class _File:
+    path: str
+    part_number: str
+    identity: str
+    origin: str
+
+    def standing(self, client: SiloClient, outbox: Store) -> Standing | None:
+        """None where the file would undo nothing."""
+        from silo.api.files import is_newest, standing
+
+        # The newest one decides it nearly always; an item may have hundreds.
+        if is_newest(self.origin, client.revisions(self.part_number, newest=1)):
+            return None
+        known = outbox.known_revision(client.base_url, self.origin, self.identity)
+        stands = standing(client.revisions(self.part_number), self.origin, known)
+        return None if stands.newer is None else stands
+
+    def lines(
+        self, client: SiloClient, stands: Standing, mine: Assembly | None, cancelled: Cancel | None
+    ) -> tuple[ThreeLines, ...]:
+        from silo.vault.pull import RevisionBoms
+
+        if mine is None:
+            return ()
+        with RevisionBoms(client, self.part_number, self.path, cancelled) as boms:
+            return boms.three(stands, mine)
+
+    def theirs(self, stands: Standing, lines: tuple[ThreeLines, ...]) -> Theirs:
+        newest = stands.newest
+        assert newest is not None  # something is newer
+        return Theirs(
+            self.path,
+            self.part_number,
+            newest.revision_number,
+            newest.created_by or "",
+            newest.created_at.timestamp() if newest.created_at else None,
+            newest.comment,
+            stands.base.revision_number if stands.base is not None else None,
+            lines,
+            newest.model_dump(mode="json", exclude={"properties", "links"}),
+        )
+
+
+Look = Callable[[Callable[[Mapping[str, Theirs]], None]], object]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a person says in the commit dialog.
+
+    register
+        give it a part number as well.
+    choices
+        what to do about files that colleagues have changed, beside committing.
+    """
+
+    rows: tuple[Row, ...]
+    comment: str = ""
+    register: bool = False
+    choices: tuple[tuple[Row, Theirs, Choice], ...] = ()
+
+
+class Account(Protocol):
+    """One assembly's solids (:class:`silo.workbench.freecad.witness.Account`)."""
+
+    @property
+    def doc_path(self) -> str: ...
+
+    @property
+    def agrees(self) -> bool: ...
+
+    @property
+    def unexplained(self) -> tuple[str, ...]: ...
+
+    def sentence(self) -> str: ...
+
+
+class Desk(Protocol):
+    """FreeCAD's documents, its window, and a person."""
+
+    @property
+    def documents(self) -> Documents: ...
+
+    def snapshot(self, doc: Any, /) -> Snapshot:
+        """Snapshot of a live document."""
+
+    def find(self, path: str, /) -> Any | None:
+        """The open document of a file; None where it is not open."""
+
+    def save_as(self, doc: Any, /) -> None:
+        """Let a person give a document its first name."""
+
+    def identity(self, doc: Any, /) -> str | None:
+        """The item that a document belongs to, without looking at its components."""
+
+    def ask(self, planned: Plan, note: str, comment: str, look: Look, /) -> Answer | None:
+        """Which documents to commit, with which comment; None where the person does not want to.
+
+        comment
+            what the person wrote before and is not in Silo yet.
+        look
+            begins to look at Silo, and calls back with what colleagues did meanwhile.
+        """
+
+    def warn(self, title: str, text: str, /) -> None:
+        """A message that a person must have seen."""
+
+    def later(self, call: Callable[[], None], /) -> None:
+        """Run something in a turn of its own, once the present event is done."""
+
+    # -- files ------------------------------------------------------------------------------------------
+
+    def open(self, path: str, /) -> Any:
+        """The document of a file, opened whole."""
+
+    def close(self, doc: Any, /) -> None:
+        """Close a document without saving."""
+
+    def save_copy(self, doc: Any, path: Path, /) -> None:
+        """Write a document, with its unsaved edits, to another file."""
+
+    def open_paths(self) -> tuple[str, ...]:
+        """The files that this FreeCAD has open."""
+
+    def is_open_elsewhere(self, path: str, /) -> bool:
+        """True where another FreeCAD of this user has the file open."""
+
+    # -- previews ---------------------------------------------------------------------------------------
+
+    def preview_window(self, title: str, path: str, flow: PreviewFlow, /) -> Preview:
+        """Open the preview of a document."""
+
+    def accounts(self, extraction: Extraction, /) -> Sequence[Account]:
+        """The solids that FreeCAD shows, for the assembly and each sub-assembly."""
+
+    def relink(self, finding: Finding, /) -> list[str]:
+        """Set the live links of a finding to the file that was meant; their labels."""
+
+    # -- registering ------------------------------------------------------------------------------------
+
+    def register_window(self, title: str, path: str, flow: RegisterFlow, /, *, asks: bool) -> Registering:
+        """Open the Register Parts dialog of a document."""
+
+    def look_at(self, paths: Iterable[str], /) -> dict[str, Seen]:
+        """How the files of components stand."""
+
+    def write_identity(self, candidate: Candidate, identity: str, /) -> None:
+        """Write an identity into a component's document and save it."""
+
+    def remove_identity(self, candidate: Candidate, /) -> None:
+        """Take the identity from what is modelled in an assembly's own file, and save it."""
+
+    def unedited(self) -> list[Any]:
+        """The documents without unsaved edits, each after those that it links to."""
+
+    def save_marked(self, doc: Any, /) -> None:
+        """Save a document that was unedited, where FreeCAD has marked it for something below it."""
 
 
 class CommitFlow:
@@ -97,7 +510,10 @@ class CommitFlow:
         """Commit a document: ask where there is something to ask, then return without waiting."""
         if not doc.FileName:
             self._desk.save_as(doc)
-        unregistered = bool(doc.FileName) and not self._desk.is_registered(doc)
+        # A file of several registered parts is no item, and needs none: it goes as a document.
+        unregistered = bool(
+            doc.FileName and not self._desk.identity(doc) and not self._desk.snapshot(doc).several
+        )
         planned = plan(doc, self._desk.documents, unregistered=unregistered)
         if text := refusal(planned):
             if planned.top.state is not State.UNNAMED:
@@ -112,10 +528,44 @@ class CommitFlow:
         if answer is None:
             return
         self.run(answer.rows, answer.comment)
+        if not unregistered:
+            decided = {row.path for row in planned.rows}
+            top = planned.top.path
+            # The top too, if it is no item: nothing else sends it.
+            skip = decided if self._desk.identity(doc) else decided - {top}
+            self._turns.append((self._along(top, skip, answer.comment), ""))
         for row, theirs, choice in answer.choices:
             self.choose(row.path, theirs, choice)
         if answer.register:
             self._turns.append((self._registering(planned.top.path), ""))
+
+    def _along(self, path: str, skip: set[str], comment: str) -> Iterator[Taken]:
+        """A turn after the documents are saved: what they link to goes along, if Silo does not have it."""
+        how = {"comment": comment, "allow_missing": self._preferences.text("MissingLinks") == ALLOW}
+        title = translate("Silo", "Looking at the linked files")
+
+        def work(client: Any, server: str) -> int:
+            from silo.vault.project import send_along  # late: FreeCAD's start waits for this module
+
+            return send_along(path, client, self._session.outbox, server, skip, **how)
+
+        def sent(count: int) -> None:
+            if count:
+                self._session.send(force=True)
+
+        def failed(error: SiloError) -> None:
+            self._tell_error(os.path.basename(path), str(error))
+
+        def offline(_error: SiloError) -> None:
+            self._session.aside(title, lambda _control: work(None, ""), done=sent, failed=failed)
+
+        def ask() -> None:
+            self._session.ask(
+                title, lambda client, _control: work(client, client.base_url), done=sent, failed=offline
+            )
+
+        self._session.after_keeping(ask)
+        yield from ()
 
     def _registering(self, path: str) -> Iterator[Taken]:
         """A turn after the documents are saved."""
@@ -149,7 +599,7 @@ class CommitFlow:
         announced = self._session.shown.newer
 
         def question(client: Any, control: Any) -> dict[str, Theirs]:
-            from silo.vault.revisions import top_of
+            from silo.vault.pull import top_of
 
             def mine(path: str) -> Assembly | None:
                 taken = self._session.in_gui(lambda: self._desk.snapshot(documents[path]), control)
@@ -242,7 +692,8 @@ class CommitFlow:
         if taken.error is not None:
             self._tell_error(taken.row.label, str(taken.error))
         elif taken.snapshot is not None and not taken.snapshot.identity:
-            self._session.add(not_in_silo(taken.snapshot))
+            if not taken.snapshot.several:
+                self._session.add(not_in_silo(taken.snapshot))
             if comment:
                 self._comments[taken.snapshot.path] = comment
         else:

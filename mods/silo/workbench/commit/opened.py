@@ -16,12 +16,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from silo.durable import Stamp
+    from silo.platform import Stamp
 
 
 def _stamp(path: str) -> Stamp | None:
     """What changes when a file is written; None where there is none. FreeCAD's start does not import it."""
-    from silo.durable import stamp_of
+    from silo.platform import stamp_of
 
     return stamp_of(path)
 

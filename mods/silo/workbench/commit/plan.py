@@ -3,6 +3,10 @@
 
 A plan lists the document and everything below it that has unsaved edits, leaves before parents (spec,
 design decision 3). Nothing is lost: a document that FreeCAD cannot save whole is reported, never written.
+
+A document as it was at one moment: what the worker needs to know of it, and nothing that is alive.
+
+Taken in the GUI thread in milliseconds; from then on the document may change, be closed, or FreeCAD may die.
 """
 
 from __future__ import annotations
@@ -15,13 +19,72 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
-from silo.bom.errors import DocumentError, SiloError
-from silo.durable import Stamp, stamp_of
+from silo.bom.errors import DocumentError, SeveralAssembliesError, SiloError
+from silo.bom.links import extract, file_bom
+from silo.bom.model import Extraction, held_items, sole_identity
+from silo.bom.report import to_plain
+from silo.bom.roots import NAME_ONE
 from silo.outbox.entry import new_key
-from silo.spelling import one_path
+from silo.platform import Stamp, one_path, stamp_of
 from silo.workbench.commit.opened import Base
-from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.words import plain, translate
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A document at commit time.
+
+    path
+        real path of its file.
+    identity
+        Silo UUID of the item that the file belongs to; None while unregistered.
+    extraction
+        the BOM, for an assembly; None for a part.
+    problem
+        why there is no BOM though there might be one ("several assemblies").
+    several
+        several items are in it, and it is none of them: its file is a document of its own.
+    """
+
+    path: str
+    label: str
+    identity: str | None = None
+    extraction: Extraction | None = None
+    problem: str = field(default="", compare=False)
+    several: bool = field(default=False, compare=False)
+
+    @property
+    def is_assembly(self) -> bool:
+        """True where there is a BOM to sync."""
+        return self.extraction is not None
+
+    def is_as(self, other: Snapshot) -> bool:
+        """True where both are of one state: the same item, and the same BOM with all below it."""
+        mine, its = (one.extraction and to_plain(one.extraction) for one in (self, other))
+        return (self.path, self.identity, mine) == (other.path, other.identity, its)
+
+
+Walk = Callable[[Any], Extraction]
+
+
+def take(doc: Any, *, assembly: Any = None, walk: Walk = extract) -> Snapshot:
+    """Take a snapshot of an open document.
+
+    assembly
+        the container that a person works in, where that is known; used where the document holds several.
+    walk
+        gives the BOM of a container (:func:`silo.workbench.freecad.live.extract_object`).
+    """
+    path = one_path(doc.FileName) if doc.FileName else ""
+    label = str(getattr(doc, "Label", "") or os.path.basename(path))
+    try:
+        found, extraction = file_bom(doc, assembly, walk)
+    except SeveralAssembliesError as error:
+        here = translate("Silo", "Make the one that is meant active: double-click it in the tree.")
+        return Snapshot(path, label, sole_identity(doc), problem=str(error).replace(NAME_ONE, here))
+    several = not found and len({identity for identity, _ in held_items(doc)}) > 1
+    return Snapshot(path, label, found, extraction, several=several)
+
 
 # Seconds of the GUI thread; what has not been compared with its file by then counts as edited.
 MOST_S = 0.08

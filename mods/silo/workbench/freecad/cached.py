@@ -12,6 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from silo.bom.document import LinkProblem
+from silo.bom.findings import FindingCode
+
 # Attributes of an object that are no properties, and that a walk may ask for.
 _PLAIN = frozenset(("State", "ID", "dumpPropertyContent", "getLinkedObject", "isValid"))
 
@@ -21,10 +24,17 @@ class FactCache:
 
     is_object
         True for a FreeCAD document object.
+    imported
+        gives the part in a file that A2plus imported into a document: (path of the document, the file).
     """
 
-    def __init__(self, is_object: Callable[[Any], bool]) -> None:
+    def __init__(
+        self,
+        is_object: Callable[[Any], bool],
+        imported: Callable[[str, str], Any] = lambda _owner, file: LinkProblem(FindingCode.BROKEN_LINK, file),
+    ) -> None:
         self._is_object = is_object
+        self.imported = imported
         self._objects: dict[Any, CachedObject] = {}
         self._documents: dict[str, CachedDocument] = {}
         # FreeCAD's answer depends on the type alone.
@@ -127,6 +137,10 @@ class CachedDocument:
         """An object by its ``Name``."""
         found = self.real.getObject(name)
         return self._cache.object(found) if found is not None else None
+
+    def imported(self, file: str) -> Any:
+        """The part that A2plus imported from a file, read from there: FreeCAD does not open it."""
+        return self._cache.imported(self.FileName, file)
 
     def getPropertyByName(self, name: str) -> Any:
         """A property of the document; AttributeError where there is none, as in FreeCAD."""

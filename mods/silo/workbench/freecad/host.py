@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Set
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -40,12 +40,13 @@ def version() -> tuple[int, int]:
 
 
 def program() -> str:
-    """The command line program that runs this FreeCAD. ConfigError where it cannot be told."""
+    """Return the command line program of this FreeCAD. Raises ConfigError if nobody can say which."""
     from silo.bom.errors import ConfigError
 
-    homes = (sys.executable, os.path.join(FreeCAD.getHomePath(), "bin", "freecadcmd"))
-    for path in (*homes, f"{homes[1]}.exe"):
-        if "freecadcmd" in os.path.basename(path or "").lower() and os.path.isfile(path):
+    folders = (os.path.dirname(sys.executable or ""), os.path.join(FreeCAD.getHomePath(), "bin"))
+    names = (os.path.basename(sys.executable or ""), "freecadcmd", "FreeCADCmd", "freecadcmd.exe")
+    for path in (os.path.join(folder, name) for folder in folders for name in names):
+        if "freecadcmd" in os.path.basename(path).lower() and os.path.isfile(path):
             return path
     raise ConfigError("FreeCAD does not say which program runs it")
 
@@ -96,64 +97,95 @@ def save_parameters() -> None:
     FreeCAD.saveParameter()
 
 
-Leaves = dict[tuple[str, str], tuple[Any, int]]
+class Pieces:
+    """How many solids FreeCAD shows for an object: visible, hidden, and marked as left out.
 
+    One for each sub-object path. FreeCAD itself says what an object shows (``getSubObjects``), with all that
+    it links to. Its shape of a container (``Part.getShape``) would have twice what lies in a folder.
 
-class ShownLeaves:
-    """The objects with a shape of their own that FreeCAD shows for an object, and how often each.
-
-    FreeCAD itself says what an object shows (``getSubObjects``), with all that it links to; what is hidden is
-    not shown. Its shape of a container (``Part.getShape``) would have twice what lies in a folder.
-
-    though_hidden
-        document and name of objects that are taken as shown wherever they lie, with all their elements.
+    own_shapes
+        the solids of single shapes, kept for the next assembly.
+    top
+        the assembly: what leads back to it shows nothing.
     """
 
-    def __init__(self, though_hidden: Set[tuple[str, str]] = frozenset()) -> None:
-        self._though_hidden = though_hidden
-        self._known: dict[tuple[str, str, bool], Leaves] = {}
+    def __init__(self, own_shapes: dict[tuple[str, str], int], top: Any = None) -> None:
+        from silo.bom.walk.kinds import left_out_by
 
-    def of(self, obj: Any, hidden: bool = False) -> Leaves:
-        """Document and name of each leaf → the leaf, and how often it is shown. ``hidden``: the object is."""
-        obj = getattr(obj, "real", obj)
-        linked = obj.getLinkedObject(True)
-        if linked is not None and linked != obj:
-            if hidden:
-                return {}
-            obj = linked
-        key = (obj.Document.Name, obj.Name, hidden)
+        self._left_out_by = left_out_by
+        self._own_shapes = own_shapes
+        self._known = {} if top is None else {(top.Document.Name, top.Name): (0, 0, 0)}
+
+    def of(self, obj: Any, is_visible: bool = True) -> tuple[int, int, int]:
+        """The solids of an object. ``is_visible``: where it lies."""
+        obj = real(obj)
+        target = obj.LinkedObject if obj.isDerivedFrom("App::Link") else None
+        if isinstance(target, tuple) and not target[1].endswith("."):  # a face or an edge
+            return (0, 0, 0)
+        end = obj.getLinkedObject(True) or obj
+        key = (end.Document.Name, end.Name)
         if key not in self._known:
-            self._known[key] = {}  # what leads back to itself shows nothing
-            self._known[key] = self._inside(obj, hidden)
-        return self._known[key]
+            self._known[key] = (0, 0, 0)  # what leads back to itself shows nothing
+            self._known[key] = self._inside(end, key)
+        visible, hidden, left_out = self._known[key]
+        if not is_visible:
+            visible, hidden, left_out = 0, visible + hidden, left_out
+        return (
+            (0, hidden, left_out + visible)
+            if self._left_out_by(obj) or self._left_out_by(end)
+            else (visible, hidden, left_out)
+        )
 
-    def _inside(self, obj: Any, hidden: bool) -> Leaves:
-        holds = "Group" in obj.PropertiesList or obj.isDerivedFrom("App::LinkGroup")
-        if hidden and not holds:
-            return {}
-        names = obj.getSubObjects()
-        is_link = obj.hasExtension("App::LinkBaseExtension")
-        if not names or (obj.isDerivedFrom("Part::Feature") and not is_link):
-            return {} if hidden else {(obj.Document.Name, obj.Name): (obj, 1)}
-        # A part lists what lies in its folders beside the folders.
-        skip_folders = "Group" in obj.PropertiesList and not obj.isDerivedFrom("App::DocumentObjectGroup")
-        whole = is_link and (obj.Document.Name, obj.Name) in self._though_hidden
-        leaves: Leaves = {}
-        for name in names:
-            shown = obj.getSubObject(name, retType=1)
-            if shown is None or (skip_folders and shown.isDerivedFrom("App::DocumentObjectGroup")):
-                continue
+    def _inside(self, obj: Any, key: tuple[str, str]) -> tuple[int, int, int]:
+        inside = sub_objects(obj)
+        if inside is None:
+            if key not in self._own_shapes:
+                self._own_shapes[key] = _solids(obj)
+            return (self._own_shapes[key], 0, 0)
+        found = [self.of(one, is_visible) for one, is_visible in inside]
+        visible, hidden, left_out = map(sum, zip(*found, strict=True)) if found else (0, 0, 0)
+        return (visible, hidden, left_out)
+
+
+def real(obj: Any) -> Any:
+    """FreeCAD's own object for one that is read once (:mod:`silo.workbench.freecad.cached`)."""
+    return getattr(obj, "real", obj)
+
+
+def sub_objects(obj: Any) -> list[tuple[Any, bool]] | None:
+    """What an object shows within itself, and if it is visible there; None for a shape of its own."""
+    if {"BuildShape", "Freeze", "Group"}.issubset(
+        obj.PropertiesList
+    ):  # Assembly3, with or without the add-on
+        return [(one, group.Visibility and one.Visibility) for group in obj.Group for one in group.Group]
+    names = obj.getSubObjects()
+    if not names or (obj.isDerivedFrom("Part::Feature") and not obj.hasExtension("App::LinkBaseExtension")):
+        return None
+    # A part lists what lies in its folders beside the folders.
+    skip_folders = "Group" in obj.PropertiesList and not obj.isDerivedFrom("App::DocumentObjectGroup")
+    found = []
+    for name in names:
+        shown = obj.getSubObject(name, retType=1)
+        if shown is not None and not (skip_folders and shown.isDerivedFrom("App::DocumentObjectGroup")):
             visible = obj.isElementVisible(name.rstrip("."))
-            is_hidden = hidden or visible == 0 or (visible < 0 and not shown.Visibility)
-            if whole or (holds and (shown.Document.Name, shown.Name) in self._though_hidden):
-                is_hidden = False
-            for key, (leaf, times) in self.of(shown, is_hidden).items():
-                leaves[key] = (leaf, times + (leaves[key][1] if key in leaves else 0))
-        return leaves
+            found.append((shown, bool(shown.Visibility if visible < 0 else visible)))
+    return found
 
 
-def solids(obj: Any) -> int:
-    """How many solids the own shape of an object has."""
+def root_objects(document: Any) -> list[tuple[Any, bool]]:
+    """What FreeCAD shows at the root of a document: all that no part, link group, array or body holds."""
+    holders = [one for one in document.Objects if not one.isDerivedFrom("App::DocumentObjectGroup")]
+    held = {
+        one.Name
+        for holder in holders
+        for name in ("Group", "ElementList")
+        if name in holder.PropertiesList
+        for one in getattr(holder, name)
+    }
+    return [(obj, obj.Visibility) for obj in holders if obj.Name not in held]
+
+
+def _solids(obj: Any) -> int:
     import Part
 
     def count(shape: Any) -> int:
@@ -185,7 +217,7 @@ def active_document() -> Any:
 
 def documents_by_path() -> dict[str, Any]:
     """The open documents by the paths of their files, each in the one spelling that its folder lists."""
-    from silo.spelling import Spelling  # late: FreeCAD's start waits for this module
+    from silo.platform import Spelling  # late: FreeCAD's start waits for this module
 
     real = Spelling().real
     return {real(doc.FileName): doc for doc in documents() if doc.FileName}
@@ -193,7 +225,7 @@ def documents_by_path() -> dict[str, Any]:
 
 def find_document(path: str) -> Any:
     """The open document of a file, or None."""
-    from silo.spelling import one_path
+    from silo.platform import one_path
 
     return documents_by_path().get(one_path(path))
 

@@ -17,14 +17,14 @@ from collections.abc import Callable
 from typing import Any
 from xml.sax.saxutils import unescape
 
-from silo.bom.document import LinkProblem, object_name
+from silo.bom.document import LinkProblem, object_name, saved_by
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
 from silo.bom.walk.targets import is_assembly_link, is_link
-from silo.spelling import Spelling, one_path
+from silo.platform import Spelling, one_path
 from silo.workbench.freecad import host, saving
 from silo.workbench.freecad.cached import CachedDocument, FactCache
 
@@ -89,7 +89,16 @@ def extract_live(document: Any, assembly: str | None = None, *, hardware: bool =
 
 def cached_document(document: Any) -> CachedDocument:
     """A live document for one walk: quick to ask, and never out of date for it is not kept."""
-    return FactCache(host.is_object).document(document)
+    library: Any = None
+
+    def imported(owner: str, file: str) -> Any:
+        from silo.fcstd import Library
+
+        nonlocal library
+        library = library or Library()
+        return library.imported(_Owner(owner), file)
+
+    return FactCache(host.is_object, imported).document(document)
 
 
 def extract_object(assembly_obj: Any, *, hardware: bool = True) -> Extraction:
@@ -200,7 +209,7 @@ class LinkInspector:
     def _look(self, owner: str, file: str, name: str) -> LinkProblem:
         """What the reader of files says of the target, for it knows more than FreeCAD does."""
         from silo.fcstd import Library
-        from silo.fcstd.values import Ref
+        from silo.fcstd.properties import Ref
 
         if self._library is None:
             self._library = Library()
@@ -230,7 +239,7 @@ def lost_assemblies(document: Any) -> list[str]:
     if host.version() >= ASSEMBLY_SINCE or not document.FileName:
         return []
     # Reading a large file takes long, and what an old FreeCAD has written holds nothing that this one drops.
-    if (by := saved_by(document)) is not None and by < ASSEMBLY_SINCE:
+    if (by := saved_by(document.getProgramVersion())) and by < ASSEMBLY_SINCE:
         return []
     from silo.fcstd import Library
 
@@ -243,12 +252,6 @@ def lost_assemblies(document: Any) -> list[str]:
         for obj in in_file
         if obj.TypeId.startswith("Assembly::Assembly") and document.getObject(obj.Name) is None
     ]
-
-
-def saved_by(document: Any) -> tuple[int, int] | None:
-    """The FreeCAD that saved a document, such as (1, 0); None where that is not known."""
-    found = re.match(r"(\d+)\.(\d+)", document.getProgramVersion() or "")
-    return (int(found[1]), int(found[2])) if found else None
 
 
 def _lost(document: Any, names: list[str]) -> Extraction:

@@ -15,12 +15,12 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.durable import stamp_of
+from silo.platform import stamp_of
 from silo.workbench.freecad import host
 from silo.workbench.freecad.edits import EditWatch
 
 if TYPE_CHECKING:
-    from silo.fcstd.limits import FcstdError
+    from silo.fcstd.container import FcstdError
 
 DAMAGED = (
     "FreeCAD opens what it can of a damaged file, and saving that would make the loss final: fetch the file "
@@ -89,9 +89,8 @@ def damage(path: str, name: str = "") -> FcstdError | None:
     """
     from silo.bom.findings import FindingCode
     from silo.fcstd import Library
-    from silo.fcstd.careful import Refused
-    from silo.fcstd.container import FileState
-    from silo.fcstd.limits import ANY_SIZE, FcstdError
+    from silo.fcstd.container import ANY_SIZE, FcstdError, FileState
+    from silo.fcstd.xmltext import Refused
 
     if not path or not os.access(path, os.R_OK):
         return None
@@ -154,7 +153,7 @@ def _save(doc: Any) -> None:
         doc.save()
     else:
         # In 0.20 only FreeCAD's own save takes the mark of unsaved edits away.
-        from silo.workbench.gui.save_in_view import save_in_view
+        from silo.workbench.gui.widgets import save_in_view
 
         save_in_view(doc)
 
@@ -241,10 +240,10 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
         ``Name`` of the component's object; "" for the document itself.
     whole_document
         the document is this one component, so it carries the identity as well. Otherwise the identity is the
-        object's only (:mod:`silo.bom.identity` says where it is looked for).
+        object's only (:mod:`silo.bom.model` says where it is looked for).
     """
     from silo.bom.errors import DocumentError
-    from silo.bom.identity import meta_key
+    from silo.bom.model import meta_key
 
     obj = doc.getObject(name) if name else None
     if name and obj is None:
@@ -262,7 +261,7 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
 
 def remove_identity(doc: Any, name: str) -> None:
     """Take the identity of one object out of every place; the document's own stays. The caller saves."""
-    from silo.bom.identity import meta_key
+    from silo.bom.model import meta_key
 
     obj = doc.getObject(name)
     with others_unmarked(doc):

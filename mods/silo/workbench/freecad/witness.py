@@ -1,99 +1,125 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The geometry as witness: the solids that FreeCAD itself shows, against those that the BOM explains.
 
-FreeCAD shows an assembly by rules of its own (:class:`host.ShownLeaves`), which know nothing of our walker.
-Each assembly is compared with its direct components: so many of each, with so many solids each, and what is
-modelled in the assembly's own file. Hidden components count as any other, so they are taken as shown.
+FreeCAD says by sub-object paths what an assembly shows (:class:`host.Pieces`); nothing of the BOM goes into
+that. Each object of the assembly is then compared with what its role predicts: so many components, with so
+many solids each; and the lines of the BOM are compared with the roles.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from silo.bom.document import object_name
-from silo.bom.findings import FindingCode
-from silo.bom.identity import walk_entries
-from silo.bom.model import BomEntry, Extraction
-from silo.bom.roots import choose_assembly, silent_reader
-from silo.bom.walk.kinds import Kind, flattened
+from silo.bom.model import BomEntry, Extraction, walk_entries
+from silo.bom.roots import choose_assembly, fates, silent_reader
+from silo.bom.walk.kinds import COMPONENTS, REPEATERS, Kind, kind_of
+from silo.bom.walk.standard import STANDARD_PARTS
+from silo.bom.walk.tree import Count, Key, Lost, Role, Tree, chains
 from silo.workbench.freecad import host
-from silo.workbench.freecad.live import cached_document
+from silo.workbench.freecad.live import LinkInspector, cached_document, canonical_paths
+
+# What is shown and not counted, on purpose.
+_LEFT_OUT = (Role.LEFT_OUT, Role.OPERAND, Role.CONSTRUCTION)
+_BOUGHT = COMPONENTS | {Kind.STANDARD}
+_USERS = ("LinkedObject", "Base", "Source", "Links", "Objects", "Tool", "Shapes", "LinkCopyOnChangeSource")
 
 
 @dataclass(frozen=True)
+class Difference:
+    """An object that shows other solids than the BOM explains."""
+
+    object: str
+    label: str
+    shown: int
+    explained: int
+    why: str
+
+
+@dataclass
 class Account:
-    """One assembly: the solids shown, those that its BOM explains, and those that are no components.
+    """One assembly: the solids shown, and those that its lines explain.
 
-    modelled, left_out
-        modelled in the assembly's own file; suppressed, excluded or used up, as a finding says.
-
-    unexplained
-        names of the members whose solids no line explains (the likeliest, where only the sum shows it).
+    hidden
+        explained, and hidden in the view: hidden components count.
+    beside
+        shown and explained, and lie beside the assembly.
+    sources
+        hidden, and shown through others only: they do not count.
+    left_out
+        shown, and not counted on purpose: suppressed, excluded, used up, a tool.
     """
 
     doc_path: str
     object: str
     label: str
-    shown: int
-    explained: int
-    modelled: int
+    shown: int = 0
+    explained: int = 0
+    hidden: int = 0
+    beside: int = 0
+    sources: int = 0
     left_out: int = 0
-    unexplained: tuple[str, ...] = ()
+    differences: list[Difference] = field(default_factory=list)
 
     @property
     def agrees(self) -> bool:
         """True where every solid is explained, and every explained solid is there."""
-        return self.shown == self.explained + self.modelled + self.left_out
+        return not self.differences
+
+    @property
+    def unexplained(self) -> tuple[str, ...]:
+        """The names of the objects that differ."""
+        return tuple(one.object for one in self.differences)
+
+    def differ(self, obj: Any, shown: int, explained: int, why: str) -> None:
+        """Add a difference."""
+        self.differences.append(Difference(obj.Name, obj.Label, shown, explained, why))
 
     def sentence(self) -> str:
         """For people."""
         solids = "1 solid" if self.shown == 1 else f"{self.shown} solids"
         text = f"{self.label}: the view has {solids}, the BOM explains {self.explained}"
-        if self.modelled:
-            text += f", {self.modelled} are modelled in the file itself"
-        if self.left_out:
-            text += f", {self.left_out} are left out as the findings say"
+        further = (
+            (self.hidden, "of these hidden"),
+            (self.beside, "beside the assembly"),
+            (self.sources, "hidden sources that do not count"),
+            (self.left_out, "left out as the findings say"),
+        )
+        text = ", ".join((text, *(f"{number} {words}" for number, words in further if number)))
         if self.agrees:
             return f"{text}."
-        names = ", ".join(self.unexplained[:8]) or "none that can be named"
-        return f"{text}. They differ; look at: {names}."
+        told = [
+            f"{one.label} ({one.why}: shown {one.shown}, explained {one.explained})"
+            for one in self.differences[:8]
+        ]
+        return f"{text}. They differ; look at: {', '.join(told)}."
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {
-            **asdict(self),
-            "unexplained": list(self.unexplained),
-            "agrees": self.agrees,
-            "sentence": self.sentence(),
-        }
+        more = {"unexplained": list(self.unexplained), "agrees": self.agrees, "sentence": self.sentence()}
+        return {**asdict(self), **more}
 
 
 def accounts(extraction: Extraction, *, hardware: bool = True) -> list[Account]:
     """The assembly and every sub-assembly, each once; their documents are open.
 
     hardware
-        False where the extraction leaves standard parts out; they are then as good as modelled in the file.
+        False where the extraction leaves standard parts out.
     """
     return _Witness(hardware).accounts(extraction)
-
-
-_LEFT_OUT = (
-    *(FindingCode.SUPPRESSED, FindingCode.EXCLUDED, FindingCode.CONSUMED),
-    *(FindingCode.SUB_ELEMENT_LINK, FindingCode.NO_COMPONENT),
-)
 
 
 class _Witness:
     """Looks at each object once."""
 
     def __init__(self, hardware: bool) -> None:
-        self._reader = silent_reader(hardware=hardware)
+        self._reader = silent_reader(hardware=hardware, counts_beside=True, inspect=LinkInspector())
         self._documents: dict[str, Any] = {}
-        self._leaves = host.ShownLeaves()
-        self._solids: dict[tuple[str, str], int] = {}
-        self._left_out: set[tuple[str, str]] = set()
+        self._own_shapes: dict[tuple[str, str], int] = {}
+        self._canonical = canonical_paths()
 
     def accounts(self, extraction: Extraction) -> list[Account]:
         head = extraction.assembly
@@ -103,20 +129,10 @@ class _Witness:
         top = document.getObject(head.object_name) if head.object_name else choose_assembly(document)
         if top is None:  # this FreeCAD is too old to load it; the extraction says so
             return []
-        read = [(top, head, extraction.entries)]
+        read = [(top, head, (*extraction.entries, *head.own))]
         for entry in walk_entries(extraction.entries):
             if entry.is_assembly and (obj := self._object(entry)) is not None:
-                read.append((obj, entry, entry.children))
-        # A hidden component counts as any other.
-        counted = {
-            (obj.Document.Name, name) for obj, _, entries in read for one in entries for name in one.instances
-        }
-        self._leaves = host.ShownLeaves(counted)
-        self._left_out = {
-            (place.doc_path, place.obj)
-            for finding in extraction.findings_of(*_LEFT_OUT)
-            for place in finding.where
-        }
+                read.append((obj, entry, (*entry.children, *entry.own)))
         return [self._account(*one) for one in read]
 
     def _document(self, path: str) -> Any:
@@ -129,58 +145,116 @@ class _Witness:
         document = self._document(entry.doc_path)
         return None if document is None or entry.missing else document.getObject(entry.object_name)
 
-    def _account(self, obj: Any, head: BomEntry, entries: Sequence[BomEntry]) -> Account:
-        members = {object_name(member): (member, kind) for _, member, kind in flattened(obj, object_name)}
-        counted = {name for entry in entries for name in entry.instances}
-        # What the BOM counts beside the assembly is not in the assembly's shape.
-        beside = sorted(counted - {*members, object_name(obj)})
-        roots = [*(obj.Group if getattr(obj, "is_document_root", False) else [obj])]
-        roots += [one for name in beside if (one := obj.Document.getObject(name)) is not None]
-        seen = [self._shown(one, obj.Document) for one in roots]
-        shown, modelled = sum(shown for shown, _ in seen), sum(modelled for _, modelled in seen)
-        explained = sum(entry.quantity * self._solids_of(entry) for entry in entries)
-        # A declared part is modelled in the file, and explained by its line.
-        modelled -= sum(
-            entry.quantity * self._shown(part, obj.Document)[1]
-            for entry in entries
-            if entry.doc_path == head.doc_path and (part := self._object(entry)) is not None
-        )
-        left_out = self._solids_left_out(obj, head)
-        suspects = tuple(
-            name
-            for name, (member, kind) in members.items()
-            if name not in counted
-            and (head.doc_path, name) not in self._left_out
-            and kind not in (Kind.NOTHING, Kind.FOLDER)
-            and (inside := self._shown(member, obj.Document))[0] > inside[1]
-        )
-        account = Account(head.doc_path, head.object_name, head.label, shown, explained, modelled, left_out)
-        return account if account.agrees else replace(account, unexplained=suspects)
+    def _account(self, obj: Any, head: BomEntry, lines: Sequence[BomEntry]) -> Account:
+        account = Account(head.doc_path, head.object_name, head.label)
+        contents = self._reader.contents(obj)
+        roles = fates(obj, contents, self._reader)
+        top, is_array = host.real(obj), kind_of(obj) in REPEATERS
+        see = host.Pieces(self._own_shapes, None if is_array else top)
+        own = contents.own if head.own or not contents.is_assembly(obj) else []
+        predicted: Counter[str] = Counter()
+        pieces: Counter[Key] = Counter()
+        beside = {}
+        for count in (*contents.counts, *own):
+            name = object_name(count.shown.obj)
+            pieces[self._component(count.target)] += count.quantity
+            if not isinstance(count.target, Lost):
+                predicted[name] += count.quantity * see.of(self._drawn(count, contents.tree))[0]
+            if count.beside:
+                beside[name] = host.real(count.shown.obj)
+        if getattr(obj, "is_document_root", False):
+            inside = host.root_objects(host.real(obj.Document))
+        else:
+            inside = host.sub_objects(top) or []
+        # An array is its own only member.
+        shown = [(top, True)] if is_array else _members(inside, roles)
+        found: dict[str, _Seen] = {}
+        for one, is_visible in (*shown, *((one, one.Visibility) for one in beside.values())):
+            found.setdefault(one.Name, _Seen(one)).add(see.of(one, is_visible))
+        for name in {**found, **predicted}:
+            seen = found.get(name) or _Seen(obj.Document.getObject(name))
+            account.shown += seen.shown
+            account.left_out += seen.left_out
+            account.beside += seen.shown if name in beside else 0
+            account.explained += predicted[name]
+            _judge(account, seen, roles, predicted[name], may_hide=name not in beside)
+        if own or not contents.own:  # a part is no assembly of what it is made of
+            self._compare_lines(account, lines, pieces)
+        return account
 
-    def _solids_left_out(self, obj: Any, head: BomEntry) -> int:
-        """What is shown and not counted, on purpose."""
-        names = [name for path, name in self._left_out if path == head.doc_path]
-        found = [one for name in names if (one := obj.Document.getObject(name)) is not None]
-        seen = [self._shown(one, obj.Document) for one in found if getattr(one, "Visibility", True)]
-        return sum(shown - modelled for shown, modelled in seen)
+    def _drawn(self, count: Count, tree: Tree | None) -> Any:
+        """The component; for one that is not open in FreeCAD, what stands for it in the assembly."""
+        if host.is_object(host.real(count.target)):
+            return count.target
+        return next(chains(count, tree, self._reader.key))[-1][0]
 
-    def _solids_of(self, entry: BomEntry) -> int:
-        obj = self._object(entry)
-        return 0 if obj is None else self._shown(obj, obj.Document)[0]
+    def _component(self, target: Any) -> Key:
+        path, name = target.key if isinstance(target, Lost) else self._reader.component(target)
+        return (path if path == STANDARD_PARTS else self._canonical(path), name)
 
-    def _shown(self, obj: Any, document: Any) -> tuple[int, int]:
-        """Solids that FreeCAD shows for an object; and those of them that are modelled in this document."""
-        solids = modelled = 0
-        for key, (leaf, times) in self._leaves.of(obj).items():
-            if key not in self._solids:
-                self._solids[key] = host.solids(leaf)
-            solids += self._solids[key] * times
-            if key[0] == document.Name and self._is_modelled(leaf, document):
-                modelled += self._solids[key] * times
-        return solids, modelled
+    def _compare_lines(self, account: Account, lines: Sequence[BomEntry], pieces: Counter[Key]) -> None:
+        """Report lines with another quantity than the roles have, and what has no line."""
+        left = Counter(pieces)
+        for line in lines:
+            registered = (line.doc_path, line.object_name)
+            key = registered if registered in pieces or not line.standard else (STANDARD_PARTS, line.standard)
+            left[key] -= line.quantity
+        for (path, name), number in left.items():
+            if number:
+                total = pieces[path, name]
+                account.differences.append(Difference(name, name, total, total - number, "line of the BOM"))
 
-    def _is_modelled(self, leaf: Any, document: Any) -> bool:
-        # FreeCAD keeps the changed copies of copy-on-change links in a group of this name.
-        if any(holder.Name.startswith("CopyOnChangeGroup") for holder in leaf.InList):
-            return False
-        return not self._reader.brings(document.getObject(leaf.Name))
+
+def _members(
+    listed: Sequence[tuple[Any, bool]], roles: Mapping[str, Role | None], visible: bool = True
+) -> Iterator[tuple[Any, bool]]:
+    """Each object that is no mere holder, once for each path, and if it is visible there."""
+    for one, is_visible in listed:
+        if roles.get(one.Name) is Role.HOLDER:
+            yield from _members(host.sub_objects(one) or [], roles, visible and is_visible)
+        else:
+            yield one, visible and is_visible
+
+
+@dataclass
+class _Seen:
+    """The solids of one object over all paths to it."""
+
+    obj: Any
+    shown: int = 0
+    hidden: int = 0
+    left_out: int = 0
+
+    def add(self, solids: tuple[int, int, int]) -> None:
+        self.shown += solids[0]
+        self.hidden += solids[1]
+        self.left_out += solids[2]
+
+
+def _judge(
+    account: Account, seen: _Seen, roles: Mapping[str, Role | None], explained: int, *, may_hide: bool
+) -> None:
+    obj, role = seen.obj, roles.get(seen.obj.Name)
+    kind = kind_of(obj)
+    is_source = _is_used_by(obj, roles)
+    if seen.shown == explained:
+        if role is Role.SOURCE and is_source:
+            account.sources += seen.hidden
+        elif seen.hidden and not explained and role not in _LEFT_OUT and kind in _BOUGHT:
+            account.differ(obj, 0, 0, "hidden and not counted")
+    elif seen.shown < explained <= seen.shown + seen.hidden and may_hide and (seen.shown or not is_source):
+        account.hidden += explained - seen.shown
+    elif not explained and role in _LEFT_OUT and not (role is Role.CONSTRUCTION and kind in _BOUGHT):
+        account.left_out += seen.shown
+    else:
+        account.differ(obj, seen.shown, explained, "no role" if role is None else role.value)
+
+
+def _is_used_by(obj: Any, others: Mapping[str, Role | None]) -> bool:
+    """True if one of these objects shows or consumes this one: a link, an array, a compound, a cut."""
+    for one in obj.InList:
+        for name in _USERS if one.Document == obj.Document and one.Name in others else ():
+            value = getattr(one, name, None) if name in one.PropertiesList else None
+            if obj in (value if isinstance(value, list | tuple) else (value,)):
+                return True
+    return False

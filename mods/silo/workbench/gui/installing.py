@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Where FreeCAD's Python lacks packages, the add-on is a workbench with one button that installs them."""
+"""Where FreeCAD's Python lacks packages, the add-on is a workbench with one button that installs them.
+
+The add-on's page of the documentation, in a window: it needs no browser and no network.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,31 @@ from silo.workbench.commands import INSTALL, Command
 from silo.workbench.freecad import host
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets, Relay
-from silo.workbench.words import translate, visible
+from silo.workbench.words import QT_TRANSLATE_NOOP, translate, visible
+
+PAGE = Path(__file__).resolve().parents[4] / "docs" / "addon.md"
+
+
+class HelpWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
+    """Not modal: one reads it beside the work."""
+
+    def __init__(self, parent: Any) -> None:
+        super().__init__(parent)
+        layout = widgets.lay_out(self, "SiloHelp", translate("Silo", "Help on Silo"), 820, 700)
+        self.page = QtWidgets.QTextBrowser()
+        self.page.setOpenExternalLinks(True)
+        self.page.setSearchPaths([str(PAGE.parent)])
+        self.page.setMarkdown(_text())
+        layout.addWidget(self.page)
+
+
+def _text() -> str:
+    try:
+        return PAGE.read_text(encoding="utf-8")
+    except OSError:
+        text = translate("Silo", "The documentation is not there: {path}")
+        return text.replace("{path}", str(PAGE))
+
 
 # The one window; FreeCAD holds no reference to it.
 _open: list[Any] = []
@@ -28,11 +55,10 @@ def stub_commands(missing: Sequence[str]) -> dict[str, Command]:
         _open[:] = [window]
         window.show()
 
-    tip = translate("Silo", "Install the Python packages that Silo needs: {names}")
     return {
         INSTALL: Command(
-            text=translate("Silo", "Install What Silo Needs…"),
-            tip=tip.replace("{names}", ", ".join(missing)),
+            text=QT_TRANSLATE_NOOP("Silo_InstallPackages", "Install What Silo Needs…"),
+            tip=QT_TRANSLATE_NOOP("Silo_InstallPackages", "Install the Python packages that Silo needs"),
             icon="silo",
             run=run,
         )
@@ -40,18 +66,10 @@ def stub_commands(missing: Sequence[str]) -> dict[str, Command]:
 
 
 def install() -> str:
-    """Install the packages for this FreeCAD; where they are now. SiloError. Worker."""
-    from silo.addon_install import Place, install_packages
-    from silo.platform import python_beside
+    """Install the packages for this FreeCAD, and return where they are. Raises SiloError. Worker."""
+    from silo.freecads import ask_freecad, install_packages
 
-    return install_packages(
-        Place(
-            Path(host.user_data_folder()),
-            host.version(),
-            (sys.version_info[0], sys.version_info[1]),
-            tuple(python_beside(sys.base_exec_prefix)),
-        )
-    )
+    return install_packages(ask_freecad(host.program(), Path(host.user_data_folder())))
 
 
 class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types

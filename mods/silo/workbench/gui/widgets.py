@@ -1,16 +1,30 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Small widgets that the pane and the dialogs share. Text is always shown as text, never as markup."""
+"""Small widgets that the pane and the dialogs share. Text is always shown as text, never as markup.
+
+A layout that puts widgets side by side and begins a new line where the width ends (Qt has none).
+
+A table cell with a choice: text with a small arrow, a list when one clicks on it.
+
+FreeCAD is about to close: what must be done before its documents are gone, and the wait for the disk.
+
+FreeCAD 0.20's own save, for any document: the one way there to take the mark of unsaved edits away.
+
+It is a message to a 3D view. A document that a link has loaded has no view, so it gets one for the moment
+(0.3 s, measured). FreeCAD asks whether to save the files below as well; the answer is no, for whoever calls
+this decides about each file.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from silo.workbench import words
 from silo.workbench.freecad import host
-from silo.workbench.gui.flow_layout import FlowLayout
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets, run_dialog
 from silo.workbench.pane.activity import Tone
+from silo.workbench.words import translate
 
 # (on a light ground, on a dark ground)
 _COLOURS = {
@@ -218,3 +232,236 @@ def warn(parent: Any, title: str, text: str) -> None:
     box.setTextFormat(QtCore.Qt.TextFormat.PlainText)
     box.setText(words.visible(text, 2000))
     run_dialog(box)
+
+
+class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no types
+    """Left to right, then down. ``gap`` is between neighbours and between lines, in pixels."""
+
+    def __init__(self, gap: int = 8) -> None:
+        super().__init__()
+        self._items: list[Any] = []
+        self._gap = gap
+        self.setContentsMargins(0, 0, 0, 0)
+
+    def addItem(self, item: Any) -> None:
+        """Qt hands over what :meth:`addWidget` was given."""
+        self._items.append(item)
+
+    def count(self) -> int:
+        """How many widgets there are."""
+        return len(self._items)
+
+    def itemAt(self, number: int) -> Any:
+        """One of them, None beyond the last."""
+        return self._items[number] if 0 <= number < len(self._items) else None
+
+    def takeAt(self, number: int) -> Any:
+        """Remove one and give it."""
+        return self._items.pop(number) if 0 <= number < len(self._items) else None
+
+    def hasHeightForWidth(self) -> bool:
+        """The narrower, the higher."""
+        return True
+
+    def heightForWidth(self, width: int) -> int:
+        """Height that a width needs."""
+        return self._place(QtCore.QRect(0, 0, width, 0), move=False)
+
+    def setGeometry(self, area: Any) -> None:
+        """Place the widgets."""
+        super().setGeometry(area)
+        self._place(area, move=True)
+
+    def sizeHint(self) -> Any:
+        """As small as possible: the width comes from outside."""
+        return self.minimumSize()
+
+    def minimumSize(self) -> Any:
+        """Room for the largest widget."""
+        size = QtCore.QSize()
+        for item in self._items:
+            size = size.expandedTo(item.minimumSize())
+        return size
+
+    def _place(self, area: Any, *, move: bool) -> int:
+        x, y, line = area.x(), area.y(), 0
+        for item in self._items:
+            hint = item.sizeHint()
+            if x > area.x() and x + hint.width() > area.right() + 1:
+                x, y, line = area.x(), y + line + self._gap // 2, 0
+            if move:
+                item.setGeometry(QtCore.QRect(QtCore.QPoint(x, y), hint))
+            x += hint.width() + self._gap
+            line = max(line, hint.height())
+        return int(y + line - area.y())
+
+
+# The cell's data that holds the key of what is chosen now.
+KEY = QtCore.Qt.ItemDataRole.UserRole + 1
+
+
+class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # PySide has no types
+    """Edits a cell by choosing; a newly chosen key is set as ``UserRole``, the text is what is shown.
+
+    The cell holds the present key as :data:`KEY`, which need not be one that can be chosen.
+
+    choices
+        row → {key: text}.
+    """
+
+    def __init__(self, choices: Callable[[int], dict[str, str]], parent: Any) -> None:
+        super().__init__(parent)
+        self._choices = choices
+
+    def createEditor(self, parent: Any, _option: Any, index: Any) -> Any:
+        """A list of the choices, opened at once."""
+        box = QtWidgets.QComboBox(parent)
+        for key, text in self._choices(index.row()).items():
+            box.addItem(text, key)
+        box.activated.connect(lambda _number: self._chosen(box))
+        QtCore.QTimer.singleShot(0, box.showPopup)
+        return box
+
+    def setEditorData(self, editor: Any, index: Any) -> None:
+        """Begin with what is chosen now."""
+        editor.setCurrentIndex(editor.findData(index.data(KEY)))
+
+    def setModelData(self, editor: Any, model: Any, index: Any) -> None:
+        """Take over the choice."""
+        key = editor.currentData()
+        if key is not None and key != index.data(KEY):
+            model.setData(index, key, QtCore.Qt.ItemDataRole.UserRole)
+
+    def paint(self, painter: Any, option: Any, index: Any) -> None:
+        """The text, and an arrow where one can choose."""
+        super().paint(painter, option, index)
+        if not index.flags() & QtCore.Qt.ItemFlag.ItemIsEditable:
+            return
+        area = option.rect
+        middle = area.center().y()
+        right = area.right() - 6
+        arrow = QtGui.QPolygon(
+            [
+                QtCore.QPoint(right - 8, middle - 2),
+                QtCore.QPoint(right, middle - 2),
+                QtCore.QPoint(right - 4, middle + 3),
+            ]
+        )
+        painter.save()
+        painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
+        painter.setPen(QtCore.Qt.PenStyle.NoPen)
+        painter.setBrush(option.palette.color(QtGui.QPalette.ColorRole.Text))
+        painter.drawPolygon(arrow)
+        painter.restore()
+
+    def _chosen(self, box: Any) -> None:
+        self.commitData.emit(box)
+        self.closeEditor.emit(box)
+
+
+# A bar that is there for a moment only is a flicker.
+PATIENCE_S = 0.3
+STEP_S = 0.05
+
+
+class CloseWatch(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
+    """Calls ``before`` when a window is asked to close, before it does anything about it."""
+
+    def __init__(self, window: Any, before: Callable[[], None]) -> None:
+        super().__init__(window)
+        self._before = before
+        window.installEventFilter(self)
+
+    def eventFilter(self, _watched: Any, event: Any) -> bool:
+        """Never holds the event back."""
+        if event.type() == QtCore.QEvent.Type.Close:
+            self._before()
+        return False
+
+
+def wait_for_disk(left: Callable[[float], int]) -> None:
+    """Wait until nothing is left, with a bar after a moment and a button to close all the same.
+
+    left
+        waits for at most so many seconds, and returns how many things the disk still has to do.
+    """
+    most = left(PATIENCE_S)
+    if not most:
+        return
+    window = QtWidgets.QProgressDialog()
+    window.setObjectName("SiloClosing")
+    window.setWindowTitle(translate("Silo", "Silo"))
+    window.setLabelText(
+        translate(
+            "Silo",
+            "Your commits are being copied to the outbox. They are sent when FreeCAD is started the next "
+            "time.\n"
+            "Commits that are not copied by then may have to be committed again.",
+        )
+    )
+    window.setCancelButtonText(translate("Silo", "Close without waiting"))
+    window.setMinimumDuration(0)
+    window.setRange(0, most)
+    window.show()
+    while (count := left(STEP_S)) and not window.wasCanceled():
+        window.setRange(0, max(most, count))
+        window.setValue(max(0, most - count))
+        QtWidgets.QApplication.processEvents()
+    window.hide()
+    window.deleteLater()
+
+
+def save_in_view(doc: Any) -> None:
+    """Save a document that has a file."""
+    view = host.view_of(doc)
+    with _answering_no():
+        if view.ActiveView is not None:
+            view.sendMsgToViews("Save")
+        elif not doc.InList:
+            # Its file is saved; the mark stays, for closing the last view of such a document closes it.
+            doc.save()
+        else:
+            with host.same_active_document(), _passing_view(doc):
+                view.sendMsgToViews("Save")
+
+
+@contextmanager
+def _passing_view(doc: Any) -> Iterator[None]:
+    """A 3D view that nobody gets to see."""
+    window = host.main_window()
+    area = window.findChild(QtWidgets.QMdiArea)
+    window.setUpdatesEnabled(False)
+    try:
+        before, was = area.subWindowList(), area.activeSubWindow()
+        host.activate(doc)
+        host.run_command("Std_ViewCreate")
+        made = [one for one in area.subWindowList() if one not in before]
+        try:
+            yield
+        finally:
+            for one in made:
+                one.close()
+            if was is not None:
+                area.setActiveSubWindow(was)
+    finally:
+        window.setUpdatesEnabled(True)
+
+
+@contextmanager
+def _answering_no() -> Iterator[None]:
+    """Answer No to FreeCAD's question about the files below, should it come."""
+
+    def answer() -> None:
+        box = QtWidgets.QApplication.activeModalWidget()
+        if isinstance(box, QtWidgets.QMessageBox):
+            no = box.button(QtWidgets.QMessageBox.StandardButton.No)
+            if no is not None:
+                no.click()
+
+    timer = QtCore.QTimer()
+    timer.timeout.connect(answer)
+    timer.start(0)
+    try:
+        yield
+    finally:
+        timer.stop()

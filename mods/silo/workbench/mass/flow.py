@@ -56,18 +56,15 @@ class MassFlow:
 
     def _measured(self, doc: Any) -> Any:
         from silo.inertia.calculator import Task, calculate
-        from silo.inertia.geometry.options import ReadOptions
+        from silo.inertia.geometry.graph import ReadOptions
         from silo.inertia.links import Link, LinkMap
-        from silo.inertia.massrule import Options
+        from silo.inertia.masses import Options
         from silo.inertia.materials import load_materials
         from silo.workbench.mass import shapes
         from silo.workbench.mass.rows import shown
 
         with Waiting(plain(doc.Label, 60)) as waiting:
-            # FreeCAD's own volume stands witness here; meshes are for pictures, and cost as much again.
-            assembly = shapes.read_live(
-                doc, ReadOptions(mesh_check=False, hardware=self._hardware), waiting.report
-            )
+            assembly = shapes.read_live(doc, ReadOptions(hardware=self._hardware), waiting.report)
         rule = Options(step_density=True, unknown_is_zero=True, own_bom=True)
         # Without anything placed there is nothing for a pattern to match, which would be reported as a fault.
         everything = Link(assembly.name or "assembly", ("**",))

@@ -4,12 +4,18 @@
 No geometry kernel but FreeCAD's is needed, and none of its numbers is used: ``Shape.Volume`` and
 ``MatrixOfInertia`` come from an integration without error control, off by up to 7e-3 on real parts. They only
 stand witness, as the tessellation does.
+
+FreeCAD's faces as our integration takes them: exact surfaces, and edges in the surfaces' parameters.
+
+Asks only the shapes' own methods, the same in FreeCAD 0.20, 1.0 and 1.1; imports nothing of FreeCAD.
 """
 
 from __future__ import annotations
 
+import math
 import os
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
@@ -18,9 +24,19 @@ import numpy as np
 from silo.bom.document import LinkProblem, own
 from silo.bom.errors import DocumentError
 from silo.inertia.core import place
-from silo.inertia.geometry.exact.quadrature import Moments, integrate
-from silo.inertia.geometry.freecad.assembly import assembled, one_by_one
-from silo.inertia.geometry.freecad.members import top_object
+from silo.inertia.geometry.exact import (
+    Asked,
+    Basis,
+    Curve,
+    Elementary,
+    Face,
+    Floats,
+    Moments,
+    Nurbs,
+    Surface,
+    Turned,
+    integrate,
+)
 from silo.inertia.geometry.freecad.stated_materials import (
     NO_MATERIAL,
     NOTHING,
@@ -28,37 +44,208 @@ from silo.inertia.geometry.freecad.stated_materials import (
     linked_material,
     told_material,
 )
-from silo.inertia.geometry.freecad.walk import Leaf, Walk
-from silo.inertia.geometry.graph import in_metres
+from silo.inertia.geometry.freecad.walk import Leaf, Walk, assembled, one_by_one
+from silo.inertia.geometry.graph import ReadOptions, Report, in_metres
 from silo.inertia.geometry.measured import (
     INVALID,
     NO_VOLUME,
     STATED,
     Measured,
-    Notes,
     cavity_note,
     drift_note,
     integration_notes,
-    mesh_notes,
     shell_note,
 )
-from silo.inertia.geometry.mesh import PICTURE_TRIANGLES, Floats, Mesh, joined, mesh_volume, simplified
-from silo.inertia.geometry.options import ReadOptions, Report
-from silo.inertia.geometry.together import Body, together
-from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, SolidProps
+from silo.inertia.geometry.together import Body, Mesh, mesh_volume, together
+from silo.inertia.model import Assembly, GeometryCode, Note, SolidProps
 from silo.workbench.freecad import live
-from silo.workbench.mass.shape_faces import face_of, faces_of
+
+_ELEMENTARY = {
+    "Plane": (Basis.LINEAR, Basis.LINEAR),
+    "Cylinder": (Basis.CIRCULAR, Basis.LINEAR),
+    "Cone": (Basis.CIRCULAR, Basis.LINEAR),
+    "Sphere": (Basis.CIRCULAR, Basis.CIRCULAR),
+    "Toroid": (Basis.CIRCULAR, Basis.CIRCULAR),
+}
+Value = Callable[[float, float], tuple[float, float, float]]
+"""(u, v) → a point of the surface."""
+
+SAME = 1e-9
+"""How far, in sizes of the face, our form of a surface may be from FreeCAD's."""
+
+_FITTED = ("Line2d", "Circle2d", "Ellipse2d")
+_BACKWARDS = "Reversed"
+_BOUNDARY = ("Forward", "Reversed")
+
+
+def faces_of(shape: Any) -> Iterator[Any]:
+    """The faces, each as the solid has it (``Faces`` would list a face that is used twice only once)."""
+    if shape.ShapeType == "Face":
+        if shape.Orientation in _BOUNDARY:
+            yield shape
+        return
+    for inner in shape.childShapes():
+        if inner.ShapeType in ("Solid", "Shell", "Face"):
+            yield from faces_of(inner)
+
+
+def face_of(face: Any) -> Face:
+    """A FreeCAD face as the integration takes it. ValueError where FreeCAD does not give enough of it."""
+    wires = [wire for wire in face.childShapes() if wire.ShapeType == "Wire"]
+    return Face(_surface(face), [_curve(face, edge) for wire in wires for edge in _edges(face, wire)])
+
+
+def _edges(face: Any, wire: Any) -> Iterator[Any]:
+    """The edges, with the face's own orientation in them, which distinguishes the two curves of a seam."""
+    listed = [edge for edge in wire.childShapes() if edge.Orientation in _BOUNDARY]
+    yield from listed
+    for edge in listed:
+        # FreeCAD >= 1.0 lists a seam once, though the face goes along it twice, up and down.
+        if edge.isSeam(face) and sum(edge.isSame(other) for other in listed) == 1:
+            yield edge.reversed()
+
+
+def _curve(face: Any, edge: Any) -> Curve:
+    found = face.curveOnSurface(edge)
+    if found is None:
+        raise ValueError("an edge has no curve on its face")
+    curve, first, last = found
+    kind = type(curve).__name__
+    sign = -1.0 if edge.Orientation == _BACKWARDS else 1.0
+    line = kind == "Line2d"
+    at = _fitted(curve, Basis.LINEAR if line else Basis.CIRCULAR) if kind in _FITTED else _asked(curve)
+    return Curve(at, _breaks(curve, kind, first, last), sign, line)
+
+
+def _fitted(curve: Any, basis: Basis) -> Callable[[Floats], Floats]:
+    """A line, circle or ellipse, from a few of its points."""
+    points = _asked(curve)(basis.samples)
+    coefficients = np.linalg.solve(basis.at(basis.samples), points)
+    return lambda t: basis.at(t) @ coefficients
+
+
+def _asked(curve: Any) -> Callable[[Floats], Floats]:
+    value = curve.value
+
+    def at(t: Floats) -> Floats:
+        points = [value(x) for x in t.tolist()]
+        return np.array([(p.x, p.y) for p in points]).reshape(-1, 2)
+
+    return at
+
+
+def _breaks(curve: Any, kind: str, first: float, last: float) -> Floats:
+    ends = np.array([first, last])
+    if kind == "Line2d":
+        return ends
+    if hasattr(curve, "getKnots"):
+        knots = np.array(curve.getKnots())
+        return np.union1d(ends, knots[(knots > first) & (knots < last)])
+    return np.linspace(first, last, max(2, math.ceil((last - first) / (math.pi / 2)) + 1))
+
+
+def _surface(face: Any) -> Surface:
+    """The quickest form of the face's surface that is the same surface."""
+    surface = face.Surface
+    kind = type(surface).__name__
+    value = _values(face)
+    u_low, u_high, v_low, v_high = face.ParameterRange
+    corners = [(u_low, v_low), (u_high, v_high), (0.7 * u_low + 0.3 * u_high, 0.6 * v_low + 0.4 * v_high)]
+    size = max(face.BoundBox.DiagonalLength, 1e-9)
+    for form in _forms(surface, kind, face, value):
+        if all(_same(form, value, u, v, size) for u, v in corners):
+            return form
+    return Asked(_asker(face), np.linspace(u_low, u_high, 5))
+
+
+def _forms(surface: Any, kind: str, face: Any, value: Value) -> Iterator[Surface]:
+    u_range, v_range = tuple(face.ParameterRange[:2]), tuple(face.ParameterRange[2:])
+    if kind in _ELEMENTARY:
+        yield Elementary.sampled(*_ELEMENTARY[kind], value, u_range)
+    elif kind in ("BSplineSurface", "BezierSurface"):
+        if kind == "BezierSurface":
+            surface = surface.toBSpline()
+        if surface.NbUPoles == surface.NbVPoles == 2:
+            yield Elementary.sampled(Basis.LINEAR, Basis.LINEAR, value, u_range)
+        yield _nurbs(surface, u_range, v_range)
+    elif kind in ("SurfaceOfExtrusion", "SurfaceOfRevolution"):
+        curve = surface.BasisCurve
+        extruded = kind == "SurfaceOfExtrusion"
+        if extruded and type(curve).__name__ in ("BSplineCurve", "BezierCurve"):
+            yield _extruded(curve, face, value)
+        along = Basis.LINEAR if type(curve).__name__ in ("Line", "LineSegment") else Basis.CIRCULAR
+        bases = (along, Basis.LINEAR) if extruded else (Basis.CIRCULAR, along)
+        yield Elementary.sampled(*bases, value, u_range)
+        if not extruded:
+            yield Turned(_asker(face), u_range)
+
+
+def _same(form: Surface, value: Value, u: float, v: float, size: float) -> bool:
+    ours = form.at(np.array([[u]]), np.array([v]))[0][0, 0]
+    return bool(np.abs(ours - value(u, v)).max() <= SAME * size)
+
+
+def _values(face: Any) -> Value:
+    value = face.valueAt
+
+    def at(u: float, v: float) -> tuple[float, float, float]:
+        point = value(u, v)
+        return point.x, point.y, point.z
+
+    return at
+
+
+def _asker(face: Any) -> Callable[[float, float], Any]:
+    value, slopes = face.valueAt, face.derivative1At
+
+    def ask(u: float, v: float) -> Any:
+        du, dv = slopes(u, v)
+        return tuple(value(u, v)), tuple(du), tuple(dv)
+
+    return ask
+
+
+def _extruded(curve: Any, face: Any, value: Value) -> Nurbs:
+    """A spline drawn along a straight line: a spline surface of degree 1 in that direction."""
+    if type(curve).__name__ == "BezierCurve":
+        curve = curve.toBSpline()
+    curve, periodic = curve.copy(), curve.isPeriodic()
+    if periodic:
+        curve.setNotPeriodic()
+    u_low, u_high, v_low, v_high = face.ParameterRange
+    along = np.subtract(value(u_low, v_high), value(u_low, v_low)) / (v_high - v_low)
+    poles = np.array([tuple(pole) for pole in curve.getPoles()], dtype=np.float64)
+    weights = np.array(curve.getWeights(), dtype=np.float64) if curve.isRational() else None
+    knots = np.array(curve.KnotSequence, dtype=np.float64)
+    drawn = Nurbs.drawn((poles, weights, knots, curve.Degree), along, (v_low, v_high))
+    return drawn.unrolled((u_low, u_high) if periodic else None)
+
+
+def _nurbs(surface: Any, u_range: tuple[float, float], v_range: tuple[float, float]) -> Nurbs:
+    surface = surface.copy()
+    u_periodic, v_periodic = surface.isUPeriodic(), surface.isVPeriodic()
+    if u_periodic:
+        surface.setUNotPeriodic()
+    if v_periodic:
+        surface.setVNotPeriodic()
+    weights = None
+    if surface.isURational() or surface.isVRational():
+        weights = np.array(surface.getWeights(), dtype=np.float64)
+    found = Nurbs(
+        np.array([[tuple(pole) for pole in row] for row in surface.getPoles()], dtype=np.float64),
+        weights,
+        np.array(surface.UKnotSequence, dtype=np.float64),
+        np.array(surface.VKnotSequence, dtype=np.float64),
+        surface.UDegree,
+        surface.VDegree,
+    )
+    return found.unrolled(u_range if u_periodic else None, v_range if v_periodic else None)
+
 
 MM = 1e-3
 
 AGREE = 0.02
 """Where our integration and FreeCAD's differ by more, relative to the volume, the mesh decides."""
-
-CLOSE = 0.01
-"""A mesh that agrees as well as this clears a solid: chords cut about that much off a cylinder."""
-
-MANY = 100_000
-"""Triangles from where a finer mesh takes seconds."""
 
 
 def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
@@ -73,16 +260,16 @@ def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
         raise DocumentError(source, f"this FreeCAD is too old to load its assemblies ({', '.join(lost)})")
     cached = live.cached_document(document)
     walk = Walk(LiveFacts(), os.path.dirname(cached.FileName).replace("\\", "/"), options.hardware)
-    top = walk.product(top_object(cached, options.object_name))
+    top = walk.top(cached, options.object_name)
 
     def measured(leaf: Leaf) -> Measured:
-        return _Product(options.eps, options.mesh_check, report).measured(leaf)
+        return _Product(options.eps, report).measured(leaf)
 
     return assembled(walk, top, source, options, one_by_one(measured), report)
 
 
 class LiveFacts:
-    """The facts of :class:`silo.inertia.geometry.freecad.facts.Facts` from FreeCAD itself."""
+    """The facts of :class:`silo.inertia.geometry.freecad.walk.Facts` from FreeCAD itself."""
 
     def __init__(self) -> None:
         self._inspect = live.LinkInspector()
@@ -146,7 +333,6 @@ class _Solid:
 
     shape: Any
     props: SolidProps | None
-    mesh: Mesh | None
 
 
 @dataclass(eq=False)
@@ -154,10 +340,9 @@ class _Product:
     """Measures the shapes of one product."""
 
     eps: float
-    mesh_check: bool
     report: Report
     known: list[_Solid] = field(default_factory=list)
-    problems: list[GeometryProblem] = field(default_factory=list)
+    problems: list[Note] = field(default_factory=list)
 
     def measured(self, leaf: Leaf) -> Measured:
         """All solids of a leaf, in its axes."""
@@ -176,17 +361,11 @@ class _Product:
             if found.props is not None:
                 bodies.append(_placed(found, matrix @ moved, solid, matrix))
         faces = any(shape.Faces for shape, _ in shapes)
-        meshes = [body.mesh for body in bodies if body.mesh is not None]
-        if self.mesh_check and not solids and faces:
-            meshes = [
-                _mesh(shape, _fineness(shape)).moved(in_metres(t)) for shape, t in placed if shape.Faces
-            ]
-        picture = simplified(joined(meshes), PICTURE_TRIANGLES) if meshes else None
         settled = together(bodies, _common, self.problems)
         if settled.mixed:
             self.problems.append(cavity_note(settled))
         wires = any(shape.Edges for shape, _ in shapes)
-        return Measured(settled.solids, tuple(self.problems), picture, faces, wires)
+        return Measured(settled.solids, tuple(self.problems), None, faces, wires)
 
     def _find(self, solid: Any, where: str) -> tuple[_Solid, Floats]:
         """The solid or an equal one that was measured before, and (4, 4) [mm] from there to here."""
@@ -194,21 +373,19 @@ class _Product:
         for one in self.known:
             if solid.isPartner(one.shape) and solid.Orientation == one.shape.Orientation:
                 return one, here @ np.linalg.inv(matrix_of(one.shape.Placement))
-        notes: Notes = []
+        notes: list[Note] = []
         found = self._measure(solid, notes)
-        self.problems += [GeometryProblem(code, where + message) for code, message in notes]
+        self.problems += [replace(note, message=where + note.message) for note in notes]
         self.known.append(found)
         return found, np.eye(4)
 
-    def _measure(self, solid: Any, notes: Notes) -> _Solid:
+    def _measure(self, solid: Any, notes: list[Note]) -> _Solid:
         box = solid.BoundBox
         centre, size = np.array(tuple(box.Center)), max(box.DiagonalLength, 1e-9)
-        mesh = _mesh(solid, _fineness(solid)) if self.mesh_check else None
-        body = self._integrated(solid, centre, size / 2)
-        body = _weighed(solid, body, mesh, notes)
+        body = _weighed(solid, self._integrated(solid, centre, size / 2), notes)
         if not np.isfinite(body.volume) or body.volume == 0.0:
             notes.append(NO_VOLUME)
-            return _Solid(solid, None, mesh)
+            return _Solid(solid, None)
         # The centre's distance is that from the origin of the shape's own coordinates.
         away = float(np.linalg.norm(np.linalg.inv(matrix_of(solid.Placement)) @ np.r_[centre, 1.0])) * MM
         notes += integration_notes(
@@ -218,14 +395,11 @@ class _Product:
             notes.append(note)
         if not solid.isValid():
             notes.append(INVALID)
-        if mesh is not None:
-            mesh, deviation = _cross_checked(solid, mesh, abs(body.volume))
-            notes += mesh_notes(deviation, 0)
         sign = -1.0 if body.volume < 0 else 1.0
         props = SolidProps(
             sign * body.volume * MM**3, body.com * MM, sign * body.inertia * MM**5, reversed=body.volume < 0
         )
-        return _Solid(solid, props, mesh)
+        return _Solid(solid, props)
 
     def _integrated(self, solid: Any, centre: Floats, radius: float) -> Moments:
         """By our integration; not finite where FreeCAD does not give the geometry in full."""
@@ -243,16 +417,14 @@ class _Product:
             return Moments(np.nan, centre, np.zeros((3, 3)), np.inf)
 
 
-def _weighed(solid: Any, ours: Moments, mesh: Mesh | None, notes: Notes) -> Moments:
-    """Our moments; FreeCAD's where ours cannot be had, or where the mesh sides with them."""
+def _weighed(solid: Any, ours: Moments, notes: list[Note]) -> Moments:
+    """Return our moments, or FreeCAD's if there are none of ours, or if a mesh is nearer to FreeCAD's."""
     volume = float(solid.Volume)
     if abs(ours.volume - volume) <= AGREE * abs(volume):
         return ours
-    enclosed = abs(mesh_volume(mesh)) * MM**-3 if mesh is not None else abs(volume)
-    trusted = np.isfinite(ours.volume) and abs(abs(ours.volume) - enclosed) < abs(abs(volume) - enclosed)
-    if not trusted:
+    if not np.isfinite(ours.volume) or not _nearer_to_mesh(solid, ours.volume, volume):
         notes.append(
-            (
+            Note(
                 GeometryCode.NOT_CONVERGENT,
                 "measured by FreeCAD's own integration, which has no error control: on real parts it was off "
                 "by up to 0.7 %",
@@ -263,29 +435,16 @@ def _weighed(solid: Any, ours: Moments, mesh: Mesh | None, notes: Notes) -> Mome
     if ours.drift > STATED:  # where faces close, it is FreeCAD that is wrong
         apart = abs(volume / ours.volume - 1)
         message = f"FreeCAD's own volume differs by {apart:.1%}; the geometry may be bad"
-        notes.append((GeometryCode.NOT_CONVERGENT, message))
+        notes.append(Note(GeometryCode.NOT_CONVERGENT, message))
     return ours
 
 
-def _cross_checked(solid: Any, mesh: Mesh, volume: float) -> tuple[Mesh, float]:
-    """A mesh for the picture, and by how much the best mesh differs from ``volume`` [mm^3]."""
-    deviation = abs(abs(mesh_volume(mesh)) * MM**-3 / volume - 1)
-    if deviation < CLOSE or len(mesh) > MANY:
-        return mesh, deviation
-    # Thin curved wires lose several per cent to chords: fine against their thickness, not their length.
-    wanted = min(_fineness(solid) / 5, 0.02 * volume / max(solid.Area, 1e-12))
-    finer = _mesh(solid, max(wanted, _fineness(solid) / 50))
-    return mesh, min(deviation, abs(abs(mesh_volume(finer)) * MM**-3 / volume - 1))
-
-
-def _fineness(shape: Any) -> float:
-    return max(0.005 * float(shape.BoundBox.DiagonalLength), 1e-6)
-
-
-def _mesh(shape: Any, deflection: float) -> Mesh:
-    points, facets = shape.tessellate(deflection)
-    vertices = np.array([(p.x, p.y, p.z) for p in points]).reshape(-1, 3) * MM
-    return Mesh(vertices, np.array(facets, dtype=np.int64).reshape(-1, 3))
+def _nearer_to_mesh(solid: Any, ours: float, theirs: float) -> bool:
+    """Return True if our volume [mm^3] is nearer to the one that FreeCAD's tessellation encloses."""
+    points, facets = solid.tessellate(max(0.005 * float(solid.BoundBox.DiagonalLength), 1e-6))
+    vertices = np.array([(p.x, p.y, p.z) for p in points]).reshape(-1, 3)
+    enclosed = abs(mesh_volume(Mesh(vertices, np.array(facets, dtype=np.int64).reshape(-1, 3))))
+    return abs(abs(ours) - enclosed) < abs(abs(theirs) - enclosed)
 
 
 def _placed(found: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
@@ -298,8 +457,7 @@ def _placed(found: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
     ends = ((box.XMin, box.XMax), (box.YMin, box.YMax), (box.ZMin, box.ZMax))
     corners = np.array([(*corner, 1.0) for corner in product(*ends)]) @ matrix.T
     corners = corners[:, :3] * MM
-    mesh = found.mesh.moved(metres) if found.mesh is not None else None
-    return Body(there, corners.min(axis=0), corners.max(axis=0), mesh, (solid, matrix))
+    return Body(there, corners.min(axis=0), corners.max(axis=0), None, (solid, matrix))
 
 
 def _closed_shells(shape: Any) -> list[Any]:

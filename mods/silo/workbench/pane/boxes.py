@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The parts of the Database Activity pane: a box per entry, the banner, work in progress, what waits."""
+"""The parts of the Database Activity pane: a box per entry, the banner, work in progress, what waits.
+
+The content of the Activity dock (spec bom-sync §6): it draws :mod:`silo.workbench.pane.activity`.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,134 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
+from silo.outbox.entry import host_of, pause_text
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
-from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
-from silo.workbench.pane.banner import Banner
-from silo.workbench.pane.waiting import Row, can_send, heading, host_of, meant_for_another, rows
-from silo.workbench.session.shown import Shown
+from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, gathered
+from silo.workbench.pane.waiting import (
+    Banner,
+    Row,
+    banner,
+    can_send,
+    heading,
+    meant_for_another,
+    rows,
+)
+from silo.workbench.session.session import Shown
 from silo.workbench.words import plain, translate
+
+# More boxes than this are made only when somebody asks for them: widgets cost time, values do not.
+FIRST, MORE = 40, 60
+
+
+def _waits(shown: Shown) -> object:
+    """What is drawn of what waits."""
+    return shown.waiting, shown.server, shown.theirs, shown.reason
+
+
+class Pane(QtWidgets.QWidget):  # type: ignore[misc]
+    """The content of the dock: connection and work in progress; below them scrolls what waits, and the boxes,
+    newest first."""
+
+    def __init__(self, on_action: OnAction) -> None:
+        super().__init__()
+        self._on_action = on_action
+        self._shown: Shown | None = None
+        self._boxes: dict[str, tuple[Entry, Any]] = {}
+        self._most = FIRST
+        self._day = ""
+        self.setMinimumWidth(240)
+        layout = QtWidgets.QVBoxLayout(self)
+        layout.setContentsMargins(6, 6, 6, 6)
+        layout.setSpacing(6)
+        self._banner = BannerWidget(on_action)
+        self._busy = BusyWidget(on_action)
+        self._waiting = WaitingWidget(on_action)
+        for part in (self._banner, self._busy):
+            layout.addWidget(part)
+        layout.addWidget(self._make_list(), 1)
+
+    def _make_list(self) -> Any:
+        area = QtWidgets.QScrollArea()
+        area.setWidgetResizable(True)
+        area.setFrameShape(QtWidgets.QFrame.Shape.NoFrame)
+        area.setHorizontalScrollBarPolicy(QtCore.Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        inside = QtWidgets.QWidget()
+        self._list = QtWidgets.QVBoxLayout(inside)
+        self._list.setContentsMargins(0, 0, 2, 0)
+        self._list.setSpacing(6)
+        self._empty = widgets.label(
+            translate(
+                "Silo",
+                "Nothing has happened yet. Commit an assembly with File → Commit to Silo, and what becomes "
+                "of it is shown here.",
+            ),
+            Tone.QUIET,
+        )
+        self._older = widgets.link_button(translate("Silo", "Show older…"), self._show_older)
+        # In the list: in a low window it would leave the news no room, and its own lines neither.
+        self._list.addWidget(self._waiting)
+        self._list.addWidget(self._empty)
+        self._list.addWidget(self._older)
+        self._list.addStretch(1)
+        area.setWidget(inside)
+        return area
+
+    def draw(self, shown: Shown) -> None:
+        """Show a state; only what changed is made anew."""
+        before, self._shown = self._shown, shown
+        self._banner.draw(banner(shown))
+        self._busy.draw(shown)
+        if before is None or _waits(before) != _waits(shown):
+            self._waiting.draw(shown)
+        today = time.strftime("%Y-%m-%d")
+        if before is None or before.activity is not shown.activity or today != self._day:
+            # At midnight "14:03" becomes a date.
+            if today != self._day:
+                self._drop(tuple(self._boxes))
+            self._day = today
+            self._draw_entries(gathered(shown.activity.entries))
+
+    def changeEvent(self, event: Any) -> None:
+        """Another theme: what is coloured is made anew."""
+        super().changeEvent(event)
+        if event.type() in (QtCore.QEvent.Type.StyleChange, QtCore.QEvent.Type.PaletteChange):
+            shown, self._shown = self._shown, None
+            if shown is not None:
+                QtCore.QTimer.singleShot(0, lambda: self._draw_anew(shown))
+
+    def _draw_anew(self, shown: Shown) -> None:
+        if self._shown is None:
+            self._banner.forget()
+            self._drop(tuple(self._boxes))
+            self.draw(shown)
+
+    def _draw_entries(self, entries: tuple[Entry, ...]) -> None:
+        wanted = entries[: self._most]
+        keys = {entry.key for entry in wanted}
+        changed = [e.key for e in wanted if e.key in self._boxes and self._boxes[e.key][0] != e]
+        self._drop((*(key for key in self._boxes if key not in keys), *changed))
+        for place, entry in enumerate(wanted):
+            if entry.key not in self._boxes:
+                box = Box(entry, self._on_action)
+                self._boxes[entry.key] = (entry, box)
+                # What waits and the empty text stand first.
+                self._list.insertWidget(place + 2, box)
+        self._empty.setVisible(not entries)
+        self._older.setVisible(len(entries) > len(wanted))
+
+    def _drop(self, keys: tuple[str, ...]) -> None:
+        for key in keys:
+            _entry, box = self._boxes.pop(key)
+            self._list.removeWidget(box)
+            box.hide()
+            box.deleteLater()
+
+    def _show_older(self) -> None:
+        self._most += MORE
+        if self._shown is not None:
+            self._draw_entries(gathered(self._shown.activity.entries))
+
 
 OnAction = Callable[[Action], None]
 
@@ -186,7 +310,10 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
             self._most = self.MOST
             return
         self._layout.addWidget(widgets.label(heading(shown.waiting, shown.server.url), bold=True))
-        ordered = rows(shown.waiting, shown.server.url, shown.theirs, shown.reason)
+        if shown.pause is not None:
+            told = pause_text(shown.pause, shown.server.url, time.time(), translate)
+            self._layout.addWidget(widgets.label(plain(told, 400), wrap=True))
+        ordered = rows(shown.waiting, shown.server.url, shown.theirs, shown.reason, shown.pause)
         first = ordered[: self._most]
         for row in first:
             self._row(row)
@@ -195,7 +322,9 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
             self._layout.addWidget(widgets.link_button(text, partial(self._show_all, shown)))
         send = []
         if can_send(shown.waiting, shown.server.url):
-            send.append(Action(Do.RETRY, translate("Silo", "Send now")))
+            again = shown.pause is not None or any(entry.reason for entry in shown.waiting)
+            text = translate("Silo", "Retry all") if again else translate("Silo", "Send now")
+            send.append(Action(Do.RETRY, text))
         if len(away := meant_for_another(shown.waiting, shown.server.url)) > 1:
             text = translate("Silo", "Send all {n} of another address to {host}").replace(
                 "{n}", str(len(away))
@@ -210,7 +339,7 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
         self.draw(shown)
 
     def _row(self, row: Row) -> None:
-        what = f"{row.title} · {row.what} · {_clock(row.since)}"
+        what = f"{row.title} · {row.what} · {row.state} · {_clock(row.since)}"
         self._layout.addWidget(widgets.label(what, Tone.ERROR if row.urgent else Tone.PLAIN))
         if row.reason:
             self._layout.addWidget(widgets.label(row.reason, Tone.QUIET))

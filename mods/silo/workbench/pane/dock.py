@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The Database Activity dock. It is there from FreeCAD's start, or its place would not be restored; its
-content (:mod:`silo.workbench.pane.content`) is made when somebody first looks at it.
+content (:mod:`silo.workbench.pane.boxes`) is made when somebody first looks at it.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from silo.workbench.words import translate
 
 if TYPE_CHECKING:
     from silo.workbench.pane.activity import Action
-    from silo.workbench.pane.content import Pane
-    from silo.workbench.session.shown import Shown
+    from silo.workbench.pane.boxes import Pane
+    from silo.workbench.session.session import Shown
 
 NAME = "Database Activity"
 
@@ -26,7 +26,7 @@ class ActivityDock(QtWidgets.QDockWidget):  # type: ignore[misc]  # PySide has n
     """The dock. FreeCAD restores place and visibility by its object name, so that must never change.
 
     on_action
-        told of every button that is pressed.
+        gets every button that is pressed.
     """
 
     def __init__(self, window: Any, on_action: Callable[[Action], None]) -> None:
@@ -54,7 +54,7 @@ class ActivityDock(QtWidgets.QDockWidget):  # type: ignore[misc]  # PySide has n
         if not visible:
             return
         if self._pane is None:
-            from silo.workbench.pane.content import Pane
+            from silo.workbench.pane.boxes import Pane
 
             self._pane = Pane(self._on_action)
             self.setWidget(self._pane)

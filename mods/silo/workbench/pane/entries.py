@@ -10,19 +10,18 @@ from datetime import datetime
 from typing import Any
 
 from silo.activity import Count, count_texts, headline, no_changes, unregistered_text
-from silo.api.merging import unusual
-from silo.api.sse import MERGE, RESET, ServerEvent
+from silo.api.boms import unusual
+from silo.api.events import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
-from silo.bom.identity import walk_entries
-from silo.bom.model import BomEntry
-from silo.bom.naming import display_name
+from silo.bom.model import BomEntry, walk_entries
 from silo.bom.report import shorten
+from silo.bom.resolve import display_name
 from silo.bom_sync import Resolved, Status
-from silo.outbox.report import Sent
+from silo.outbox.send import Sent
 from silo.workbench.pane.activity import Action, Batch, Do, Entry, Line, Tone, not_in_silo_key, shortened
-from silo.workbench.session.colleagues import Newer
+from silo.workbench.session.session import Newer
 from silo.workbench.words import counted, plain, quantity, translate
 
 # Makes an absolute address of a page such as `resolve_url`; raises SiloError for another server's.
@@ -33,7 +32,7 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
     """The box of one commit."""
     lines = (*_revision_lines(sent), *_status_lines(sent), *_resolved_lines(sent))
     tone = max((line.tone for line in lines), key=_WEIGHT.__getitem__, default=Tone.GOOD)
-    url = (sent.result.resolve_url if sent.result is not None else "") or f"/items/{sent.part_number}/bom"
+    url = (sent.result.resolve_url if sent.result is not None else "") or sent.page
     return Entry(
         key=f"sync:{sent.sync_id}" if sent.sync_id else f"commit:{sent.part_number}:{now}",
         also=(
@@ -72,7 +71,7 @@ _WEIGHT = {
 
 
 def _title(sent: Sent) -> str:
-    item = " ".join(filter(None, (sent.part_number, _name(sent))))
+    item = " ".join(filter(None, (sent.number, _name(sent))))
     if sent.status is Status.MERGED:
         return headline(item, translate)
     if sent.status is Status.BLOCKED:
@@ -206,7 +205,7 @@ def _conflict_lines(sent: Sent, resolved: Resolved) -> list[Line]:
     lines = []
     for change in sent.plan.diff.conflicts:
         told = text.replace("{number}", change.part_number).replace("{cad}", quantity(change.local_quantity))
-        told = told.replace("{silo}", quantity(change.remote_quantity))
+        told = told.replace("{silo}", change.on_server(quantity(change.remote_quantity)))
         lines.append(Line(told, Tone.WARNING, _show(known.get(change.part_number), resolved)))
     return lines
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The preview window: the assembly's BOM against the server's, and Sync. It draws ``preview.rows``."""
+"""The preview window: the assembly's BOM against the server's, and Sync. It draws ``preview.flow``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from silo.bom.errors import SiloError
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Tone
-from silo.workbench.preview.rows import MOST_CELL, MOST_ROWS, Kind, Preview, Row, rows, summary
+from silo.workbench.preview.flow import MOST_CELL, MOST_ROWS, Kind, Preview, Row, rows, summary
 from silo.workbench.words import counted, plain, tip, translate
 
 if TYPE_CHECKING:

@@ -1,22 +1,382 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""From the command to the preview window, and from its buttons to the workers. GUI thread."""
+"""From the command to the preview window, and from its buttons to the workers. GUI thread.
+
+The BOM preview as rows: the assembly against the server, level by level (the rows of ``silo-mod diff``).
+
+Pure, but for :func:`ask`, which reads from the server and belongs in the worker.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
-from dataclasses import replace
-from typing import Any, Protocol
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Protocol
 
+from silo.bom.document import relative
 from silo.bom.errors import SiloError
-from silo.bom.model import BomEntry
+from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.model import BomDiff, BomEntry, Extraction
+from silo.bom.report import shorten
+from silo.bom.resolve import display_name
 from silo.outbox.entry import new_key
-from silo.workbench.commit.desk import Desk
-from silo.workbench.commit.flow import CommitFlow, commit_of
-from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.preview.rows import Preview, ask, to_sync
+from silo.workbench.commit.flow import CommitFlow, Desk, commit_of
+from silo.workbench.commit.plan import Snapshot
+from silo.workbench.session.jobs import Control
 from silo.workbench.session.session import Session
-from silo.workbench.words import plain, translate
+from silo.workbench.words import MOST_TIP, plain, quantity, translate
+
+if TYPE_CHECKING:
+    from silo.bom_sync import Resolved
+
+
+# Letters of a cell; its tool tip has the rest.
+MOST_CELL = 300
+
+
+class Kind(StrEnum):
+    """What a row says."""
+
+    ADDED = "added"
+    CHANGED = "changed"
+    CONFLICT = "conflict"
+    UNREFERENCED = "unreferenced"
+    MANUAL = "manual"
+    UNCHANGED = "unchanged"
+    UNREGISTERED = "unregistered"
+    MISSING = "missing"
+    NOT_COUNTED = "not counted"
+    GROUP = "group"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the table.
+
+    cad, silo
+        quantities per one parent, as text; "" where that side has none.
+    document, objects
+        the instances in the CAD model, to select them.
+    """
+
+    kind: Kind
+    number: str = ""
+    name: str = ""
+    cad: str = ""
+    silo: str = ""
+    note: str = ""
+    document: str = ""
+    objects: tuple[str, ...] = ()
+    children: tuple[Row, ...] = ()
+
+    def __post_init__(self) -> None:
+        for text, most in (("number", MOST_CELL), ("name", MOST_CELL), ("note", MOST_TIP)):
+            object.__setattr__(self, text, plain(getattr(self, text), most))
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One assembly against the server's lines.
+
+    to_send
+        a sync of it would be sent: the server has something to learn from it.
+    """
+
+    resolved: Resolved
+    lines: tuple[Mapping[str, Any], ...]
+    diff: BomDiff
+    to_send: bool
+
+
+@dataclass(frozen=True)
+class Preview:
+    """All that the preview shows, and what a sync from it needs.
+
+    compared
+        every assembly, children before parents; the one that was asked for is the last.
+    broken
+        what keeps the assembly from being synced.
+    page
+        address of the assembly's BOM on the server.
+    note
+        why it was made, where nobody asked for it.
+    """
+
+    snapshot: Snapshot
+    compared: tuple[Compared, ...]
+    names: Mapping[str, str] = field(default_factory=dict)
+    broken: tuple[Finding, ...] = ()
+    page: str = ""
+    note: str = ""
+
+    @property
+    def top(self) -> Compared:
+        return self.compared[-1]
+
+    @property
+    def number(self) -> str:
+        """Part number of the assembly; "" while it has none."""
+        return self.top.resolved.assembly.part_number or ""
+
+    @property
+    def unregistered(self) -> tuple[BomEntry, ...]:
+        """Components without a part number, the assembly itself included."""
+        return self.top.resolved.unregistered
+
+    @property
+    def movable(self) -> tuple[Finding, ...]:
+        """The broken links for which one file fits."""
+        return tuple(finding for finding in self.broken if finding.did_you_mean)
+
+    @property
+    def to_send_below(self) -> int:
+        """Sub-assemblies whose sync has something to send."""
+        return sum(1 for one in self.compared[:-1] if one.to_send)
+
+
+def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
+    """Compare a snapshot with the server, sub-assemblies included. Worker."""
+    from silo.batch import suggest_by_identity
+    from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
+    from silo.fcstd.linked import with_suggestions
+
+    extraction = snapshot.extraction or Extraction(BomEntry(snapshot.path, label=snapshot.label))
+    extraction = with_suggestions(extraction)
+    whole = resolve(extraction, api)
+    lines = []
+    for one in assemblies(whole):
+        control.check()
+        control.progress(one.assembly.part_number or one.assembly.label)
+        lines.append(server_lines(one, api))
+    whole = suggest_by_identity(whole, list(zip(assemblies(whole), lines, strict=True)))
+    compared = [_compared(one, known) for one, known in zip(assemblies(whole), lines, strict=True)]
+    all_lines = [line for one in compared for line in one.lines]
+    number = whole.assembly.part_number
+    page = api.web_url(f"/items/{number}/bom") if number else ""
+    return Preview(snapshot, tuple(compared), names_of(whole, all_lines), blocking(whole), page)
+
+
+def _compared(one: Resolved, lines: tuple[Mapping[str, Any], ...]) -> Compared:
+    from silo.bom_sync import Status, decide
+
+    # Whether what is missing may be left out is asked in the window, so it does not count here.
+    outcome = decide(one, lines, allow_missing=True)
+    diff = one.diff(lines) if outcome.plan is None else outcome.plan.diff
+    return Compared(one, lines, diff, outcome.status is Status.MERGED)
+
+
+# Nested assemblies share their lines: some dozen small files can stand for more rows than memory holds.
+MOST_ROWS = 3000
+
+
+def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[Row, ...]:
+    """The table: the lines of the assembly, then what is left out and why.
+
+    most
+        so many rows of sub-assemblies at most, each of which gets its share; one row sums up the rest.
+    """
+    by_key = {one.resolved.assembly.key: one for one in preview.compared}
+    base = os.path.dirname(preview.snapshot.path)
+    room = most // 2
+    table = [*_assembly_rows(preview.top, by_key, preview.names, frozenset(), room)]
+    unresolved = preview.top.resolved.unresolved
+    share = _share(room, unresolved)
+    unregistered = tuple(
+        _unregistered_row(entry, base, tuple(_below(entry, by_key, preview.names, frozenset(), share)))
+        for entry in unresolved
+    )
+    if unregistered:
+        title = translate("Silo", "Without a part number: left out until registered")
+        table.append(_group(title, unregistered))
+    left_out = tuple(_finding_row(f, preview, base) for f in _told(preview.top.resolved.findings))
+    if left_out:
+        title = translate("Silo", "Not counted, or counted with a remark")
+        table.append(_group(title, left_out))
+    return tuple(table)
+
+
+def _group(title: str, children: tuple[Row, ...]) -> Row:
+    return Row(Kind.GROUP, name=f"{title} ({len(children)})", children=children)
+
+
+Known = Mapping[tuple[str, str], Compared]
+Keys = frozenset[tuple[str, str]]
+
+
+def _share(room: int, entries: Sequence[BomEntry]) -> int:
+    return room // max(1, sum(entry.is_assembly for entry in entries))
+
+
+def _assembly_rows(
+    one: Compared, known: Known, names: Mapping[str, str], above: Keys, room: int
+) -> Iterator[Row]:
+    """The assembly's own lines in its own order, then those that only the server has.
+
+    room
+        so many rows may stand below them.
+    """
+    states = _states(one.diff)
+    share = _share(room, one.resolved.entries)
+    above = above | {one.resolved.assembly.key}
+    for entry in one.resolved.entries:
+        kind, silo, note = states.get(entry.part_number or "", (Kind.UNCHANGED, "", ""))
+        if entry.missing:
+            base = os.path.dirname(one.resolved.assembly.doc_path)
+            kind, note = Kind.MISSING, _missing_words(relative(entry.doc_path, base), entry.object_name)
+        yield Row(
+            kind,
+            number=entry.part_number or "",
+            name=entry.name or (display_name(entry) if entry.missing else ""),
+            cad=quantity(entry.quantity),
+            silo=silo,
+            note=note,
+            document=one.resolved.assembly.doc_path,
+            objects=entry.instances,
+            children=tuple(_below(entry, known, names, above, share)),
+        )
+    local = {entry.part_number for entry in one.resolved.entries}
+    for kind, changes in (
+        (Kind.UNREFERENCED, one.diff.removed),
+        (Kind.MISSING, one.diff.kept),
+        (Kind.MANUAL, one.diff.manual),
+    ):
+        for change in changes:
+            if change.part_number not in local:
+                number, amount = change.part_number, quantity(change.quantity)
+                name = names.get(number, "")
+                yield Row(kind, number=number, name=name, silo=amount, note=_notes()[kind])
+
+
+def _below(entry: BomEntry, known: Known, names: Mapping[str, str], above: Keys, room: int) -> Iterator[Row]:
+    """The lines of a sub-assembly; none where it stands above itself (a loop is reported as a finding)."""
+    one = known.get(entry.key) if entry.is_assembly and entry.key not in above else None
+    if one is None:
+        return
+    left = room - len(one.resolved.entries) - len(one.diff.removed) - len(one.diff.manual)
+    if left < 0:
+        yield Row(Kind.GROUP, name=translate("Silo", "… more rows than can be shown here"))
+    else:
+        yield from _assembly_rows(one, known, names, above, left)
+
+
+def _states(diff: BomDiff) -> dict[str, tuple[Kind, str, str]]:
+    """Part number → kind, the server's quantity, and what a sync does."""
+    notes = _notes()
+    states: dict[str, tuple[Kind, str, str]] = {}
+    for line in diff.unchanged:
+        states[line.part_number] = (Kind.UNCHANGED, quantity(line.quantity), "")
+    for line in diff.added:
+        states[line.part_number] = (Kind.ADDED, "", notes[Kind.ADDED])
+    for change in diff.quantity_changed:
+        states[change.part_number] = (Kind.CHANGED, quantity(change.remote_quantity), notes[Kind.CHANGED])
+    for change in diff.conflicts:
+        kept = change.on_server(quantity(change.remote_quantity))
+        states[change.part_number] = (Kind.CONFLICT, kept, notes[Kind.CONFLICT])
+    for line in diff.kept:
+        states[line.part_number] = (Kind.MISSING, quantity(line.quantity), notes[Kind.MISSING])
+    return states
+
+
+def _notes() -> dict[Kind, str]:
+    return {
+        Kind.ADDED: translate("Silo", "new in the assembly: will be added"),
+        Kind.CHANGED: translate("Silo", "will take the assembly's quantity"),
+        Kind.CONFLICT: translate("Silo", "manual line in Silo with another quantity: a person decides there"),
+        Kind.UNREFERENCED: translate("Silo", "not in the assembly: kept, marked unreferenced"),
+        Kind.MANUAL: translate("Silo", "manual line: not touched"),
+        Kind.MISSING: translate("Silo", "its file is missing: the line stays as it is"),
+    }
+
+
+def _missing_words(file: str, name: str) -> str:
+    text = translate("Silo", "missing: {file}")
+    return text.replace("{file}", f"{file}#{name}" if name else file)
+
+
+def _unregistered_row(entry: BomEntry, base: str, children: tuple[Row, ...]) -> Row:
+    return Row(
+        Kind.UNREGISTERED,
+        name=display_name(entry),
+        cad=quantity(entry.quantity),
+        note=relative(entry.doc_path, base),
+        children=children,
+    )
+
+
+# Told as rows of their own.
+_ELSEWHERE = (FindingCode.UNREGISTERED,)
+_ORDER = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
+
+
+def _told(findings: Iterable[Finding]) -> list[Finding]:
+    return sorted((f for f in findings if f.code not in _ELSEWHERE), key=lambda f: _ORDER[f.severity])
+
+
+def _finding_row(finding: Finding, preview: Preview, base: str) -> Row:
+    top = preview.snapshot.path
+    mine = tuple(place.obj for place in finding.where if place.doc_path == top and place.obj)
+    return Row(
+        Kind.NOT_COUNTED,
+        number={Severity.ERROR: "✗", Severity.WARNING: "⚠", Severity.INFO: "·"}[finding.severity],
+        note=shorten(finding.message, base),
+        document=top if mine else "",
+        objects=mine,
+    )
+
+
+def summary(preview: Preview) -> str:
+    """One line over the table."""
+    diff = preview.top.diff
+    parts = (
+        (len(diff.added), translate("Silo", "{n} to add")),
+        (len(diff.quantity_changed), translate("Silo", "{n} with another quantity")),
+        (len(diff.removed), translate("Silo", "{n} unreferenced")),
+        (len(diff.conflicts), translate("Silo", "{n} in conflict")),
+        (len(preview.top.resolved.unresolved), translate("Silo", "{n} without a part number")),
+        (sum(entry.missing for entry in preview.top.resolved.entries), translate("Silo", "{n} missing")),
+    )
+    told = [text.replace("{n}", str(count)) for count, text in parts if count]
+    if not told:
+        agree = translate("Silo", "Nothing to sync: all {n} lines agree with Silo.")
+        return agree.replace("{n}", str(len(diff.unchanged)))
+    return ", ".join(told)
+
+
+def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:
+    """Snapshots whose BOMs a sync sends, children before parents; without ``below`` the top one only."""
+    found = []
+    for one in preview.compared[:-1] if below else ():
+        if one.to_send:
+            found.append(_part_of(preview.snapshot, one.resolved))
+    return (*found, preview.snapshot)
+
+
+def _part_of(snapshot: Snapshot, one: Resolved) -> Snapshot:
+    """A sub-assembly as a snapshot of its own, cut from that of its parent."""
+    head = one.assembly
+    original = _find(snapshot.extraction, head.key)
+    mine = tuple(f for f in one.findings if any(place.doc_path == head.doc_path for place in f.where))
+    return Snapshot(
+        path=head.doc_path,
+        label=display_name(head),
+        identity=head.silo_uuid,
+        extraction=Extraction(replace(head, children=()), original.children if original else (), mine),
+    )
+
+
+def _find(extraction: Extraction | None, key: tuple[str, str]) -> BomEntry | None:
+    stack = list(extraction.entries) if extraction is not None else []
+    seen = set()
+    while stack:
+        entry = stack.pop()
+        if entry.key == key:
+            return entry
+        if id(entry) not in seen:
+            seen.add(id(entry))
+            stack.extend(entry.children)
+    return None
+
 
 # Of many sub-assemblies that differ, the first ones.
 _MOST_ACCOUNTS = 4

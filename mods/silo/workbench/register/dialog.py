@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The Register Components dialog of spec bom-sync §6; it draws :mod:`silo.workbench.register.rows`."""
+"""The Register Components dialog of spec bom-sync §6; it draws :mod:`silo.workbench.register.flow`."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from silo.registering.items import Registration
 from silo.registering.offer import Offer
 from silo.registering.orders import Order
 from silo.workbench.gui import widgets
-from silo.workbench.gui.choice_cell import KEY, ChoiceDelegate
 from silo.workbench.gui.qt import QtCore, QtWidgets
+from silo.workbench.gui.widgets import KEY, ChoiceDelegate
 from silo.workbench.pane.activity import Tone
-from silo.workbench.register.rows import (
+from silo.workbench.register.flow import (
     APART,
     NEW,
     EditedRow,

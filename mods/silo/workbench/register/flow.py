@@ -7,30 +7,364 @@
                                        ▲                                          │ identities: GUI thread
                                        ╰─────────────── next numbers ◀── commits ◀┘
 
-FreeCAD and Qt come in through the :class:`~silo.workbench.commit.desk.Desk` only.
+FreeCAD and Qt come in through the :class:`~silo.workbench.commit.flow.Desk` only.
+
+The rows of the Register Parts dialog while a person edits them. Pure; the dialog only draws them.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
+from silo.activity import rules_text
 from silo.bom.errors import SiloError
-from silo.bom.identity import walk_entries
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.model import BomEntry, Extraction, walk_entries
 from silo.registering.items import Registration
 from silo.registering.journal import Journal
-from silo.registering.offer import Candidate, Offer, next_number, offer
+from silo.registering.offer import Candidate, Offer, Similar, State, next_number, offer
 from silo.registering.orders import Order, carry_out
-from silo.workbench.commit.desk import Desk
-from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.register.rows import EditedRow
+from silo.workbench.commit.flow import CommitFlow, Desk
+from silo.workbench.commit.plan import Snapshot
+from silo.workbench.pane.activity import Tone
 from silo.workbench.session.session import Session
 from silo.workbench.settings.preferences import Preferences
-from silo.workbench.words import translate
+from silo.workbench.words import counted, plain, translate
+
+NEW = "new"
+SAME = "same"
+ASK = "ask"
+APART = "apart"
+
+
+def section_words() -> dict[str, str]:
+    """The sections of the dialog for people."""
+    return {
+        "": translate("Silo", "Components"),
+        "standard": translate("Silo", "Standard parts"),
+        "modelled": translate("Silo", "Modelled in this file, not counted"),
+        "declared": translate("Silo", "Modelled in this file, and counted"),
+    }
+
+
+def type_words() -> dict[str, str]:
+    """Item types for people."""
+    return {
+        "part": translate("Silo", "Part"),
+        "assembly": translate("Silo", "Assembly"),
+        "consumable": translate("Silo", "Consumable"),
+        "tool": translate("Silo", "Tool"),
+    }
+
+
+def state_words() -> dict[State, str]:
+    """The states for people."""
+    return {
+        State.READY: "",
+        State.EDITED: translate("Silo", "its unsaved edits are saved too"),
+        State.ELSEWHERE: translate(
+            "Silo", "open in another FreeCAD: close it there first, or saving there undoes this"
+        ),
+        State.READ_ONLY: translate("Silo", "the file is read-only"),
+        State.PARTIAL: translate("Silo", "has edits, but is loaded only in part: open the file itself first"),
+        State.NEWER: translate("Silo", "has changed on disk since you opened it: open it again first"),
+        State.MISSING: translate("Silo", "the file is missing"),
+        State.UNNAMED: translate("Silo", "has no file yet: save it first"),
+        State.LOST: translate("Silo", "made by a newer FreeCAD: cannot be saved here"),
+    }
+
+
+@dataclass
+class EditedRow:
+    """A component with what the person chose for it.
+
+    file
+        the name of its file, such that no other row has it.
+    number
+        NEW for a new item, else the part number of an item to join. A copied identity begins with ASK, until
+        the person says NEW or SAME (keep it).
+    result
+        what became of it; None while it is not registered.
+    """
+
+    candidate: Candidate
+    name: str
+    item_type: str
+    category: str
+    file: str
+    number: str = NEW
+    checked: bool = True
+    running: bool = False
+    result: Registration | None = None
+
+    @classmethod
+    def of(cls, candidate: Candidate, file: str = "") -> EditedRow:
+        """A row as it is offered."""
+        proposal = candidate.proposal
+        return cls(
+            candidate,
+            name=proposal.name,
+            item_type=proposal.item_type,
+            category=proposal.category,
+            file=file or os.path.basename(candidate.entry.doc_path),
+            number=ASK if candidate.same_as else NEW,
+            checked=candidate.wanted,
+        )
+
+    @property
+    def section(self) -> str:
+        """The section that the row stands in, a key of :func:`section_words`."""
+        if self.candidate.article is not None:
+            return "declared" if self.candidate.declared else "modelled"
+        return "standard" if self.candidate.entry.is_standard else ""
+
+    @property
+    def finished(self) -> bool:
+        """True where it has its number."""
+        return self.result is not None and self.result.error is None
+
+    @property
+    def editable(self) -> bool:
+        """True while something can still be chosen."""
+        usable = self.candidate.state.usable and not self.candidate.declared
+        return usable and not self.finished and not self.running
+
+    @property
+    def can_undeclare(self) -> bool:
+        """True where it is modelled in the file and its identity can be taken back."""
+        return self.candidate.declared and self.candidate.state.usable and not self.running
+
+    @property
+    def can_choose(self) -> bool:
+        """True while its number can be chosen; a copied identity can be kept without writing to the file."""
+        return self.editable or (bool(self.candidate.same_as) and not self.finished and not self.running)
+
+    @property
+    def can_register(self) -> bool:
+        """True where pressing Register gives it a number."""
+        return self.editable and bool(self.name.strip()) and self.number not in (SAME, ASK)
+
+    @property
+    def can_keep(self) -> bool:
+        """True where pressing the button keeps the identity that it has."""
+        return self.can_choose and self.number == SAME
+
+    def keep(self) -> None:
+        """It stays what it is."""
+        self.result = Registration(self.candidate.proposal, part_number=self.candidate.same_as)
+        self.checked = False
+
+    def order(self) -> Order:
+        """The row as an order for the worker."""
+        existing = next((s for s in self.candidate.similar if s.part_number == self.number), None)
+        apart = self.number == APART
+        return Order(self.candidate, self.name.strip(), self.item_type, self.category, existing, apart)
+
+    @property
+    def guesses(self) -> bool:
+        """True while its category is one that nobody has looked at."""
+        same = self.category == self.candidate.proposal.category
+        return (
+            self.candidate.proposal.is_guess and same and not (self.checked or self.finished or self.running)
+        )
+
+    def component(self) -> str:
+        """Which component this is."""
+        return self._component
+
+    @cached_property
+    def _component(self) -> str:
+        entry = self.candidate.entry
+        if entry.standard:
+            return plain(translate("Silo", "Standard part: {name}").replace("{name}", entry.standard), 80)
+        if (article := self.candidate.article) is not None:
+            text = plain(entry.label, 60)
+            copies = translate("Silo", "{name} ({n} copies)").replace("{n}", str(len(article.objects)))
+            return copies.replace("{name}", text) if len(article.objects) > 1 else text
+        return plain(f"{self.file} · {entry.label}" if self.candidate.shares_file else self.file, 80)
+
+    def number_text(self, numbers: Mapping[str, str], taken: int) -> str:
+        """The number that it has, or would get; ``taken`` rows before it want one of the same category."""
+        if self.finished and self.result is not None:
+            return self.result.part_number or ""
+        if self.number == SAME:
+            text = translate("Silo", "{number} (kept)")
+            return text.replace("{number}", self.candidate.same_as)
+        if self.number == ASK:
+            return translate("Silo", "same or new part?")
+        if self.number == APART:
+            return translate("Silo", "one for each")
+        if self.candidate.declared:
+            return ""
+        if self.number != NEW:
+            return self.number
+        if not self.candidate.state.usable:
+            return ""
+        following = numbers.get(self.category, "")
+        if not following:
+            return translate("Silo", "new")
+        text = translate("Silo", "{number} or later") if taken else translate("Silo", "{number} (new)")
+        return text.replace("{number}", following)
+
+    def choices(self) -> dict[str, str]:
+        """What can be chosen as its number."""
+        found = {}
+        if self.candidate.same_as:
+            same = translate("Silo", "same part: keep {number}")
+            found[SAME] = same.replace("{number}", self.candidate.same_as)
+        if not self.candidate.state.usable:
+            return found
+        new = translate("Silo", "new part: a new number")
+        found[NEW] = new if self.candidate.same_as else translate("Silo", "a new number")
+        if self.candidate.article is not None and len(self.candidate.article.objects) > 1:
+            found[APART] = translate("Silo", "different parts: a number for each copy")
+        for similar in self.candidate.similar:
+            found[similar.part_number] = f"{similar.part_number} {plain(similar.name, 60)}"
+        return found
+
+    def note(self) -> tuple[str, Tone]:
+        """The last column: what happened, what is in the way, or what to look at."""
+        if self.result is not None and self.result.error is not None:
+            return plain(str(self.result.error), 300), Tone.ERROR
+        if self.finished:
+            kept, registered = translate("Silo", "stays as it is"), translate("Silo", "registered")
+            return kept if self.number == SAME else registered, Tone.GOOD
+        if self.running:
+            return translate("Silo", "registering…"), Tone.QUIET
+        if not self.candidate.state.usable and not self.candidate.same_as:
+            return state_words()[self.candidate.state], Tone.WARNING
+        told = [*self._suspicions(), *self._about_the_article(), state_words()[self.candidate.state]]
+        text = "; ".join(filter(None, told))
+        doubtful = bool(self._suspicions()) or self.candidate.state is State.ELSEWHERE
+        return text, Tone.WARNING if doubtful else Tone.QUIET
+
+    def _about_the_article(self) -> list[str]:
+        article = self.candidate.article
+        if article is None:
+            return []
+        if article.declared:
+            one, many = translate("Silo", "counts once"), translate("Silo", "counts {n} times")
+        else:
+            one = translate("Silo", "would count once; check it if it is a part")
+            many = translate("Silo", "would count {n} times; check it if it is a part")
+        told = [counted(article.entry.quantity, one, many)]
+        if article.source:
+            source = translate("Silo", "imported from {file}").replace(
+                "{file}", os.path.basename(article.source)
+            )
+            told.append(source)
+        if article.alike == "label":
+            told.append(translate("Silo", "equal by their labels only"))
+        return told
+
+    def _suspicions(self) -> list[str]:
+        told = []
+        if self.candidate.same_as:
+            text = translate("Silo", "carries the identity of {number}, as another file does")
+            told.append(text.replace("{number}", self.candidate.same_as))
+        told += [_similar_words(similar) for similar in self.candidate.similar[:2]]
+        if self.candidate.twin:
+            text = translate("Silo", "the same content as {name}")
+            told.append(text.replace("{name}", plain(self.candidate.twin, 40)))
+        return told
+
+
+def _similar_words(similar: Similar) -> str:
+    if similar.same_file:
+        text = translate("Silo", "Silo has this very file as {number}")
+    else:
+        text = translate("Silo", "Silo has {number} with the same name")
+    return text.replace("{number}", similar.part_number)
+
+
+def group(rows: Sequence[EditedRow], row: EditedRow) -> list[EditedRow]:
+    """The rows that carry the same identity as this one, itself among them."""
+    if not row.candidate.same_as:
+        return [row]
+    return [other for other in rows if other.candidate.same_as == row.candidate.same_as]
+
+
+def choose(rows: Sequence[EditedRow], row: EditedRow, number: str) -> None:
+    """Take over what the person chose as a row's number, and what follows from it for its group."""
+    row.number, row.checked = number, True
+    asked = [other for other in group(rows, row) if other.number == ASK and not other.finished]
+    last = len(asked) == 1 and all(
+        other.number != SAME for other in group(rows, row) if other is not asked[0]
+    )
+    # "The same part" is said of all of them; once all others are new parts, the last one is the part itself.
+    for other in asked if number == SAME or last else ():
+        other.number, other.checked = SAME, True
+
+
+def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> None:
+    """Take over the chosen type; the category follows where it is still the one that was proposed.
+
+    categories
+        code → description, as the schema has them.
+    """
+    order = row.order().retyped(item_type, categories)
+    row.item_type, row.category = order.item_type, order.category
+
+
+def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]:
+    """The number column of all rows."""
+    taken: dict[str, int] = {}
+    texts = []
+    for row in rows:
+        texts.append(row.number_text(numbers, taken.get(row.category, 0)))
+        if row.number == NEW and row.checked and not row.finished:
+            taken[row.category] = taken.get(row.category, 0) + 1
+    return texts
+
+
+def notices(offer: Offer) -> str:
+    """About the whole offer: mistakes in the site's rules, and that nobody looked for look-alikes."""
+    told = [rules_text(getattr(offer.categories, "problem", ""), translate)]
+    if offer.unsearched:
+        text = translate("Silo", "Silo was not searched for parts that look alike: {problem}")
+        told.append(text.replace("{problem}", plain(offer.unsearched, 300)))
+    return "\n".join(filter(None, told))
+
+
+def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
+    """What the dialog says above its rows; ``more`` of them do not fit in."""
+    components = [row for row in rows if row.candidate.article is None]
+    if not components:
+        text = translate("Silo", "All components of {name} have their Silo part number.")
+        return text.replace("{name}", plain(title, 80))
+    left = [row for row in components if not row.finished]
+    if not left:
+        return translate("Silo", "All of these have their part number now.")
+    copied = sum(1 for row in left if row.candidate.same_as)
+    told = [_unregistered(len(left) - copied)] if len(left) > copied else []
+    if copied:
+        told.append(
+            translate(
+                "Silo",
+                "Where files carry one identity, choose in the column Part number: the same part, or a "
+                "new one?",
+            )
+        )
+    if more > 0:
+        told.append(translate("Silo", "({n} more after these)").replace("{n}", str(more)))
+    return "\n".join(told)
+
+
+def _unregistered(left: int) -> str:
+    one = translate(
+        "Silo",
+        "The following component has no Silo part number and will be excluded from the BOM until registered:",
+    )
+    many = translate(
+        "Silo",
+        "The following components have no Silo part number and will be excluded from the BOM until "
+        "registered:",
+    )
+    return counted(left, one, many)
 
 
 class Window(Protocol):

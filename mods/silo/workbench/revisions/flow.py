@@ -17,11 +17,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import DocumentError, SiloError
-from silo.folders import cache_folder
-from silo.outbox.database import KEPT_ASIDE_DAYS
-from silo.workbench.commit.desk import Desk
+from silo.outbox.store import KEPT_ASIDE_DAYS
+from silo.platform import cache_folder
+from silo.workbench.commit.flow import Choice, Desk, Theirs
 from silo.workbench.commit.opened import Base
-from silo.workbench.commit.theirs import Choice, Theirs
 from silo.workbench.pane.activity import Entry, Line, Tone
 from silo.workbench.session.session import Session
 from silo.workbench.words import plain, translate
@@ -102,7 +101,7 @@ class RevisionFlow:
 
         def fetch(client: SiloClient, control: Control) -> None:
             content.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            from silo.api.revisions import download_revision
+            from silo.api.files import download_revision
 
             checksum = str((theirs.newer or {}).get("file_checksum") or "")
             number = theirs.part_number
@@ -117,8 +116,8 @@ class RevisionFlow:
 
     def _replace(self, path: str, content: Path | None, theirs: Theirs) -> None:
         """Theirs in the place of mine, of which a copy is kept. ``content`` None: theirs is there already."""
-        from silo.durable import remove_patiently, replacing
         from silo.files import content_hash
+        from silo.platform import remove_patiently, replacing
 
         doc, outbox, kept = self._desk.find(path), self._session.outbox, list[str]()
         # The file on disk is mine, or it is a third person's.
@@ -215,15 +214,14 @@ class RevisionFlow:
     ) -> None:
         """Fetch a file with all that it links to. What FreeCAD has open, and what has edits that are not in
         Silo, is left alone; ``overwrite`` replaces the latter and keeps copies."""
-        from silo.spelling import Spelling  # late: FreeCAD's start waits for this module
+        from silo.platform import Spelling  # late: FreeCAD's start waits for this module
 
         real = Spelling().real  # a link may have opened the file under another spelling of its name
         mine = {real(path) for path in self._desk.open_paths()}
         outbox = self._session.outbox
 
         def run(client: SiloClient, control: Control) -> Pulled:
-            from silo.vault.fetch import fetched
-            from silo.vault.pull import Rules, place
+            from silo.vault.pull import Rules, fetched, place
 
             def progress(name: str, count: int) -> None:
                 control.progress(f"{count + 1}: {plain(name, 60)}", None)
@@ -259,7 +257,7 @@ class RevisionFlow:
         outbox = self._session.outbox
 
         def run(client: SiloClient, _control: Control) -> Known:
-            from silo.api.revisions import standing
+            from silo.api.files import standing
             from silo.bom.errors import NotFoundError
 
             item = client.get_item_by_uuid(identity)
@@ -285,7 +283,7 @@ class RevisionFlow:
         """What a revision changed in the BOM, line by line in words; read from both files."""
 
         def run(client: SiloClient, control: Control) -> list[str]:
-            from silo.vault.revisions import RevisionBoms, line_texts
+            from silo.vault.pull import RevisionBoms, line_texts
 
             with RevisionBoms(client, part_number, path, control.cancelled) as boms:
                 return line_texts(boms.change(older, newer))
@@ -294,7 +292,7 @@ class RevisionFlow:
 
 
 def _known(client: SiloClient, part_number: str) -> Known:
-    from silo.vault.revisions import file_revisions
+    from silo.vault.pull import file_revisions
 
     item = client.get_item(part_number)
     found = file_revisions(client.revisions(part_number))

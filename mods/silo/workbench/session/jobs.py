@@ -67,7 +67,7 @@ class Worker:
     on_busy
         told (through ``deliver``) whenever there is something new to show; None when idle.
     on_bug
-        told of exceptions that are no :class:`SiloError`; the job then ends with a plain sentence.
+        gets exceptions that are no :class:`SiloError`; the job then ends with a plain sentence.
     """
 
     def __init__(

@@ -3,27 +3,26 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from silo.api.client import SiloClient
-from silo.api.config import resolve_server
-from silo.api.events import ConnectionState, EventListener
-from silo.api.sse import RESET, ServerEvent
-from silo.bom.errors import ConfigError
-from silo.durable import read_memory
+from silo.api.config import Pause, resolve_server
+from silo.api.events import RESET, Connection, ConnectionState, EventListener, ServerEvent
+from silo.bom.errors import ConfigError, InputError
 from silo.outbox.entry import Entry as Waiting
-from silo.outbox.report import Report, Sent
-from silo.outbox.send import send_all
+from silo.outbox.send import Report, Sent, send_all
 from silo.outbox.store import Store
+from silo.platform import read_memory, write_memory
 from silo.workbench.pane import entries
 from silo.workbench.pane.activity import Entry
-from silo.workbench.session.colleagues import Newer
 from silo.workbench.session.gui_thread_gc import collection_off
 from silo.workbench.session.jobs import Control
+from silo.workbench.session.session import Newer
 from silo.workbench.settings.server import Known, Server, TokenStore, choose_server
 from silo.workbench.words import translate
 
@@ -52,6 +51,8 @@ class Online:
         self._outbox = outbox
         self._entry, self._sent, self._state, self._newer = entry, sent, state, newer
         self._last_ids = LastIds(outbox.path.with_name("last-events.json"))
+        self._own: set[str] = set()  # merges of ours whose event was not heard yet
+        self._hints: set[str] = set()  # in the report view already
         self._client: SiloClient | None = None
         self._server = Server()
         self._listener: EventListener | None = None
@@ -89,6 +90,9 @@ class Online:
     def connect(self, known: Known, store: TokenStore, *, live: bool) -> Server:
         """Use the server that the settings name; begin to listen to it where ``live``."""
         self._use(choose_server(known, store, file_server=file_server()))
+        if self.address:
+            # Another token or address may be what was wanted.
+            self._outbox.resume(self.address, told=False)
         self._listen(live=live)
         return self._server
 
@@ -98,9 +102,14 @@ class Online:
             self._use(choose_server(known, store, file_server=file_server()))
         _ = self.client
 
-    def retry_now(self) -> None:
-        """Try to connect again at once."""
-        if self._listener is not None:
+    def pause(self) -> Pause | None:
+        """Why nothing is sent to the server now; None where nothing keeps it."""
+        pause = self._outbox.pause(self.address) if self.address else None
+        return pause if pause is not None and pause.left(self._outbox.clock()) else None
+
+    def wake(self) -> None:
+        """Let the connection look at the pause again, which has ended."""
+        if self._listener is not None and self._listener.state.kind is not Connection.ONLINE:
             self._listener.retry_now()
 
     def close(self) -> None:
@@ -130,6 +139,7 @@ class Online:
             on_state=self._heard_state,
             last_event_id=self._last_ids.get(url),
             around=collection_off,
+            pauses=_SharedPauses(self._outbox, url),
         )
         self._listener.start()
 
@@ -137,10 +147,15 @@ class Online:
         if self._listener is not None:
             self._listener.stop(timeout=1.0)
             self._listener = None
+            self._last_ids.save()
 
     def _heard(self, event: ServerEvent, url: str) -> None:
         if event.id is not None:
             self._last_ids.set(url, event.id)
+        if event.merge is not None and event.merge.sync_id in self._own:
+            # Its box was shown with the answer. After a crash the event must not bring it once more.
+            self._own.discard(event.merge.sync_id or "")
+            self._last_ids.save()
         if event.type == RESET:
             self._newer("", None)
         elif (announced := entries.commit_of_event(event)) is not None:
@@ -153,8 +168,33 @@ class Online:
         self._state(state.kind.value, state.message)
 
     def _tell(self, sent: Sent) -> None:
+        if sent.result is not None:
+            self._own.add(sent.sync_id)
+            self._last_ids.save()  # the event may have come before the answer
         self._entry(entries.of_sent(sent, self.client.web_url))
-        self._sent(sent, entries.console_lines(sent))
+        # A sub-assembly that goes along has the hints of the assembly once more.
+        hints = [line for line in entries.console_lines(sent) if line not in self._hints]
+        self._hints.update(hints)
+        self._sent(sent, tuple(hints))
+
+
+class _SharedPauses:
+    """The pause of a server, for its live connection."""
+
+    def __init__(self, outbox: Store, url: str) -> None:
+        self._outbox, self._url = outbox, url
+
+    def clock(self) -> float:
+        return self._outbox.clock()
+
+    def get(self) -> Pause | None:
+        with suppress(InputError):  # a disk that is full must not end the connection
+            return self._outbox.pause(self._url)
+        return None
+
+    def set(self, pause: Pause | None) -> None:
+        with suppress(InputError):
+            self._outbox.set_pause(self._url, pause)
 
 
 def _client(server: Server) -> SiloClient:
@@ -171,27 +211,36 @@ def file_server() -> object | None:
         return None
 
 
+SAVE_EVERY_S = 10.0
+
+
 class LastIds:
     """The last event seen of each server, so that what happened while FreeCAD was closed is shown too."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._known = self._read()
+        self._saved = dict(self._known)
+        self._due = 0.0
 
     def get(self, url: str) -> str | None:
         """Where to resume; None for a server that was never listened to."""
         return self._known.get(url)
 
     def set(self, url: str, event_id: str) -> None:
-        """Remember an event. A lost write costs a repeated event, so nothing is synced here."""
+        """Remember an event; a crash may repeat those of colleagues of the last :data:`SAVE_EVERY_S`."""
         self._known[url] = event_id
-        try:
-            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            part = self._path.with_suffix(".new")
-            part.write_text(json.dumps(self._known), encoding="utf-8")
-            part.replace(self._path)
-        except OSError:
+        if monotonic() >= self._due:
+            self.save()
+
+    def save(self) -> None:
+        """Write to disk what is new. A lost write costs repeated events, so nothing is synced here."""
+        self._due = monotonic() + SAVE_EVERY_S
+        if self._known == self._saved:
             return
+        written = dict(self._known)
+        if write_memory(self._path, written) is None:
+            self._saved = written
 
     def _read(self) -> dict[str, str]:
         return {url: str(event_id) for url, event_id in read_memory(self._path).items()}

@@ -4,35 +4,146 @@
 Methods are called in the GUI thread and return at once. Work is done by workers, so that a commit is on
 disk at once even while copies take long or the network hangs: for rows, for copies, for the server. Results
 come back through ``deliver``. No widgets here, and no FreeCAD, so that all of it runs in any test.
+
+What colleagues have committed since this FreeCAD runs, as the server announces it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import ConfigError, SiloError
-from silo.outbox.database import OutboxError
 from silo.outbox.entry import Commit, State
 from silo.outbox.entry import Entry as Waiting
-from silo.outbox.store import Store
-from silo.workbench.pane.activity import Action, Entry
-from silo.workbench.session.colleagues import Colleagues, Newer
+from silo.outbox.store import OutboxError, Store
+from silo.workbench.pane.activity import Action, Activity, Entry
 from silo.workbench.session.jobs import Busy, Control, Deliver, Job, Worker, in_gui
-from silo.workbench.session.shown import Listener, Shown
 from silo.workbench.settings.server import Known, Server, TokenStore
 from silo.workbench.words import translate
 
 if TYPE_CHECKING:
-    # These bring requests and pydantic with them, which only a worker may import (start-up time).
     from silo.api.client import SiloClient
-    from silo.outbox.report import Sent
+    from silo.api.config import Pause
+    from silo.outbox.send import Sent
+    from silo.workbench.commit.flow import Theirs
     from silo.workbench.commit.opened import Base
-    from silo.workbench.commit.theirs import Theirs
     from silo.workbench.session.online import Online
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Everything that the pane shows.
+
+    waiting
+        all that is in the outbox, oldest first.
+    pause
+        why nothing is sent to the server now; None where nothing keeps it.
+    theirs
+        id in the outbox → what a colleague's revision changed, for commits that are held because of one; None
+        where there is nothing to compare.
+    newer
+        UUID of an item → the newest commit of it that another FreeCAD has made since this one runs.
+    presence
+        the same in words, for the documents that are open.
+    """
+
+    server: Server = field(default_factory=Server)
+    connection: str = "stopped"
+    reason: str = ""
+    busy: Busy | None = None
+    waiting: tuple[Waiting, ...] = ()
+    pause: Pause | None = None
+    theirs: Mapping[int, Theirs | None] = field(default_factory=dict)
+    activity: Activity = field(default_factory=Activity)
+    newer: Mapping[str, Newer] = field(default_factory=dict)
+    presence: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Who hears what happens in a session; all calls come through ``deliver``.
+
+    shown
+        something to show has changed.
+    console
+        a line for the report view.
+    sent
+        a commit of this FreeCAD arrived.
+    bug
+        an exception that should not have been.
+    """
+
+    shown: Callable[[Shown], None] = lambda _shown: None
+    console: Callable[[str], None] = lambda _text: None
+    sent: Callable[[Sent], None] = lambda _sent: None
+    bug: Callable[[BaseException], None] = lambda _error: None
+
+
+@dataclass(frozen=True)
+class Newer:
+    """A commit that the server announced. ``at``: seconds of :func:`time.monotonic`."""
+
+    part_number: str
+    revision: int
+    who: str
+    at: float
+
+
+class Colleagues:
+    """Keeps colleagues' commits apart from our own, which the server announces as well: before our upload has
+    its answer, or after.
+
+    newer
+        UUID of an item → the newest commit of it by somebody else.
+    """
+
+    def __init__(self) -> None:
+        self.newer: Mapping[str, Newer] = {}
+        self._mine: dict[str, int] = {}
+        self._going: set[str] = set()
+        self._unsure: dict[str, Newer] = {}
+
+    def sending(self, identity: str) -> None:
+        """A commit of this item is on its way to the server."""
+        self._going.add(identity.lower())
+
+    def anew(self) -> None:
+        """The server counts anew, after a restore: by what we know of its numbers, nothing is ours."""
+        self._mine.clear()
+
+    def gone(self, seen: Mapping[str, Newer], identities: Iterable[str]) -> None:
+        """The server has nothing newer of these items; what was announced after ``seen`` stays."""
+        stale = {one for one in map(str.lower, identities) if self.newer.get(one) is seen.get(one)}
+        self.newer = {key: one for key, one in self.newer.items() if key not in stale}
+
+    def heard(self, identity: str, newer: Newer) -> None:
+        """The server announced a commit."""
+        if newer.revision <= self._mine.get(identity, 0):
+            return  # Ours, or one that ours was made from or sent on top of.
+        if identity in self._going:
+            self._unsure[identity] = newer
+        else:
+            self.newer = {**self.newer, identity: newer}
+
+    def arrived(self, identity: str, revision: int) -> None:
+        """The server has our commit of an item, as this revision."""
+        identity = identity.lower()
+        self._mine[identity] = max(revision, self._mine.get(identity, 0))
+        known = self.newer.get(identity)
+        if known is not None and known.revision <= revision:
+            self.newer = {key: one for key, one in self.newer.items() if key != identity}
+
+    def sent(self, still_going: Iterable[str]) -> None:
+        """A run of sending has ended. What was announced meanwhile and is not ours is a colleague's. Of
+        ``still_going`` something is still on its way."""
+        unsure, self._unsure, self._going = self._unsure, {}, set()
+        for identity, newer in unsure.items():
+            self.heard(identity, newer)
+        self._going = {identity.lower() for identity in still_going}
 
 
 class Session:
@@ -124,7 +235,7 @@ class Session:
         before = self.shown.connection
         self._show(connection=kind, reason=reason)
         if kind == "online" and before != "online" and self.shown.waiting:
-            self.send(force=True)
+            self.send(force=False)
 
     # -- commits ----------------------------------------------------------------------------------------
 
@@ -152,12 +263,21 @@ class Session:
 
         def stage(_control: Control) -> None:
             self.outbox.stage(commit, self._online.address if self._online is not None else "")
-            self._disk.submit(Job(title, finish, done=lambda _kept: self.send(force=True), failed=failed))
+            self._disk.submit(Job(title, finish, done=lambda _kept: self.send(force=False), failed=failed))
 
         self._rows.submit(Job(title, stage, failed=failed))
 
+    def after_keeping(self, then: Callable[[], None]) -> None:
+        """Call something in the GUI thread, once all commits of before are on disk with their copies."""
+        title = translate("Silo", "Keeping the commit")
+
+        def behind(_control: Control) -> None:
+            self._disk.submit(Job(title, lambda _control: None, done=lambda _none: then()))
+
+        self._rows.submit(Job(title, behind))
+
     def send(self, *, force: bool) -> None:
-        """Send what waits; ``force`` also what was to be tried later only."""
+        """Send what waits, nothing in a pause; ``force`` ends all pauses of the server first."""
 
         def run(control: Control) -> Any:
             online = self._need_online()
@@ -167,7 +287,10 @@ class Session:
             except ConfigError:
                 # Without a server all that waits is kept; the pane says what to do.
                 report = None
-            return report, self.outbox.entries()
+            pause = online.pause()
+            if pause is None:
+                online.wake()
+            return report, self.outbox.entries(), pause
 
         self._net.submit(
             Job(
@@ -180,9 +303,9 @@ class Session:
         )
 
     def _sent_all(self, result: Any) -> None:
-        report, waiting = result
+        report, waiting, pause = result
         self._colleagues.sent(entry.identity for entry in waiting if entry.state is not State.HELD)
-        self._waits(waiting, newer=self._colleagues.newer)
+        self._waits(waiting, newer=self._colleagues.newer, pause=pause)
         stopped = report.stopped_by if report is not None else None
         if stopped is not None and stopped.code != "cancelled":
             self._show(reason=str(stopped), connection=self._connection_after(stopped))
@@ -204,7 +327,7 @@ class Session:
     def _look_again(self) -> None:
         """After a restore of the server, a colleague's commit that was announced may be gone."""
         if seen := self.shown.newer:
-            from silo.workbench.commit.theirs import gone  # late, as all that a start does not need
+            from silo.workbench.commit.flow import gone  # late, as all that a start does not need
 
             title = translate("Silo", "Looking for colleagues' commits")
             self.ask(
@@ -229,7 +352,9 @@ class Session:
 
     def tick(self) -> None:
         """Called now and then: what waits is tried again when its time has come."""
-        if (self.shown.waiting or self._owed) and self._net.idle:
+        # A log-in by the command line ends the pause of a wrong token.
+        is_refused = self.shown.connection == "refused"
+        if (self.shown.waiting or self._owed or is_refused) and self._net.idle:
             self.send(force=False)
 
     def retry(self, entry_id: int) -> None:
@@ -248,9 +373,7 @@ class Session:
         self._change(move, send=True)
 
     def retry_all(self) -> None:
-        """Send all that waits, now."""
-        if self._online is not None:
-            self._online.retry_now()
+        """End the pauses of the server: connect, and send all that waits, now."""
         self.send(force=True)
 
     def discard(self, entry_id: int, *, keep: bool = False) -> None:
@@ -284,7 +407,7 @@ class Session:
             return
 
         def compare(client: SiloClient, control: Control) -> dict[int, Theirs | None]:
-            from silo.workbench.commit.theirs import look_held
+            from silo.workbench.commit.flow import look_held
 
             return {entry.id: look_held(client, self.outbox, entry, control.cancelled) for entry in left}
 

@@ -6,18 +6,32 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from silo.workbench.gui import widgets
+from silo.workbench.gui import qt, widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.session.session import Session
-from silo.workbench.settings.page_work import in_use, keep_token, look, test
 from silo.workbench.settings.preferences import ALLOW, HOLD, Preferences
-from silo.workbench.settings.server import Known, Server, read_known
-from silo.workbench.settings.tokens import Keyring
+from silo.workbench.settings.server import (
+    Keyring,
+    Known,
+    Server,
+    begin_login,
+    in_use,
+    is_let_in,
+    keep_token,
+    look,
+    read_known,
+    test,
+)
 from silo.workbench.words import translate
 
+if TYPE_CHECKING:
+    from silo.api.client import BrowserLogin
+
+# So often the server is asked if the user has let FreeCAD in.
+LOGIN_MS = 1500
 KEYRING, PREFERENCE = "keyring", "preference"
 
 
@@ -60,7 +74,8 @@ class PreferencePage:
         self.token = QtWidgets.QLineEdit()
         self.token.setObjectName("token")
         self.token.setEchoMode(QtWidgets.QLineEdit.EchoMode.Password)
-        form.addRow(translate("Silo", "API token"), self.token)
+        log_in = widgets.button(translate("Silo", "Log in…"), "log_in", self.log_in)
+        form.addRow(translate("Silo", "API token"), widgets.line(self.token, log_in))
         self.place = QtWidgets.QComboBox()
         self.place.setObjectName("place")
         self.place.addItem(translate("Silo", "FreeCAD's preferences (a plain file)"), PREFERENCE)
@@ -212,15 +227,44 @@ class PreferencePage:
     def test(self) -> None:
         """Ask the server who we are, with what is entered now."""
         self._tell(translate("Silo", "Asking the server…"), Tone.QUIET)
-        certificate = self.certificate.text().strip()
-        verify = (certificate or True) if self.verify.isChecked() else False
-        wanted = Known(self.url.text().strip(), self.token.text().strip(), verify)
+        wanted = self._entered()
         known, keyring = read_known(self._preferences), self._keyring
         self._ask(
             translate("Silo", "Testing the connection"),
             lambda: test(wanted, known, keyring),
             lambda text: self._tell(text, Tone.GOOD),
         )
+
+    def log_in(self) -> None:
+        """Get a token through the browser: the user lets FreeCAD in on the server's page."""
+        wanted, known = self._entered(), read_known(self._preferences)
+        self._tell(translate("Silo", "Asking the server…"), Tone.QUIET)
+
+        def opened(login: BrowserLogin) -> None:
+            text = translate("Silo", "Let FreeCAD in on the page that opens. It shows the code {code}.")
+            self._tell(text.replace("{code}", login.code), Tone.QUIET)
+            if not qt.open_url(login.page):
+                self._tell(login.page, Tone.QUIET)
+            ask(login)
+
+        def ask(login: BrowserLogin) -> None:
+            title = translate("Silo", "Waiting for the browser")
+            self._ask(title, lambda: is_let_in(login, wanted, known), lambda done: answered(login, done))
+
+        def answered(login: BrowserLogin, done: bool) -> None:
+            if not done:
+                qt.later(LOGIN_MS, lambda: ask(login) if self._alive else None)
+                return
+            self.token.setText(login.token)
+            self._tell(translate("Silo", "You are logged in. Press OK to keep the token."), Tone.GOOD)
+
+        title = translate("Silo", "Asking for the login page")
+        self._ask(title, lambda: begin_login(wanted, known), opened)
+
+    def _entered(self) -> Known:
+        certificate = self.certificate.text().strip()
+        verify = (certificate or True) if self.verify.isChecked() else False
+        return Known(self.url.text().strip(), self.token.text().strip(), verify)
 
     def _tell(self, text: str, tone: Tone) -> None:
         self.result.setText(text)

@@ -3,17 +3,90 @@
 
 The server is looked for in the environment, then in the preferences, then in the configuration file of the
 command line. A token belongs to the server it was given for and is sent to no other.
+
+The system's keyring as a place for API tokens, where there is one that works.
+
+``keyring`` is not among the add-on's dependencies: it is used where the user has it. Its first use may ask
+the desktop to unlock something, so all of this belongs in a worker thread.
+
+What the preference page asks of keyring and server, and the words for where settings come from.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
+from silo.bom.errors import AuthError, ConfigError
 from silo.workbench.settings.preferences import Preferences
+from silo.workbench.words import plain, translate
+
+if TYPE_CHECKING:
+    from silo.api.client import BrowserLogin
+
+SERVICE = "silo-mod"
+
+# Back ends that only say no, or keep what they are given where everybody can read it.
+_USELESS = ("fail", "null", "plaintext", "chainer_empty")
+
+
+class Keyring:
+    """Tokens by server address. A keyring that does not work holds nothing."""
+
+    def __init__(self, module: Any = None) -> None:
+        self._module = module
+
+    def name(self) -> str:
+        """What the keyring calls itself; "" where there is none that can be trusted."""
+        module = self._load()
+        if module is None:
+            return ""
+        try:
+            backend = module.get_keyring()
+            usable = float(getattr(backend, "priority", 0)) > 0
+        except Exception:  # noqa: BLE001  # back ends raise what they like; without one there is the preference
+            return ""
+        kind = f"{type(backend).__module__}.{type(backend).__name__}".lower()
+        if not usable or any(word in kind for word in _USELESS):
+            return ""
+        return str(getattr(backend, "name", "") or type(backend).__name__)
+
+    def get(self, url: str) -> str:
+        """The token kept for a server; "" where there is none."""
+        if not self.name():
+            return ""
+        try:
+            return str(self._load().get_password(SERVICE, _key(url)) or "").strip()
+        except Exception:  # noqa: BLE001  # a locked or broken keyring is no reason to stop
+            return ""
+
+    def set(self, url: str, token: str) -> None:
+        """Keep a token; "" removes it. :class:`ConfigError` where the keyring does not take it."""
+        if not self.name():
+            raise ConfigError("this system has no keyring that could keep the token")
+        module = self._load()
+        try:
+            if token:
+                module.set_password(SERVICE, _key(url), token)
+            elif module.get_password(SERVICE, _key(url)) is not None:
+                module.delete_password(SERVICE, _key(url))
+        except Exception as error:  # translated for the person who pressed the button
+            raise ConfigError(f"the keyring did not keep the token: {error}") from error
+
+    def _load(self) -> Any:
+        if self._module is None and importlib.util.find_spec("keyring") is not None:
+            import keyring
+
+            self._module = keyring
+        return self._module
+
+
+def _key(url: str) -> str:
+    return url.strip().rstrip("/").lower()
 
 
 class Origin(StrEnum):
@@ -106,3 +179,100 @@ def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
 
     text = env.get(VERIFY, "").strip()
     return verify_of(VERIFY, text) if text else otherwise
+
+
+def look(known: Known, keyring: Keyring) -> tuple[Server, str]:
+    """The server in use, and the keyring's name ("" for none). Worker: a keyring may take its time."""
+    from silo.workbench.session.online import file_server
+
+    return choose_server(known, keyring, file_server=file_server()), keyring.name()
+
+
+def keep_token(keyring: Keyring, url: str, token: str) -> None:
+    """Put a token into the keyring. Worker."""
+    if not url:
+        raise ConfigError(translate("Silo", "Enter the server's address too: a token belongs to its server."))
+    keyring.set(url, token)
+
+
+def test(wanted: Known, known: Known, keyring: Keyring) -> str:
+    """Ask the server who we are; the answer in words, or the error that explains what is wrong. Worker.
+
+    wanted, known
+        what is entered on the page, and what was saved before.
+    """
+    from silo.api.client import SiloClient
+    from silo.workbench.session.online import file_server
+
+    entered = replace(known, url=wanted.url or known.url, verify=wanted.verify)
+    server = choose_server(entered, keyring, file_server=file_server())
+    if not server.configured:
+        raise ConfigError(translate("Silo", "Enter the address of the server first."))
+    with SiloClient(server.url, wanted.token or server.token or None, verify=server.verify) as client:
+        user, state = client.whoami(), client.ready()
+    text = translate("Silo", "Connected as {user} ({role}); the server is in {mode} mode.")
+    name = user.display_name or user.username
+    return (
+        text.replace("{user}", plain(name, 60))
+        .replace("{role}", plain(user.role, 30) or "?")
+        .replace("{mode}", plain(state.mode, 30))
+    )
+
+
+def begin_login(wanted: Known, known: Known) -> BrowserLogin:
+    """Return the page that lets FreeCAD in. Worker."""
+    from silo.api.client import SiloClient
+
+    url = wanted.url or known.url
+    if not url:
+        raise ConfigError(translate("Silo", "Enter the address of the server first."))
+    with SiloClient(url, None, verify=wanted.verify) as client:
+        login = client.begin_login("FreeCAD")
+    if login is None:
+        text = translate("Silo", "This server has no page for that. Make a token on its account page.")
+        raise ConfigError(text)
+    return login
+
+
+def is_let_in(login: BrowserLogin, wanted: Known, known: Known) -> bool:
+    """True once the user has let FreeCAD in. Worker."""
+    from silo.api.client import SiloClient
+
+    with SiloClient(wanted.url or known.url, login.token, verify=wanted.verify) as client:
+        try:
+            client.whoami()
+        except AuthError:
+            return False
+    return True
+
+
+def in_use(server: Server, env: Mapping[str, str]) -> str:
+    """Which server and token are in use, and where they come from."""
+    if not server.configured:
+        return translate("Silo", "No server is set up. To try it out, run: silo-mod serve")
+    where = translate("Silo", "In use: {url} ({from}).").replace("{url}", plain(server.url, 100))
+    text = where.replace("{from}", _url_words()[server.url_from])
+    text += " " + _token_words()[server.token_from]
+    if env.get("SILO_SSL_VERIFY", "").strip():
+        text += " " + translate("Silo", "SILO_SSL_VERIFY decides about the certificate.")
+    return text
+
+
+def _url_words() -> dict[Origin, str]:
+    return {
+        Origin.ENVIRONMENT: translate("Silo", "from the environment variable SILO_API_URL"),
+        Origin.PREFERENCES: translate("Silo", "from this page"),
+        Origin.FILE: translate("Silo", "from the configuration file of silo-mod"),
+        Origin.NONE: "",
+        Origin.KEYRING: "",
+    }
+
+
+def _token_words() -> dict[Origin, str]:
+    return {
+        Origin.ENVIRONMENT: translate("Silo", "Token: from the environment variable SILO_API_TOKEN."),
+        Origin.KEYRING: translate("Silo", "Token: from the system's keyring."),
+        Origin.PREFERENCES: translate("Silo", "Token: from FreeCAD's preferences, a plain file."),
+        Origin.FILE: translate("Silo", "Token: from the configuration file of silo-mod."),
+        Origin.NONE: translate("Silo", "Token: none."),
+    }

@@ -14,18 +14,17 @@ from argon2.exceptions import InvalidHashError, VerificationError
 from sqlalchemy import func, insert, select, update
 
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
-from silo_server.db.engine import ADMIN_LOCK, Tx
-from silo_server.db.tables import sessions, users
-from silo_server.errors import DuplicateError
+from silo_server.db.engine import ADMIN_LOCK, Turnstile, Tx
+from silo_server.db.tables import api_tokens, login_links, sessions, users
 from silo_server.services.access import audit
-from silo_server.turnstile import Turnstile
+from silo_server.settings import DuplicateError, wire
 from silo_server.values import Role, from_row
 
 MIN_PASSWORD = 10
 NO_TOKEN = "a token cannot set the password of its own account; log in in a browser for that"
 MAX_PASSWORD = 200
 # Each hash takes 64 MiB for as long as it takes.
-_HASHING = Turnstile(places=2, waiting=16, seconds=10, who="log-ins")
+_HASHING = Turnstile(places=2, waiting=64, seconds=20, who="log-ins")
 USERNAME_FORM = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,63}")
 
 
@@ -87,6 +86,8 @@ def create_user(
             "username: wanted 1 to 64 letters, digits or . _ @ - beginning with a letter or digit, "
             f"got {username!r}"
         )
+    if password is not None:
+        check_lasting(tx, "give a password")
     if row_of(tx, username) is not None:
         raise DuplicateError(f"username {username} is taken")
     tx.conn.execute(
@@ -113,13 +114,23 @@ def change_user(
     active: bool | None = None,
     password: str | None = None,
 ) -> User:
-    """Change a user; the last active admin cannot be taken away. A new password ends the user's sessions."""
+    """Change a user; the last active admin cannot be taken away.
+
+    A new password ends the user's sessions and login links, another role the login links. Deactivation ends
+    both, and revokes the tokens: who is let in again later makes new ones.
+    """
     if role is not None or active is not None:
         # Two admins who demote each other at once must not both be the one but last.
         tx.lock(ADMIN_LOCK)
     user = get_user(tx, username)
     if password is not None and tx.actor.by_token and tx.actor.user_id == user.id:
         raise ForbiddenError(NO_TOKEN)
+    if role is not None and not user.role.covers(role):
+        check_lasting(tx, "give a higher role")
+    if active and not user.active:
+        check_lasting(tx, "let a user in again")
+    if password is not None:
+        check_lasting(tx, "set a password")
     loses = (role is not None and role is not Role.ADMIN) or active is False
     if loses and user.role is Role.ADMIN and user.active and _active_admins(tx) <= 1:
         raise ConflictError(f"{user.username} is the last admin; make another user an admin first")
@@ -135,9 +146,26 @@ def change_user(
     if values:
         tx.conn.execute(update(users).where(users.c.id == user.id).values(**values))
         audit.note(tx, "user.changed", user.username, _what_changed(user, values))
-    if password is not None or active is False:
-        tx.conn.execute(sessions.delete().where(sessions.c.user_id == user.id))
+    ended = [sessions] if password is not None or active is False else []
+    if ended or role not in (None, user.role):
+        ended.append(login_links)
+    if ended:
+        tx.end_access()
+    for table in ended:
+        tx.conn.execute(table.delete().where(table.c.user_id == user.id))
+    if active is False:
+        theirs = (api_tokens.c.user_id == user.id) & api_tokens.c.revoked_at.is_(None)
+        tx.conn.execute(update(api_tokens).where(theirs).values(revoked_at=tx.stamp))
     return get_user(tx, username)
+
+
+def check_lasting(tx: Tx, what: str) -> None:
+    """Raise ForbiddenError for a token that ends: it must not let anybody in for longer than itself."""
+    if tx.actor.expires_at is not None:
+        raise ForbiddenError(
+            f"a token that ends on {wire(tx.actor.expires_at)} cannot {what}, which would last longer; log "
+            "in in a browser for that"
+        )
 
 
 def _what_changed(user: User, values: Mapping[str, object]) -> str:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import insert, select
 
-from silo_server.db.bulk import newest_first
-from silo_server.db.engine import Tx
+from silo_server.db.engine import Tx, newest_first
 from silo_server.db.tables import audit
 from silo_server.values import from_row
 

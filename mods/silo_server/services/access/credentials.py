@@ -5,25 +5,33 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import re
 import secrets
 from dataclasses import dataclass
 from datetime import timedelta
 
 from sqlalchemy import insert, select, update
 
-from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError
-from silo_server.clock import stamp, wire
-from silo_server.db.bulk import update_rows
-from silo_server.db.engine import Database, Tx
+from silo.bom.errors import ConfigError, ConflictError, ForbiddenError, NotFoundError, RejectedError
+from silo_server.db.engine import Database, Tx, update_rows
 from silo_server.db.tables import api_tokens, users
 from silo_server.services.access import audit
+from silo_server.settings import stamp, wire
 from silo_server.values import Actor, Role, Scope, from_row
 
 PREFIX = "silo_"
+# Tokens that the server makes by itself: of its environment, and where that has none.
+CONFIGURED, START_TOKEN = "SILO_API_TOKEN", "given out at start"
+SHORTEST_SECRET = 20
+_PLACEHOLDER = re.compile(
+    "change.?me|change.?this|example|placeholder|your.?(own|token|secret)", re.IGNORECASE
+)
 # Writing down the last use of a token on every request would make every read a write.
 LAST_USE_SECONDS = 60
 # A form that is sent twice comes twice within this time.
 REPEAT_SECONDS = 60
+# A program that was let in by its user asks again after so many days.
+PROGRAM_DAYS = 90
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +75,7 @@ def create_own_token(
     forever: bool,
     scope: Scope | None = None,
     secret: str | None = None,
+    hashed: str = "",
 ) -> tuple[Token, str]:
     """Make a token of the caller's. A token makes none that lives longer or may more than itself.
 
@@ -74,10 +83,14 @@ def create_own_token(
         its lifetime [days]; with neither it lives as long as the token that makes it.
     secret
         of :func:`secret_of_form`, whose token may have been made a moment ago.
+    hashed
+        of a secret that only a program knows; the secret that is returned is then none.
     Raises ForbiddenError, ConflictError where the form was sent long ago.
     """
     actor = tx.actor
     check_may_change(actor)
+    if name in (CONFIGURED, START_TOKEN):
+        raise RejectedError(f"name: {name} is what the server calls its own token; choose another name")
     if scope is not None and not actor.scope.covers(scope):
         raise ForbiddenError(f"a token with the scope {actor.scope} cannot make one with the scope {scope}")
     expires = stamp(tx.at + timedelta(days=days)) if days is not None else None
@@ -90,7 +103,16 @@ def create_own_token(
         expires = expires or actor.expires_at
     if secret is not None and (known := _made_before(tx, actor.own_id, secret)) is not None:
         return known, secret
-    return create_token(tx, actor.own_id, name, expires=expires, scope=scope or actor.scope, secret=secret)
+    return create_token(
+        tx, actor.own_id, name, expires=expires, scope=scope or actor.scope, secret=secret, hashed=hashed
+    )
+
+
+def let_program_in(tx: Tx, name: str, hashed: str) -> None:
+    """Make a token for a program that showed the SHA-256 of a secret of its own; one, however often asked."""
+    tx.lock(int(hashed[:15], 16))
+    if tx.conn.scalar(select(api_tokens.c.id).where(api_tokens.c.token_hash == hashed)) is None:
+        create_own_token(tx, name, days=PROGRAM_DAYS, forever=False, scope=Scope.WRITE, hashed=hashed)
 
 
 def _made_before(tx: Tx, user_id: int, secret: str) -> Token | None:
@@ -120,16 +142,17 @@ def create_token(
     expires: str | None = None,
     secret: str | None = None,
     scope: Scope = Scope.ADMIN,
+    hashed: str = "",
 ) -> tuple[Token, str]:
     """Make a token of the user; returns it with its secret, which is never shown again."""
-    prefix = shown_prefix(secret) if secret else None
-    secret = secret or PREFIX + secrets.token_hex(20)
+    prefix = PREFIX if hashed else shown_prefix(secret) if secret else None
+    secret = "" if hashed else secret or PREFIX + secrets.token_hex(20)
     token_id = tx.conn.execute(
         insert(api_tokens)
         .values(
             user_id=user_id,
             name=name,
-            token_hash=secret_hash(secret),
+            token_hash=hashed or secret_hash(secret),
             prefix=secret[:9] if prefix is None else prefix,
             scope=scope.value,
             created_at=tx.stamp,
@@ -146,10 +169,37 @@ def shown_prefix(secret: str) -> str:
     return secret[: min(9, len(secret) // 4)]
 
 
-def has_secret(tx: Tx, secret: str) -> bool:
-    """True where a token with this secret is known already, used up or not."""
-    query = select(api_tokens.c.id).where(api_tokens.c.token_hash == secret_hash(secret))
-    return tx.conn.scalar(query) is not None
+def take_configured_token(tx: Tx, user_id: int, secret: str) -> str:
+    """Make the secret of the server's environment a token of the user, and end its predecessors.
+
+    Returns why it lets nobody in, "" where it does: one that was revoked stays so.
+    """
+    query = select(api_tokens, users.c.active).join(users, users.c.id == api_tokens.c.user_id)
+    row = tx.conn.execute(query.where(api_tokens.c.token_hash == secret_hash(secret))).one_or_none()
+    if row is None:
+        create_token(tx, user_id, CONFIGURED, secret=secret)
+    elif row.revoked_at is not None:
+        return f"it was revoked on {wire(row.revoked_at)}"
+    elif not row.active or (row.expires_at is not None and row.expires_at <= tx.stamp):
+        return "its user is not active" if not row.active else f"it ended on {wire(row.expires_at)}"
+    others = (api_tokens.c.name == CONFIGURED) & (api_tokens.c.token_hash != secret_hash(secret))
+    gone = update(api_tokens).where(others, api_tokens.c.revoked_at.is_(None)).values(revoked_at=tx.stamp)
+    if tx.conn.execute(gone).rowcount:
+        audit.note(tx, "token.revoked", CONFIGURED, "the environment has another")
+    return ""
+
+
+def check_configured_secret(secret: str) -> None:
+    """Raise ConfigError for a secret of the environment that others may guess or have read."""
+    if not secret.isascii() or not secret.isprintable() or " " in secret:
+        problem = "visible ASCII characters without spaces, got others"
+    elif _PLACEHOLDER.search(secret):
+        problem = "a secret of your own, got a placeholder that others know"
+    elif len(secret) < SHORTEST_SECRET:
+        problem = f"at least {SHORTEST_SECRET} characters, got {len(secret)}"
+    else:
+        return
+    raise ConfigError(f"{CONFIGURED}: wanted {problem}. This makes one: echo silo_$(openssl rand -hex 20)")
 
 
 def list_tokens(tx: Tx, user_id: int | None = None) -> list[Token]:
@@ -178,6 +228,7 @@ def revoke_token(tx: Tx, token_id: int, user_id: int | None) -> None:
         .values(revoked_at=tx.stamp)
     )
     audit.note(tx, "token.revoked", name)
+    tx.end_access()
 
 
 def actor_by_token(db: Database, secret: str, address: str) -> Actor | None:

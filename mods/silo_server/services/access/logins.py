@@ -5,18 +5,18 @@ from __future__ import annotations
 
 import math
 import secrets
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
-from sqlalchemy import delete, func, insert, select
+from sqlalchemy import ColumnElement, delete, func, insert, select, update
 
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
-from silo_server.clock import stamp
 from silo_server.db.engine import LOGIN_LOCK, Database, Tx
-from silo_server.db.tables import login_failures, login_links, sessions, users
-from silo_server.errors import TooManyAttemptsError
+from silo_server.db.tables import login_attempts, login_links, sessions, users
 from silo_server.services.access import accounts, audit
 from silo_server.services.access.credentials import secret_hash
+from silo_server.settings import TooManyAttemptsError, stamp
 from silo_server.values import Actor, Role
 
 WRONG = "user name or password is wrong"
@@ -60,27 +60,36 @@ def set_own_password(db: Database, actor: Actor, new: str, current: str | None) 
 def _proved(db: Database, username: str, password: str, address: str) -> accounts.User:
     """The user whose password this is; AuthError, TooManyAttemptsError."""
     actor = Actor(username[:64], Role.VIEWER, address=address)
-    # An attempt counts as failed from the moment it is made: what comes at the same time is counted as well.
+    # Reserved before the password is looked at: what comes at the same time is counted as well.
     with db.write(actor, even_when_read_only=True) as tx:
         tx.lock(LOGIN_LOCK)
         _check_rate(tx, username, address)
-        attempt = _note_attempt(tx, username, address)
+        attempt = _reserve(tx, username, address)
         claimed = accounts.row_of(tx, username)
-    if not accounts.password_fits(claimed, password):
+    outcome = None  # as long as the password was not looked at, for which the server may be too busy
+    try:
+        outcome = PROVED if accounts.password_fits(claimed, password) else FAILED
+    finally:
         with db.write(actor, even_when_read_only=True) as tx:
-            audit.note(tx, "login.failed", username[:64])
+            _settle(tx, attempt, outcome)
+            if outcome == FAILED:
+                audit.note(tx, "login.failed", username[:64])
+    if outcome == FAILED:
         raise AuthError(WRONG)
-    with db.write(actor, even_when_read_only=True) as tx:
-        tx.conn.execute(delete(login_failures).where(login_failures.c.id == attempt))
     return accounts.to_user(claimed)
 
 
 def create_login_link(tx: Tx, username: str) -> str:
-    """A secret that lets this user in once, for a while; for the first start, where nobody has a password."""
+    """A secret that lets this user in once, for a while, to set a password without the old one.
+
+    So nobody makes a link for the own account: who holds its session or token is not asked for the password.
+    """
     user = accounts.get_user(tx, username)
-    if tx.actor.expires_at is not None and tx.actor.user_id == user.id:
+    accounts.check_lasting(tx, "make a login link")
+    if tx.actor.user_id == user.id:
         raise ForbiddenError(
-            "a token that ends cannot make a login link for its own account; log in for that"
+            "nobody makes a login link for the own account; set the password on the account page, or ask "
+            "another admin"
         )
     secret = secrets.token_urlsafe(32)
     expires = stamp(tx.at + timedelta(seconds=tx.settings.login_link_seconds))
@@ -168,30 +177,61 @@ def _begin(tx: Tx, user_id: int, username: str, *, by_link: bool = False) -> New
     return NewSession(secret, csrf, username, expires)
 
 
+# What an attempt to log in came to. PROVED is remembered for months, as a place that a name logs in from.
+PENDING, FAILED, PROVED = "pending", "failed", "proved"
+
+
 def _check_rate(tx: Tx, username: str, address: str) -> None:
-    window = tx.settings.login_window_seconds
+    """Raise TooManyAttemptsError where the next try has to wait, longer after each failure.
+
+    One name from one address waits soon. All names from one address, and one name from all addresses, wait
+    only where this name has never logged in from this address: so a stranger keeps nobody out.
+    """
+    window, allowed = tx.settings.login_window_seconds, tx.settings.login_failures
+    name = login_attempts.c.username_key == username.casefold()[:64]
+    place = login_attempts.c.address == address[:64]
+    _check_limit(tx, name & place, (PENDING, FAILED), allowed, window)
+    proved = select(login_attempts.c.id).where(name, place, login_attempts.c.outcome == PROVED).limit(1)
+    if tx.conn.scalar(proved) is None:
+        # Those under way are not counted here: many people behind one address may come at once.
+        _check_limit(tx, place, (FAILED,), allowed * 4, window)
+        _check_limit(tx, name, (FAILED,), allowed * 20, window)
+
+
+def _check_limit(
+    tx: Tx, which: ColumnElement[bool], outcomes: Sequence[str], allowed: int, window: float
+) -> None:
     since = stamp(tx.at - timedelta(seconds=window))
-    name, allowed = username.casefold()[:64], tx.settings.login_failures
-    by_name, by_address = login_failures.c.username_key == name, login_failures.c.address == address[:64]
-    # One name from one address is held back soon; one address with many names later; one name from many
-    # addresses last, because that lets a stranger keep somebody out.
-    limits = ((by_name & by_address, allowed), (by_address, allowed * 4), (by_name, allowed * 20))
-    for condition, limit in limits:
-        count, oldest = tx.conn.execute(
-            select(func.count(), func.min(login_failures.c.at)).where(condition, login_failures.c.at > since)
-        ).one()
-        if count >= limit:
-            passed = (tx.at - datetime.fromisoformat(oldest)).total_seconds()
-            wait = max(1, math.ceil(window - passed))
-            raise TooManyAttemptsError(f"too many failed logins; try again in {wait} seconds", wait)
+    counted = (which, login_attempts.c.outcome.in_(outcomes), login_attempts.c.at > since)
+    count, newest = tx.conn.execute(select(func.count(), func.max(login_attempts.c.at)).where(*counted)).one()
+    if count < allowed:
+        return
+    delay = min(window, 8.0 ** min(1 + count - allowed, 9))
+    wait = math.ceil(delay - (tx.at - datetime.fromisoformat(newest)).total_seconds())
+    if wait > 0:
+        raise TooManyAttemptsError(f"too many failed logins; try again in {wait} seconds", wait)
 
 
-def _note_attempt(tx: Tx, username: str, address: str) -> int:
-    old = stamp(tx.at - timedelta(seconds=tx.settings.login_window_seconds))
-    tx.conn.execute(delete(login_failures).where(login_failures.c.at <= old))
+def _reserve(tx: Tx, username: str, address: str) -> int:
+    reserved = {"username_key": username.casefold()[:64], "address": address[:64], "outcome": PENDING}
     attempt: int = tx.conn.execute(
-        insert(login_failures)
-        .values(username_key=username.casefold()[:64], address=address[:64], at=tx.stamp)
-        .returning(login_failures.c.id)
+        insert(login_attempts).values(**reserved, at=tx.stamp).returning(login_attempts.c.id)
     ).scalar_one()
     return attempt
+
+
+def _settle(tx: Tx, attempt: int, outcome: str | None) -> None:
+    """Write down what an attempt came to. One that proved the password gives its failures back."""
+    own = tx.conn.execute(select(login_attempts).where(login_attempts.c.id == attempt)).one_or_none()
+    if own is None:
+        return  # housekeeping, after a wait without end
+    same = (login_attempts.c.username_key == own.username_key) & (login_attempts.c.address == own.address)
+    if outcome is None:
+        tx.conn.execute(delete(login_attempts).where(login_attempts.c.id == attempt))
+        return
+    if outcome == PROVED:
+        gone = (login_attempts.c.id != attempt) & (login_attempts.c.outcome != PENDING)
+        tx.conn.execute(delete(login_attempts).where(same, gone))
+    tx.conn.execute(
+        update(login_attempts).where(login_attempts.c.id == attempt).values(outcome=outcome, at=tx.stamp)
+    )

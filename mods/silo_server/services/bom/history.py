@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The BOM's history: every change that ever was, the state at any of them, two states side by side.
 
+What changed in a product, over all levels, between two times: lines, quantities, data and files of its parts.
+
 Nothing is stored twice: the state after a change is, per line, what the last change up to it made of it.
 Change 0 is the empty BOM before everything.
 """
@@ -8,26 +10,30 @@ Change 0 is the empty BOM before everything.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from datetime import UTC, datetime, timedelta
+from typing import Any, NamedTuple
 
 from sqlalchemy import func, select
 
-from silo.bom.errors import ConflictError, NotFoundError
-from silo_server.db.bulk import newest_first, one_of
-from silo_server.db.engine import Tx
-from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts
-from silo_server.services.bom.changes import (
+from silo.bom.errors import ConflictError, NotFoundError, RejectedError
+from silo.bom.numbers import plain, whole_number
+from silo_server.db.engine import Tx, newest_first, one_of
+from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts, items, revisions
+from silo_server.services.bom.lines import (
     ChangeKind,
     ChangeNote,
     LineChange,
     apply_changes,
     check_no_cycle,
+    lines_of,
+    lines_of_many,
     parent_to_change,
+    stored_state,
 )
-from silo_server.services.bom.lines import lines_of, stored_state
 from silo_server.services.items import by_ids
+from silo_server.settings import ArchivedPartsError, stamp
 from silo_server.values import Item, Line, LineState, from_row, names_of
 
 
@@ -206,9 +212,18 @@ def compare(before: Sequence[PastLine], after: Sequence[PastLine]) -> list[Diffe
 
 
 def restore(
-    tx: Tx, part_number: str, change_id: int, reason: str | None, expected: int | None
+    tx: Tx,
+    part_number: str,
+    change_id: int,
+    reason: str | None,
+    expected: int | None,
+    *,
+    with_archived: bool = False,
 ) -> tuple[int, int]:
-    """Make the BOM again what change ``change_id`` left; a new change. Returns (change id, version)."""
+    """Make the BOM again what change ``change_id`` left; a new change. Returns (change id, version).
+
+    Raises ArchivedPartsError if a part that comes back is archived, unless it may (``with_archived``).
+    """
     parent = parent_to_change(tx, part_number, expected)
     target = {line.line_id: line for line in state_at(tx, parent, change_id)}
     changes = []
@@ -219,11 +234,23 @@ def restore(
         if after != line.state:
             changes.append(LineChange(line_id, line.child_id, line.state, after, line.position))
     missing = [line for line_id, line in target.items() if line_id not in current]
+    archived = sorted({line.child.part_number for line in missing if line.child.archived_at})
+    if archived and not with_archived:
+        raise ArchivedPartsError(archived)
     check_no_cycle(tx, parent, [line.child.id for line in missing])
     changes.extend(LineChange(m.line_id, m.child.id, None, m.state, m.position) for m in missing)
     text = f"restored as of change {change_id}: {len(changes)} lines changed"
     note = ChangeNote(kind=ChangeKind.RESTORE, summary=text, reason=reason, refers_to=change_id)
     return apply_changes(tx, parent, changes, note)
+
+
+def item_changed_by(tx: Tx, change_id: int) -> str:
+    """Return the part number of the BOM that a change is of; NotFoundError if there is no such change."""
+    of_it = select(items.c.part_number).join(bom_changes, bom_changes.c.parent_id == items.c.id)
+    found = tx.conn.scalar(of_it.where(bom_changes.c.id == change_id))
+    if found is None:
+        raise NotFoundError(f"there is no change {change_id}")
+    return str(found)
 
 
 def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tuple[int, int]:
@@ -260,6 +287,177 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
     return apply_changes(
         tx, parent, changes, ChangeNote(kind=ChangeKind.UNDO, summary=text, refers_to=change_id)
     )
+
+
+class Happened(NamedTuple):
+    """One thing that differs in a product between two times, and who did it last.
+
+    what
+        ``added``, ``removed``, ``quantity`` or ``line`` of a BOM, ``data`` or ``file`` of an item.
+    within
+        the BOM of a line; "" for an item.
+    """
+
+    what: str
+    within: str
+    part_number: str
+    name: str
+    before: str
+    after: str
+    at: str
+    username: str
+
+
+def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
+    """Return the time, as stored, that a person names: a date (its ``end``), a time, a revision as ``r3``.
+
+    Raises RejectedError, NotFoundError for a revision that the item does not have.
+    """
+    if text.startswith("r") and (number := whole_number(text[1:], 9)) is not None:
+        row = revisions.c
+        found = tx.conn.scalar(
+            select(row.created_at).where(row.item_id == item.id, row.revision_number == number)
+        )
+        if found is None:
+            raise NotFoundError(f"{item.part_number} has no revision {number}")
+        return str(found)
+    try:
+        when = datetime.fromisoformat(text.replace(" ", "+"))
+        if when.tzinfo is None and len(text) == 10:
+            when = when.replace(tzinfo=UTC) + timedelta(days=int(end))
+        if when.tzinfo is not None:
+            return stamp(when)
+    except (ValueError, OverflowError):
+        pass
+    raise RejectedError(
+        f"wanted a date such as 2026-02-08, a time with its zone such as 2026-02-08T22:15:00Z, or a revision "
+        f"such as r3, got {text[:60]!r}"
+    )
+
+
+def what_changed(tx: Tx, root: Item, since: str, until: str) -> list[Happened]:
+    """What differs in a product between two times, by item; what was added or removed is not looked into."""
+    since, until = sorted((since, until))
+    walked = _Walked(tx, since, until)
+    found: list[Happened] = []
+    before, after = (walked.reached(root.id, side) for side in (0, 1))
+    common = before & after
+    numbers = by_ids(tx, walked.changed.keys() & common)
+    for item_id, parent in numbers.items():
+        at, who = walked.changed[item_id]
+        for one in compare(*walked.states[item_id]):
+            if one.status != "unchanged":
+                found.append(_line_happened(parent.part_number, one, at, who))
+    found += _items_happened(tx, common, since, until)
+    return sorted(found, key=lambda one: (one.within or one.part_number, one.part_number, one.what))
+
+
+class _Walked:
+    """The BOMs of a product at two times; those without a change since the first are read as they are."""
+
+    def __init__(self, tx: Tx, since: str, until: str) -> None:
+        self._tx, self._since, self._until = tx, since, until
+        self._children: dict[int, tuple[set[int], set[int]]] = {}
+        self.states: dict[int, tuple[list[PastLine], list[PastLine]]] = {}
+        self.changed: dict[int, tuple[str, str]] = {}
+
+    def reached(self, root: int, side: int) -> set[int]:
+        """All items that the product has at the one time (0) or the other (1)."""
+        seen, level = {root}, {root}
+        while level:
+            self._load(level - self._children.keys())
+            level = set[int]().union(*(self._children[one][side] for one in level)) - seen
+            seen |= level
+        return seen
+
+    def _load(self, ids: Collection[int]) -> None:
+        tx, row = self._tx, bom_changes.c
+        query = select(row.parent_id, row.at, row.username).where(row.at > self._since)
+        for parent_id, at, who in tx.conn.execute(
+            query.where(one_of(tx, row.parent_id, ids)).order_by(row.id)
+        ):
+            if at <= self._until or parent_id not in self.changed:
+                self.changed[parent_id] = (at, who)
+        lines = lines_of_many(tx, [one for one in ids if one not in self.changed])
+        for one in ids:
+            now = {line.child_id for line in lines.get(one, ()) if line.state.rel_type == "component"}
+            self._children[one] = (now, now)
+        for item in by_ids(tx, self.changed.keys() & ids).values():
+            then, later = (
+                state_at(tx, item, change_at(tx, item, when)) for when in (self._since, self._until)
+            )
+            self.states[item.id] = (then, later)
+            sides = (
+                {line.child.id for line in state if line.state.rel_type == "component"}
+                for state in (then, later)
+            )
+            self._children[item.id] = (next(sides), next(sides))
+
+
+def _line_happened(within: str, one: Difference, at: str, who: str) -> Happened:
+    what = one.status
+    before, after = (_amount(state) for state in (one.before, one.after))
+    if what == "changed":
+        others = [name for name in one.fields if name not in ("quantity", "unit", *_BESIDE)]
+        what = "line" if others else "quantity" if before != after else "line"
+        if what == "line":
+            names = others or list(one.fields)
+            before, after = (_fields(state, names) for state in (one.before, one.after))
+    return Happened(what, within, one.child.part_number, one.child.name, before, after, at, who)
+
+
+# What changes with a quantity, or when CAD loses and finds a line.
+_BESIDE = ("source", "override", "cad_quantity")
+
+
+def _amount(state: LineState | None) -> str:
+    return "" if state is None else f"{plain(state.quantity)} {state.unit or ''}".rstrip()
+
+
+def _fields(state: LineState | None, names: Sequence[str]) -> str:
+    values = ((name.replace("_", " "), getattr(state, name)) for name in names)
+    return "; ".join(f"{name}: {_text(value)}" for name, value in values)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(map(str, value)) or "–"
+    return "–" if value in (None, "", {}, False) else "yes" if value is True else str(value)[:200]
+
+
+def _items_happened(tx: Tx, ids: Collection[int], since: str, until: str) -> Iterator[Happened]:
+    row = revisions.c
+    within = one_of(tx, row.item_id, ids) & (row.created_at <= until)
+    touched = set(tx.conn.scalars(select(row.item_id).where(within, row.created_at > since).distinct()))
+    query = select(revisions).where(one_of(tx, row.item_id, touched), row.created_at <= until)
+    known: dict[int, list[Any]] = {}
+    for one in tx.conn.execute(query.order_by(row.item_id, row.revision_number)):
+        known.setdefault(one.item_id, []).append(one)
+    for item in by_ids(tx, touched).values():
+        rows = known[item.id]
+        old = [one for one in rows if one.created_at <= since]
+        last = rows[-1]
+        then = json.loads(old[-1].properties) if old else {}
+        now = json.loads(last.properties)
+        names = sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name))
+        if names:
+            before, after = (
+                "; ".join(f"{name}: {_text(side.get(name))}" for name in names) for side in (then, now)
+            )
+            what = ("data", "", item.part_number, item.name, before, after)
+            yield Happened(*what, last.created_at, last.created_by)
+        files = [one for one in rows if one.file_checksum]
+        older = [one for one in files if one.created_at <= since]
+        if files and (not older or older[-1].file_checksum != files[-1].file_checksum):
+            newest = files[-1]
+            before, after = (_file(some) for some in (older, files))
+            what = ("file", "", item.part_number, item.name, before, after)
+            yield Happened(*what, newest.created_at, newest.created_by)
+
+
+def _file(revisions_with_file: Sequence[Any]) -> str:
+    last = revisions_with_file[-1] if revisions_with_file else None
+    return f"{last.file_name}, revision {last.revision_number}" if last else ""
 
 
 def _reopen(tx: Tx, parent: Item, change: Change, current: Mapping[str, Line]) -> None:

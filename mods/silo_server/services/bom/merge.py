@@ -1,46 +1,395 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The merge of an assembly into its BOM (spec bom-sync §5): check, plan, apply, announce; one transaction.
 
-The rules are those of :mod:`silo.bom.merge`; here is what a server adds: who may change which row is enforced
-on the stored rows, a ``sync_id`` gives the same answer again, a version mismatch is refused, a person's
-decision on a conflict is remembered until the assembly says something else.
+The rules are those of :mod:`silo.bom.compare`; here is what a server adds: who may change which row is
+enforced on the stored rows, a ``sync_id`` gives the same answer again, a version mismatch is refused, a
+person's decision on a conflict is remembered until the assembly says something else.
+
+A merge's request, answer and event, in exactly the spec's JSON (bom-sync §5).
+
+The request is read by hand and not by a model, because a bad quantity and an unknown part number are reported
+together, each with the index of its entry, in the one 400.
+
+The last sync of each assembly: when, from which file, what it left out, and what each line is in CAD.
+
+One row per assembly, written by the merge in its own transaction. An incomplete BOM must never look like a
+complete one, and an assembly that was never synced must not look like a part.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from typing import Any
 
-from sqlalchemy import delete, insert, select
+from sqlalchemy import delete, insert, select, update
 
-from silo.bom.errors import ConflictError, RejectedError
-from silo.bom.merge import MergePlan, answer_of, plan_merge, summary
-from silo.bom.model import QuantityChange
-from silo.bom.numbers import plain
-from silo_server.db.bulk import insert_rows, one_of
-from silo_server.db.engine import Tx
-from silo_server.db.tables import bom_conflicts, bom_syncs, items
-from silo_server.json_values import dumps
-from silo_server.services import events
-from silo_server.services.bom.changes import (
+from silo.bom.compare import MergePlan, answer_of, is_manual, plan_merge, summary
+from silo.bom.errors import RejectedError
+from silo.bom.model import BomDiff, QuantityChange
+from silo.bom.numbers import LARGEST_QUANTITY, as_decimal, plain
+from silo.bom.report import Reason, in_words, remembered
+from silo.bom.resolve import character_problem
+from silo_server import events
+from silo_server.db.engine import Tx, insert_rows, one_of
+from silo_server.db.tables import bom_conflicts, bom_last_syncs, items
+from silo_server.services.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
+from silo_server.services.bom.history import state_at
+from silo_server.services.bom.lines import (
     ChangeKind,
     ChangeNote,
     LineChange,
     apply_changes,
     check_no_cycle,
     check_version,
+    lines_of,
+    locked_parent,
     new_line_id,
 )
-from silo_server.services.bom.history import state_at
-from silo_server.services.bom.last_sync import LastSync, last_sync, remember
-from silo_server.services.bom.lines import lines_of
-from silo_server.services.bom.merge_json import MergeOrder, event_of
 from silo_server.services.items import get_item
 from silo_server.services.revisions import check_document
-from silo_server.values import Item, Line, LineState
+from silo_server.settings import TooLargeError, spec_time, wire
+from silo_server.values import Item, Line, LineState, dumps, from_row, names_of
+
+# An event goes to every listener: beyond this many unchanged lines it only says how many there are.
+EVENT_UNCHANGED_LINES = 500
+
+
+@dataclass(frozen=True, slots=True)
+class OrderEntry:
+    """One direct child as asked for; ``key`` is its case-folded number."""
+
+    index: int
+    part_number: str
+    quantity: float
+    components: Sequence[Mapping[str, str]] = ()
+
+    @property
+    def key(self) -> str:
+        return self.part_number.casefold()
+
+
+@dataclass(frozen=True, slots=True)
+class MergeOrder:
+    """A merge request. ``problems`` are (index, text) of the entries that are unusable in themselves."""
+
+    entries: Sequence[OrderEntry]
+    problems: Sequence[tuple[int, str]] = ()
+    sync_id: str | None = None
+    dry_run: bool = False
+    document_file: str | None = None
+    document_folder: str | None = None
+    document_sha256: str | None = None
+    document_revision: int | None = None
+    left_out: Sequence[Mapping[str, Any]] = ()
+
+    @property
+    def missing(self) -> list[tuple[str, str]]:
+        """The components that the assembly has lost."""
+        return [
+            (one.get("file", ""), one.get("object", ""))
+            for one in self.left_out
+            if one["reason"] == Reason.MISSING
+        ]
+
+
+def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
+    """The order in a decoded JSON body; RejectedError where the body as a whole is unusable.
+
+    Unknown keys are ignored. Whatever ``source`` says, the entries are an assembly's.
+    """
+    if not isinstance(body, Mapping) or not isinstance(body.get("entries"), list):
+        raise RejectedError('body: wanted {"entries": [{"child_part_number": …, "quantity": …}, …]}')
+    if len(body["entries"]) > max_entries:
+        raise TooLargeError(f"entries: this server takes at most {max_entries}, got {len(body['entries'])}")
+    sync_id, dry_run = body.get("sync_id"), body.get("dry_run")
+    if sync_id is not None and (
+        problem := text_problem(sync_id, 128) if sync_id else "wanted a text, got none"
+    ):
+        raise RejectedError(f"sync_id: {problem}")
+    if dry_run is not None and not isinstance(dry_run, bool):
+        raise RejectedError("dry_run: wanted true or false")
+    document = _document(body.get("document"))
+    entries: list[OrderEntry] = []
+    problems: list[tuple[int, str]] = []
+    for index, raw in enumerate(body["entries"]):
+        entry, problem = _entry(index, raw)
+        if entry is not None:
+            entries.append(entry)
+        if problem is not None:
+            problems.append((index, problem))
+    if not problems:
+        problems = _sums_too_large(entries)
+    left_out = _left_out(body.get("left_out"), max_entries)
+    return MergeOrder(entries, problems, sync_id, bool(dry_run), *document, left_out)
+
+
+def text_problem(value: Any, longest: int) -> str | None:
+    """Return what is wrong with a text of at most so many characters; None if nothing is."""
+    if not isinstance(value, str) or len(value) > longest:
+        return f"wanted a text of at most {longest} characters, got {_shown(value)}"
+    return character_problem(value)
+
+
+def sha256_or_none(name: str, value: Any) -> str | None:
+    """A SHA-256 in small hex digits, or None; RejectedError, naming the field, for anything else."""
+    if value is None:
+        return None
+    if isinstance(value, str) and re.fullmatch("[0-9A-Fa-f]{64}", value):
+        return value.lower()
+    raise RejectedError(f"{name}: wanted 64 hexadecimal digits")
+
+
+def quantity_problem(value: Any) -> str | None:
+    """What is wrong with a quantity, None where nothing is."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f"wanted a number, got {_shown(value)}"
+    # A huge integer has no float; comparing it does no harm where converting it would.
+    if not 0 < value <= LARGEST_QUANTITY or not math.isfinite(value):
+        return f"wanted a number above 0 and at most 1e9, got {_shown(value)}"
+    return None
+
+
+def _sums_too_large(entries: Sequence[OrderEntry]) -> list[tuple[int, str]]:
+    """A child that is named several times counts as the sum, which has the limit that one entry has."""
+    sums: dict[str, Decimal] = {}
+    problems = []
+    for entry in entries:
+        sums[entry.key] = sums.get(entry.key, Decimal(0)) + as_decimal(entry.quantity)
+        if sums[entry.key] > LARGEST_QUANTITY:
+            text = f"entries[{entry.index}].quantity: all entries of {entry.part_number!r} add up to over 1e9"
+            problems.append((entry.index, text))
+    return problems
+
+
+def _entry(index: int, raw: Any) -> tuple[OrderEntry | None, str | None]:
+    if not isinstance(raw, Mapping):
+        return None, f"entries[{index}]: wanted an object, got {_shown(raw)}"
+    name, quantity = raw.get("child_part_number"), raw.get("quantity")
+    problem = quantity_problem(quantity)
+    text = None if problem is None else f"entries[{index}].quantity: {problem}"
+    wrong = text_problem(name, 200) or (None if str(name).strip() else "wanted a part number, got none")
+    if wrong:
+        missing = f"entries[{index}].child_part_number: {wrong}"
+        return None, missing if text is None else f"{missing}; {text}"
+    # An entry with a bad quantity is still looked up, so that an unknown number is reported as well.
+    components, wrong = _components(index, raw.get("components"))
+    entry = OrderEntry(index, str(name).strip(), 1.0 if text else float(quantity or 0), components)
+    return entry, "; ".join(filter(None, (text, wrong))) or None
+
+
+def _components(index: int, raw: Any) -> tuple[Sequence[Mapping[str, str]], str | None]:
+    if raw is None:
+        return (), None
+    where = f"entries[{index}].components"
+    if not isinstance(raw, list) or not all(isinstance(one, Mapping) for one in raw):
+        return (), f'{where}: wanted [{{"file": …, "object": …}}, …], got {_shown(raw)}'
+    for one in raw:
+        if wrong := text_problem(one.get("file"), 4096) or text_problem(one.get("object", ""), 1024):
+            return (), f"{where}: {wrong}"
+    return [{"file": one["file"], "object": one.get("object", "")} for one in raw], None
+
+
+_LEFT_OUT_TEXTS = {"reason": 32, "name": 1024, "file": 4096, "object": 1024, "message": 4096}
+
+
+def _left_out(raw: Any, most: int) -> list[dict[str, Any]]:
+    if raw is None:
+        return []
+    if not isinstance(raw, list) or len(raw) > most:
+        raise RejectedError(f"left_out: wanted a list of at most {most} objects, got {_shown(raw)}")
+    return [_left_out_part(index, one) for index, one in enumerate(raw)]
+
+
+def _left_out_part(index: int, raw: Any) -> dict[str, Any]:
+    if not isinstance(raw, Mapping) or not raw.get("reason"):
+        raise RejectedError(f'left_out[{index}]: wanted {{"reason": …, "name": …, …}}, got {_shown(raw)}')
+    part: dict[str, Any] = {}
+    for name, longest in _LEFT_OUT_TEXTS.items():
+        value = raw.get(name, "")
+        if problem := text_problem(value, longest):
+            raise RejectedError(f"left_out[{index}].{name}: {problem}")
+        if value:
+            part[name] = value
+    quantity = raw.get("quantity", 0)
+    if isinstance(quantity, bool) or quantity != 0:
+        if problem := quantity_problem(quantity):
+            raise RejectedError(f"left_out[{index}].quantity: {problem}")
+        part["quantity"] = quantity
+    return part
+
+
+def _document(raw: Any) -> tuple[str | None, str | None, str | None, int | None]:
+    if raw is None:
+        return None, None, None, None
+    if not isinstance(raw, Mapping):
+        raise RejectedError('document: wanted {"file": …, "sha256": …, "revision": …}')
+    file, folder, revision = raw.get("file"), raw.get("folder"), raw.get("revision")
+    if problem := text_problem(file, 4096):
+        raise RejectedError(f"document.file: {problem}")
+    if folder is not None and (problem := text_problem(folder, 1024)):
+        raise RejectedError(f"document.folder: {problem}")
+    sha256 = sha256_or_none("document.sha256", raw.get("sha256"))
+    if isinstance(revision, float) and revision.is_integer():
+        revision = int(revision)  # 2.0 is a whole number in JSON
+    if revision is not None and not (type(revision) is int and 0 <= revision < 2**31):
+        raise RejectedError("document.revision: wanted a whole number")
+    return file, folder, sha256, revision
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def event_of(tx: Tx, parent: Item, diff: BomDiff, answer: Mapping[str, Any]) -> dict[str, Any]:
+    """The spec's event; ``warnings`` only where there is a conflict, which the diff does not say."""
+    told = dict(answer["diff"])
+    if len(told["unchanged"]) > EVENT_UNCHANGED_LINES:
+        told["unchanged_count"] = len(told["unchanged"])
+        told["unchanged"] = []
+    event: dict[str, Any] = {
+        "type": "bom_merge",
+        "item": parent.part_number,
+        "user": tx.actor.username,
+        "timestamp": spec_time(tx.stamp),
+        "summary": summary(diff),
+        "diff": told,
+        "resolve_url": answer["resolve_url"],
+    }
+    if "sync_id" in answer:
+        event["sync_id"] = answer["sync_id"]
+    if "left_out" in answer:
+        event["left_out"] = answer["left_out"][:EVENT_UNCHANGED_LINES]
+    if diff.conflicts:
+        event["warnings"] = answer["warnings"]
+    return event
+
+
+@dataclass(frozen=True, slots=True)
+class LastSync:
+    """What is known of an assembly's last sync. ``at`` None: it was never synced.
+
+    left_out
+        what the assembly holds and the BOM does not: the fields of :class:`silo.bom.report.LeftOut`.
+    refused_at
+        when the server refused a later merge, None where it did not; ``refusal`` says why.
+    """
+
+    at: str | None = None
+    username: str = ""
+    document_file: str | None = None
+    left_out: Sequence[Mapping[str, Any]] = ()
+    refused_at: str | None = None
+    refusal: str = ""
+    components: Mapping[int, Sequence[Mapping[str, str]]] = field(default_factory=dict)
+    folder: str = ""
+
+    @property
+    def gaps(self) -> list[dict[str, Any]]:
+        """Everything that is not in the BOM, a refused merge too."""
+        gaps = [dict(one) for one in self.left_out]
+        if self.refused_at:
+            gaps.append({"reason": Reason.REFUSED.value, "message": self.refusal})
+        return gaps
+
+    @property
+    def words(self) -> str:
+        """``2 missing, 1 unregistered``; "" where nothing was left out."""
+        return in_words(self.gaps)
+
+    def to_wire(self) -> dict[str, Any]:
+        """As the API sends it."""
+        return {"at": wire(self.at), "left_out": self.gaps}
+
+
+NEVER = LastSync()
+
+
+def last_sync(tx: Tx, parent: Item) -> LastSync:
+    """The last sync of one assembly."""
+    return last_syncs(tx, [parent.id]).get(parent.id, NEVER)
+
+
+def last_syncs(tx: Tx, parent_ids: Collection[int]) -> dict[int, LastSync]:
+    """The last syncs of all these assemblies; those that were never synced (nor refused) are absent."""
+    rows = tx.conn.execute(select(bom_last_syncs).where(one_of(tx, bom_last_syncs.c.parent_id, parent_ids)))
+    return {row.parent_id: _read(row) for row in rows}
+
+
+def _read(row: Any) -> LastSync:
+    return from_row(
+        LastSync,
+        row,
+        left_out=json.loads(row.left_out),
+        refusal=row.refusal or "",
+        components={int(child): known for child, known in json.loads(row.components).items()},
+        folder=row.folder or "",
+    )
+
+
+def remember(
+    tx: Tx,
+    parent: Item,
+    order: MergeOrder,
+    children: Mapping[str, int],
+    before: LastSync,
+    kept: Sequence[str],
+) -> None:
+    """Write down a merge. ``children``: part number → item id; ``kept``: the lines of missing components."""
+    ids = {number.casefold(): str(child) for number, child in children.items()}
+    entries = [
+        {"child_part_number": ids[entry.key], "components": entry.components} for entry in order.entries
+    ]
+    known = {str(child): list(components) for child, components in before.components.items()}
+    components = remembered(known, entries, [str(children[number]) for number in kept])
+    tx.conn.execute(delete(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id))
+    row = {
+        "at": tx.stamp,
+        "document_file": order.document_file,
+        "folder": order.document_folder or before.folder or None,
+        "left_out": dumps([dict(one) for one in order.left_out]),
+        "components": dumps(components),
+    }
+    _insert(tx, parent, row)
+
+
+def remember_refusal(tx: Tx, parent: Item, message: str) -> None:
+    """Write down that a merge was refused; what the last good one said stays. Nothing announces it."""
+    written = {"refused_at": tx.stamp, "refusal": message}
+    known = tx.conn.execute(
+        update(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id).values(**written)
+    )
+    if not known.rowcount:
+        _insert(tx, parent, {"left_out": "[]", "components": "{}", **written})
+    tx.touched.add(parent.uuid)
+
+
+def _insert(tx: Tx, parent: Item, row: Mapping[str, Any]) -> None:
+    who = {"parent_id": parent.id, "username": tx.actor.username}
+    tx.conn.execute(insert(bom_last_syncs).values(**who, **row))
+
+
+def in_sentences(gaps: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What was left out, each in a sentence."""
+    return [_sentence(gap) for gap in gaps]
+
+
+def _sentence(gap: Mapping[str, Any]) -> str:
+    name, count = gap.get("name") or gap.get("object") or "", gap.get("quantity")
+    who = f"{count} × {name}" if count else str(name)
+    where = f" ({gap['file']})" if gap.get("file") else ""
+    known = {
+        Reason.MISSING: f"{who}{where}: the file is missing or cannot be read",
+        Reason.UNREGISTERED: f"{who}{where}: no part number yet",
+        Reason.BROKEN: str(gap.get("message", "")),
+        Reason.REFUSED: f"a later sync was refused: {gap.get('message', '')}",
+    }
+    return known.get(gap["reason"], f"{gap['reason']}: {who}{where} {gap.get('message', '')}").rstrip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,10 +427,13 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     ConflictError (the ``sync_id`` was used for something else), NewerRevisionError (the document is not the
     item's newest file), MissingRevisionError (its file is not here).
     """
-    parent = get_item(tx, part_number, lock=True)
-    earlier = _replay(tx, parent, order)
-    if earlier is not None:
-        return earlier
+    parent = locked_parent(tx, part_number)
+    entries = [(entry.key, entry.quantity, entry.components) for entry in order.entries]
+    document = (getattr(order, name) for name in names_of(MergeOrder) if name.startswith("document"))
+    request = KeyedRequest.of(f"merge {parent.id}", order.sync_id, entries, order.left_out, *document)
+    if earlier := earlier_answer(tx, request):
+        whole = earlier.text if earlier.change_id is None else _rebuilt(tx, parent, earlier)
+        return MergeOutcome(whole, earlier.version)
     check_version(parent, expected)
     prepared = _prepare(tx, parent, order)
     changes = _line_changes(tx, prepared)
@@ -91,8 +443,12 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     remember(tx, parent, order, prepared.child_ids, prepared.before, kept)
     answer = answer_of(prepared.plan.diff, parent.part_number, order.sync_id, order.left_out)
     text = dumps(answer)
-    if order.sync_id:
-        _remember_sync(tx, parent, order, text, version, _reference(prepared, changes, answer, change_id))
+    if request is not None:
+        shorter = _without_unchanged(prepared, changes, answer)
+        kept_change = change_id if shorter and len(shorter) < len(text) else None
+        keep_answer(
+            tx, request, KeptAnswer(shorter if shorter and kept_change else text, version, kept_change)
+        )
     events.bom_merged(tx, parent, event_of(tx, parent, prepared.plan.diff, answer))
     return MergeOutcome(text, version)
 
@@ -162,6 +518,7 @@ def _as_mapping(line: Line) -> dict[str, Any]:
         "child_part_number": line.child_part_number,
         "quantity": state.quantity,
         "source": state.source,
+        "unit": state.unit,
         "rel_type": state.rel_type,
         "unreferenced_since": state.unreferenced_since,
     }
@@ -171,7 +528,7 @@ def _overrides_gone(lines: Sequence[Line], numbers: set[str]) -> list[QuantityCh
     # A person changed a quantity of a CAD line; now the assembly has it no more. The line is theirs, so it
     # stays, but silence would leave a part in the BOM that nobody needs.
     return [
-        QuantityChange(line.child_part_number, 0.0, line.state.quantity)
+        QuantityChange(line.child_part_number, 0.0, line.state.quantity, line.state.unit or "")
         for line in lines
         if line.state.override and line.child_part_number not in numbers
     ]
@@ -194,7 +551,7 @@ def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineChange]:
     for line in prepared.lines:
         name, before = line.child_part_number, line.state
         # Ownership is enforced here, on the stored row, whatever the plan says.
-        if name not in touched or before.source != "assembly" or before.rel_type != "component":
+        if name not in touched or is_manual(_as_mapping(line)):
             continue
         since = tx.stamp if name in flag else None if name in unflag else before.unreferenced_since
         after = replace(before, quantity=quantities.get(name, before.quantity), unreferenced_since=since)
@@ -234,29 +591,10 @@ def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:
     insert_rows(tx, bom_conflicts, rows)
 
 
-def _replay(tx: Tx, parent: Item, order: MergeOrder) -> MergeOutcome | None:
-    if not order.sync_id:
-        return None
-    row = tx.conn.execute(
-        select(
-            bom_syncs.c.answer, bom_syncs.c.version, bom_syncs.c.request_hash, bom_syncs.c.change_id
-        ).where(bom_syncs.c.parent_id == parent.id, bom_syncs.c.sync_id == order.sync_id)
-    ).one_or_none()
-    if row is None:
-        return None
-    if row.request_hash != _request_hash(order):
-        raise ConflictError(
-            f"sync_id {order.sync_id!r} was used before for another BOM of {parent.part_number}; "
-            "send a new one with new content"
-        )
-    answer = row.answer if row.change_id is None else _rebuilt(tx, parent, row.answer, row.change_id)
-    return MergeOutcome(answer, row.version)
-
-
-def _reference(
-    prepared: _Prepared, changes: Sequence[LineChange], answer: Mapping[str, Any], change_id: int
-) -> tuple[str, int] | None:
-    """The answer without its unchanged lines, which the history has: (JSON, change); None where it has not.
+def _without_unchanged(
+    prepared: _Prepared, changes: Sequence[LineChange], answer: Mapping[str, Any]
+) -> str | None:
+    """Return the answer's JSON without its unchanged lines, which the history has; None if it has not.
 
     Most of an answer says what is as it was; stored in full, a vault's nightly syncs would be gigabytes.
     """
@@ -272,15 +610,15 @@ def _reference(
     stored: dict[str, Any] = {"answer": kept, "others": sorted(others - {line.id for line in same})}
     if order != sorted(order):
         stored["order"] = order
-    return dumps(stored), change_id
+    return dumps(stored)
 
 
-def _rebuilt(tx: Tx, parent: Item, stored: str, change_id: int) -> str:
-    kept = json.loads(stored)
+def _rebuilt(tx: Tx, parent: Item, earlier: KeptAnswer) -> str:
+    kept = json.loads(earlier.text)
     others = set(kept["others"])
     same = [
         _pair(line.child.part_number, line.state)
-        for line in state_at(tx, parent, change_id)
+        for line in state_at(tx, parent, earlier.change_id or 0)
         if line.state.rel_type == "component" and line.line_id not in others
     ]
     kept["answer"]["diff"]["unchanged"] = [same[n] for n in kept.get("order", range(len(same)))]
@@ -289,30 +627,3 @@ def _rebuilt(tx: Tx, parent: Item, stored: str, change_id: int) -> str:
 
 def _pair(part_number: str, state: LineState) -> dict[str, Any]:
     return {"part_number": part_number, "quantity": plain(state.quantity)}
-
-
-def _remember_sync(
-    tx: Tx,
-    parent: Item,
-    order: MergeOrder,
-    answer: str,
-    version: int,
-    reference: tuple[str, int] | None,
-) -> None:
-    shorter = reference is not None and len(reference[0]) < len(answer)
-    tx.conn.execute(
-        insert(bom_syncs).values(
-            parent_id=parent.id,
-            sync_id=order.sync_id,
-            request_hash=_request_hash(order),
-            answer=reference[0] if reference and shorter else answer,
-            version=version,
-            at=tx.stamp,
-            change_id=reference[1] if reference and shorter else None,
-        )
-    )
-
-
-def _request_hash(order: MergeOrder) -> str:
-    content = sorted((entry.key, float(entry.quantity)) for entry in order.entries)
-    return hashlib.sha256(dumps(content).encode()).hexdigest()

@@ -3,6 +3,8 @@
 
 Every page shows how many BOMs wait, so finding them reads nothing but what waits (``db.tables.UNREFERENCED``,
 ``INCOMPLETE``).
+
+What people do to single BOM lines: add, change, remove. Each is one change in the history.
 """
 
 from __future__ import annotations
@@ -12,28 +14,190 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Any
 
 from sqlalchemy import func, select, text, update
 
-from silo.bom.diff import same_quantity
+from silo.bom.compare import same_quantity
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
-from silo.bom.left_out import Reason
-from silo_server.db.bulk import one_of
-from silo_server.db.engine import Tx
+from silo.bom.numbers import counts_pieces, plain
+from silo.bom.report import Reason
+from silo.bom.resolve import character_problem
+from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import INCOMPLETE, UNREFERENCED, bom_conflicts, bom_last_syncs, bom_lines, items
-from silo_server.errors import LinesChangedError
-from silo_server.services.bom.changes import (
+from silo_server.services.bom.history import Change, last_merge
+from silo_server.services.bom.lines import (
     ChangeKind,
     ChangeNote,
     LineChange,
+    LineId,
     apply_changes,
+    check_no_cycle,
+    component_of,
+    line_of,
+    lines_of,
+    mark_of,
+    new_line_id,
     parent_to_change,
 )
-from silo_server.services.bom.history import Change, last_merge
-from silo_server.services.bom.last_sync import NEVER, LastSync, last_syncs
-from silo_server.services.bom.lines import LineId, component_of, lines_of, mark_of
+from silo_server.services.bom.merge import NEVER, LastSync, last_syncs, quantity_problem
+from silo_server.services.bom.tree import Graph, conflicts_in
 from silo_server.services.items import by_ids, get_item
-from silo_server.values import Item, Line, LineState
+from silo_server.settings import DuplicateError, LinesChangedError
+from silo_server.values import Item, Line, LineState, json_problem
+
+REL_TYPES = ("component", "alternate", "reference")
+SOURCES = ("manual", "assembly")
+
+
+@dataclass(frozen=True, slots=True)
+class Edited:
+    """The line after an edit (None once removed), its parent, and the BOM's version and change."""
+
+    parent: Item
+    line: Line | None
+    version: int
+    change_id: int
+    child_part_number: str
+
+
+def add_line(
+    tx: Tx,
+    part_number: str,
+    child_part_number: str,
+    state: LineState,
+    expected: int | None = None,
+    *,
+    why: str | None = None,
+) -> Edited:
+    """Add a line. Raises DuplicateError where the child is there already, CycleError, RejectedError."""
+    parent = parent_to_change(tx, part_number, expected)
+    child = get_item(tx, child_part_number)
+    check_state(state)
+    for line in lines_of(tx, parent):
+        if line.child_id == child.id and line.state.rel_type == state.rel_type:
+            raise DuplicateError(
+                f"{child.part_number} is in the BOM of {parent.part_number} already; change its line instead"
+            )
+    check_no_cycle(tx, parent, [child.id])
+    change = LineChange(new_line_id(), child.id, None, state)
+    text = f"{child.part_number} added, quantity {plain(state.quantity)}"
+    return _apply(tx, parent, change, child.part_number, text, why)
+
+
+def change_line(
+    tx: Tx,
+    part_number: str,
+    which: str | LineId,
+    changes: Mapping[str, Any],
+    expected: int | None = None,
+    *,
+    why: str | None = None,
+) -> Edited:
+    """Change the fields (those of LineState that people own) of the line with this id, or of this child.
+
+    Another quantity or a unit that is no piece makes an assembly line a manual override, which remembers what
+    the assembly said; giving that quantity back, in pieces, ends the override. A ``source`` that is given
+    wins over this.
+    """
+    parent = parent_to_change(tx, part_number, expected)
+    line = line_of(lines_of(tx, parent), which, parent)
+    after = edited_state(line.state, changes)
+    check_state(after)
+    if after == line.state:
+        return Edited(parent, line, parent.bom_version, 0, line.child_part_number)
+    if after.rel_type != line.state.rel_type:
+        _check_free(tx, parent, line, after.rel_type)
+    fields = sorted(k for k in changes if getattr(after, k) != getattr(line.state, k))
+    if not same_quantity(after.quantity, line.state.quantity):
+        quantity = f"quantity {plain(line.state.quantity)} → {plain(after.quantity)}"
+        fields = [quantity, *(name for name in fields if name != "quantity")]
+    what = ", ".join(name.replace("_", " ") for name in fields) or "source"
+    change = LineChange(line.id, line.child_id, line.state, after, line.position)
+    return _apply(
+        tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {what}", why
+    )
+
+
+def remove_line(
+    tx: Tx,
+    part_number: str,
+    which: str | LineId,
+    expected: int | None = None,
+    *,
+    seen: str | None = None,
+    why: str | None = None,
+) -> Edited:
+    """Remove the line with this id, or of this child; only people do this.
+
+    seen
+        the :func:`mark_of` the line as the person saw it; LinesChangedError where it is another one by now.
+    """
+    parent = parent_to_change(tx, part_number, expected)
+    line = line_of(lines_of(tx, parent), which, parent)
+    if seen is not None and seen != mark_of(line.state):
+        raise LinesChangedError(f"{line.child_part_number} was changed meanwhile", [line.id])
+    change = LineChange(line.id, line.child_id, line.state, None, line.position)
+    return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} removed", why)
+
+
+def edited_state(before: LineState, changes: Mapping[str, Any]) -> LineState:
+    """The state after a person's edit; pure, so that the import's preview says the same."""
+    after = replace(before, **changes)
+    if "source" in changes:
+        if after.source == "assembly":
+            return replace(after, override=False, cad_quantity=None, reason=None)
+        return replace(after, unreferenced_since=None)
+    pieces = counts_pieces(after.unit)
+    same_unit = after.unit == before.unit or (pieces and counts_pieces(before.unit))
+    if same_unit and same_quantity(after.quantity, before.quantity):
+        return after
+    if before.override and pieces and same_quantity(after.quantity, before.cad_quantity):
+        return replace(after, source="assembly", override=False, cad_quantity=None)
+    if before.source == "assembly":
+        return replace(
+            after, source="manual", override=True, cad_quantity=before.quantity, unreferenced_since=None
+        )
+    return after
+
+
+def check_state(state: LineState) -> None:
+    """Raise RejectedError, with everything that is wrong, unless the line's state is usable."""
+    problems = []
+    problem = quantity_problem(state.quantity)
+    if problem:
+        problems.append(f"quantity: {problem}")
+    if state.rel_type not in REL_TYPES:
+        problems.append(f"rel_type: wanted one of {', '.join(REL_TYPES)}, got {state.rel_type!r}")
+    if state.source not in SOURCES:
+        problems.append(f"source: wanted one of {', '.join(SOURCES)}, got {state.source!r}")
+    for name, limit in (("unit", 32), ("find_number", 32)):
+        value = getattr(state, name)
+        if value is not None and len(value) > limit:
+            problems.append(f"{name}: wanted at most {limit} characters, got {len(value)}")
+    for name in ("unit", "find_number", "notes", "reason", "reference_designators"):
+        for written in (value,) if isinstance(value := getattr(state, name), str) else value or ():
+            if problem := character_problem(written):
+                problems.append(f"{name}: {problem}")
+    if state.metadata and (problem := json_problem(state.metadata)):
+        problems.append(f"metadata: {problem}")
+    if problems:
+        raise RejectedError("; ".join(problems), problems)
+
+
+def _check_free(tx: Tx, parent: Item, line: Line, rel_type: str) -> None:
+    for other in lines_of(tx, parent):
+        if other.child_id == line.child_id and other.state.rel_type == rel_type:
+            raise DuplicateError(f"{line.child_part_number} is in this BOM as {rel_type} already")
+
+
+def _apply(tx: Tx, parent: Item, change: LineChange, child: str, text: str, why: str | None = None) -> Edited:
+    note = ChangeNote(kind=ChangeKind.EDIT, summary=text, reason=why)
+    change_id, version = apply_changes(tx, parent, [change], note)
+    after = None
+    if change.after is not None:
+        after = next(line for line in lines_of(tx, parent) if line.id == change.line_id)
+    return Edited(parent, after, version, change_id, child)
 
 
 class Action(StrEnum):
@@ -94,19 +258,10 @@ def review(tx: Tx, part_number: str) -> Review:
 
 
 def open_conflicts(tx: Tx, parent: Item, lines: Sequence[Line]) -> list[Conflict]:
-    """The conflicts of the last merge that neither a decision nor an edit has settled since."""
-    rows = tx.conn.execute(
-        select(bom_conflicts).where(bom_conflicts.c.parent_id == parent.id, ~bom_conflicts.c.accepted)
-    ).all()
-    found = {row.child_id: row for row in rows}
-    return [
-        Conflict(line, found[line.child_id].cad_quantity, found[line.child_id].since)
-        for line in lines
-        if line.child_id in found
-        and line.state.source == "manual"
-        and line.state.rel_type == "component"
-        and not same_quantity(line.state.quantity, found[line.child_id].cad_quantity)
-    ]
+    """Return the conflicts of one BOM, in the order of its lines."""
+    graph = Graph(parent, {parent.id: lines}, conflicts_in(tx, [parent.id]))
+    found = graph.conflicts.get(parent.id, {})
+    return [Conflict(line, *found[line.child_id]) for line in lines if graph.told(line) is not None]
 
 
 def told_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[int, float]]:
@@ -194,6 +349,7 @@ def _decided(line: Line, decision: Decision, conflict: Conflict | None) -> LineS
     return replace(
         state,
         quantity=conflict.cad_quantity,
+        unit=state.unit if counts_pieces(state.unit) else None,
         source="assembly",
         override=False,
         cad_quantity=None,
@@ -264,7 +420,7 @@ class Waiting:
 
 def waiting(tx: Tx) -> list[Waiting]:
     """All BOMs that wait, by part number; archived assemblies wait for nobody."""
-    unreferenced, conflicts, gaps = _unreferenced(tx), _conflicts(tx), _incomplete(tx)
+    unreferenced, conflicts, gaps = _unreferenced(tx), conflicts_in(tx), _incomplete(tx)
     found = by_ids(tx, {*unreferenced, *conflicts, *gaps})
     syncs = last_syncs(tx, found)
     rows = []
@@ -289,7 +445,7 @@ def waiting(tx: Tx) -> list[Waiting]:
 
 def waiting_count(tx: Tx) -> int:
     """How many BOMs wait."""
-    ids = {*_unreferenced(tx), *_conflicts(tx), *_incomplete(tx)}
+    ids = {*_unreferenced(tx), *conflicts_in(tx), *_incomplete(tx)}
     if not ids:
         return 0
     alive = (
@@ -300,56 +456,43 @@ def waiting_count(tx: Tx) -> int:
     return tx.conn.scalar(alive) or 0
 
 
-def _mark(item: Item, conflicts: Mapping[int, float]) -> str:
+def _mark(item: Item, conflicts: Mapping[int, tuple[float, str]]) -> str:
     # A sync that only brings other conflicts changes no line, and so not the version.
-    told = hashlib.sha256(repr(sorted(conflicts.items())).encode()).hexdigest()[:16]
-    return f"{item.bom_version}-{told}"
+    told = repr(sorted((child, said[0]) for child, said in conflicts.items()))
+    return f"{item.bom_version}-{hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
 
-def decide_all(tx: Tx, part_number: str, action: Action, reason: str | None, seen: str) -> int:
-    """Decide the same about all unreferenced lines (``remove``, ``keep``) or all conflicts of a BOM.
+def lines_for(tx: Tx, part_number: str, action: Action, seen: str) -> tuple[list[Line], list[Line]]:
+    """Return the open lines of a BOM that ``action`` is about, and those of them that it would remove.
 
     seen
-        the mark of what the person saw.
-    Returns how many lines there were. VersionConflictError where the BOM is not the one that was seen.
+        the mark of what the person saw; VersionConflictError if the BOM is another one by now.
     """
-    open_lines = review(tx, get_item(tx, part_number, lock=True).part_number)
-    about_conflicts = action in (Action.TAKE_CAD, Action.KEEP_SILO)
-    lines = [one.line for one in open_lines.conflicts] if about_conflicts else open_lines.unreferenced
+    found = review(tx, part_number)
+    if action in (Action.TAKE_CAD, Action.KEEP_SILO):
+        lines = [one.line for one in found.conflicts]
+        gone = [one.line for one in found.conflicts if action is Action.TAKE_CAD and not one.cad_quantity]
+    else:
+        lines = list(found.unreferenced)
+        gone = lines if action is Action.REMOVE else []
+    conflicts = {one.line.child_id: (one.cad_quantity, one.since) for one in found.conflicts}
+    if lines and seen != _mark(found.parent, conflicts):
+        raise VersionConflictError(f"the BOM of {part_number} is not as it was seen")
+    return lines, gone
+
+
+def decide_all(
+    tx: Tx, part_number: str, action: Action, reason: str | None, seen: str
+) -> tuple[int, int | None]:
+    """Decide the same about all :func:`lines_for` an action; return how many, and the change, if any."""
+    lines, _ = lines_for(tx, get_item(tx, part_number, lock=True).part_number, action, seen)
     decisions = [Decision(line.child_part_number, action, reason, line.id) for line in lines]
-    if decisions:
-        conflicts = {one.line.child_id: one.cad_quantity for one in open_lines.conflicts}
-        if seen != _mark(open_lines.parent, conflicts):
-            raise VersionConflictError(f"the BOM of {part_number} is not as it was seen")
-        resolve(tx, part_number, decisions)
-    return len(decisions)
+    return len(decisions), resolve(tx, part_number, decisions)[0] if decisions else None
 
 
 def _unreferenced(tx: Tx) -> Counter[int]:
     query = select(bom_lines.c.parent_id, func.count()).where(text(f"bom_lines.{UNREFERENCED}"))
     return Counter({row[0]: row[1] for row in tx.conn.execute(query.group_by(bom_lines.c.parent_id))})
-
-
-def _conflicts(tx: Tx) -> dict[int, dict[int, float]]:
-    """Parent → child → what CAD says, by the rule of ``review.open_conflicts``, for all BOMs."""
-    same = (bom_lines.c.parent_id == bom_conflicts.c.parent_id) & (
-        bom_lines.c.child_id == bom_conflicts.c.child_id
-    )
-    query = (
-        select(
-            bom_conflicts.c.parent_id,
-            bom_conflicts.c.child_id,
-            bom_conflicts.c.cad_quantity,
-            bom_lines.c.quantity,
-        )
-        .join(bom_lines, same)
-        .where(~bom_conflicts.c.accepted, bom_lines.c.source == "manual", bom_lines.c.rel_type == "component")
-    )
-    found: dict[int, dict[int, float]] = {}
-    for row in tx.conn.execute(query):
-        if not same_quantity(row.quantity, row.cad_quantity):
-            found.setdefault(row.parent_id, {})[row.child_id] = row.cad_quantity
-    return found
 
 
 def _incomplete(tx: Tx) -> Sequence[int]:

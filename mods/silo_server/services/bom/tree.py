@@ -3,32 +3,44 @@
 
 One recursive query brings every line below an item, each once however often its assembly is used; what is
 multiplied is multiplied here. Only ``component`` lines are followed.
+
+Cost and mass of an assembly part by part, with everything that is missing named; the rules are those of
+:mod:`silo_server.services.bom.summary`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, Select, func, literal, select
 
+from silo.bom.compare import says_the_same
 from silo.bom.errors import ConflictError, CycleError
-from silo.bom.numbers import as_decimal
-from silo_server.db.bulk import one_of
-from silo_server.db.engine import Tx
-from silo_server.db.tables import bom_lines, items
-from silo_server.errors import TooLargeError
+from silo.bom.numbers import as_decimal, exact_product, exact_sum, plain, read_number
+from silo_server.db.engine import Tx, one_of
+from silo_server.db.tables import bom_conflicts, bom_lines, items
 from silo_server.services.bom.lines import select_lines, to_line
 from silo_server.services.items import by_ids
+from silo_server.services.search import fits
+from silo_server.settings import TooLargeError
 from silo_server.values import Item, Line
 
 MAX_DEPTH = 20
+# Properties that a filter looks in beside number, name and description.
+SOUGHT = ("supplier", "supplier_part_number", "manufacturer")
 # What quantities multiply and add up to, at most: exact as a JSON number, and more than anybody orders.
 MAX_TOTAL = 10**15
 # Totals are exact: counts as they are, lengths and masses as decimals.
 Exact = int | Decimal
+
+
+# Child (internal id) → what CAD says of its line in conflict, and since when.
+Told = dict[int, tuple[float, str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +49,21 @@ class Graph:
 
     root: Item
     lines: Mapping[int, Sequence[Line]]
+    conflicts: Mapping[int, Told] = field(default_factory=dict)
+
+    def told(self, line: Line) -> float | None:
+        """Return what CAD says of a line in conflict (0: not in CAD); None if there is no conflict."""
+        if line.state.rel_type != "component" or line.child_id not in self.conflicts.get(line.parent_id, ()):
+            return None
+        return self.conflicts[line.parent_id][line.child_id][0]
+
+    def doubts(self, line: Line) -> list[str]:
+        """Return what a person still has to decide about a line, in words."""
+        told = self.told(line)
+        found = ["unreferenced"] if line.state.unreferenced_since else []
+        if told is not None:
+            found.append(f"CAD says {plain(told)}" if told else "CAD has it no more")
+        return found
 
     def names(self) -> dict[int, str]:
         """Internal id → part number, of the root and of all below it."""
@@ -59,11 +86,26 @@ class Occurrence(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FlatRow:
-    """A leaf part: how much of it one root needs in all. ``unreferenced`` where a line on the way is."""
+    """A leaf part: how much of it one root needs in all.
+
+    gone
+        so much of it because of lines, on any level, that CAD has no more.
+    disputed
+        true if a quantity on the way to it is in conflict.
+    """
 
     line: Line
     unit: str | None
     total: Exact
+    gone: Exact = 0
+    disputed: bool = False
+
+    def doubts(self, pieces: int = 1) -> list[str]:
+        """Return what a person still has to decide about it, in words."""
+        found = ["unreferenced"] if self.gone else []
+        if 0 < self.gone < self.total:
+            found = [f"{plain(self.gone * pieces)} of {plain(self.total * pieces)} unreferenced"]
+        return [*found, "a quantity in conflict"] if self.disputed else found
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,16 +131,95 @@ def load_graph(tx: Tx, root: Item, depth: int | None = None) -> Graph:
     else:
         query = query.where(bom_lines.c.parent_id.in_(_reach(root, depth)))
     most = tx.settings.max_expanded_rows
-    rows = tx.conn.execute(query.limit(most + 1)).all()
-    if len(rows) > most:
-        raise TooLargeError(
-            f"there are more than {most} different lines below {root.part_number}; ask for one of its "
-            "sub-assemblies, or for less with depth="
-        )
     lines: dict[int, list[Line]] = {}
-    for row in rows:
-        lines.setdefault(row[1], []).append(to_line(row))
-    return Graph(root, lines)
+    # What many lines say of one child is kept once.
+    names: dict[int, tuple[Any, ...]] = {}
+    with tx.conn.execute(query.limit(most + 1), execution_options={"yield_per": 2000}) as rows:
+        for number, row in enumerate(rows):
+            if number == most:
+                raise TooLargeError(
+                    f"there are more than {most} different lines below {root.part_number}; ask for one of "
+                    "its sub-assemblies, or for less with depth="
+                )
+            line = to_line(row)
+            child = names.setdefault(line.child_id, line[4:11])
+            lines.setdefault(line.parent_id, []).append(Line._make((*line[:4], *child, line.state)))
+    return Graph(root, lines, conflicts_in(tx, lines))
+
+
+def conflicts_in(tx: Tx, parent_ids: Collection[int] | None = None) -> dict[int, Told]:
+    """Return the conflicts of the last merges that neither a decision nor an edit has settled since.
+
+    parent_ids
+        of these BOMs only; None: of all.
+    """
+    told, line = bom_conflicts.c, bom_lines.c
+    asked = select(told.parent_id, told.child_id, told.cad_quantity, told.since).where(~told.accepted)
+    if parent_ids is not None:
+        asked = asked.where(one_of(tx, told.parent_id, parent_ids))
+    said = {(row.parent_id, row.child_id): (row.cad_quantity, row.since) for row in tx.conn.execute(asked)}
+    if not said:
+        return {}
+    # The few that are asked about first: else SQLite reads all lines, for each page.
+    query = select(line.parent_id, line.child_id, line.quantity, line.unit).where(
+        one_of(tx, line.parent_id, {parent for parent, _ in said}),
+        one_of(tx, line.child_id, {child for _, child in said}),
+        line.source == "manual",
+        line.rel_type == "component",
+    )
+    found: dict[int, Told] = {}
+    for row in tx.conn.execute(query):
+        known = said.get((row.parent_id, row.child_id))
+        if known is not None and not says_the_same(known[0], row.quantity, row.unit):
+            found.setdefault(row.parent_id, {})[row.child_id] = known
+    return found
+
+
+def sought(words: str, item_type: str, parts: Mapping[int, Part]) -> Callable[[Line], bool]:
+    """Return the test that a filter is, for tree, flat list, totals, print and exports.
+
+    All words are in a part's number, name, description, supplier or manufacturer, and it has the type.
+    """
+    test = fits(words)
+
+    @cache
+    def fitting(child_id: int, child_type: str) -> bool:
+        if item_type and child_type != item_type:
+            return False
+        part = parts[child_id]
+        return test(*(str(text) for text in (*part[:3], *map(part.properties.get, SOUGHT)) if text))
+
+    return lambda line: fitting(line.child_id, line.child_item_type)
+
+
+def leading_to(graph: Graph, fitting: Callable[[Line], bool]) -> Callable[[Line], bool]:
+    """Return a test of lines: true if the line fits, or something below it does."""
+    below: dict[int, bool] = {}
+
+    def hit(line: Line) -> bool:
+        return fitting(line) or (line.state.rel_type == "component" and below.get(line.child_id, False))
+
+    for item_id in reversed(order_of(graph)):
+        below[item_id] = any(hit(line) for line in graph.lines.get(item_id, ()))
+    return hit
+
+
+def narrowed(graph: Graph, fitting: Callable[[Line], bool], *, leaves: bool) -> Graph:
+    """Return the graph for the totals of what fits: each part once, with all that one root needs of it.
+
+    leaves
+        of the parts of the flat list; else of what fits first on each way down, with all that is in it.
+    """
+    below = (line for lines in graph.lines.values() for line in lines)
+    whole = () if leaves else {line.child_id for line in below if fitting(line)}
+    rows = [row for row in flatten(graph, whole) if fitting(row.line)]
+    lines = [row.line._replace(state=replace(row.line.state, quantity=float(row.total))) for row in rows]
+    return Graph(graph.root, {**graph.lines, graph.root.id: lines})
+
+
+def ids_below(root: Item) -> Select[tuple[int]]:
+    """Select the ids of an item and of all that is in it."""
+    return _reach(root, None)
 
 
 def _reach(root: Item, depth: int | None) -> Select[tuple[int]]:
@@ -113,10 +234,10 @@ def _reach(root: Item, depth: int | None) -> Select[tuple[int]]:
     return select(reach.union(below).c.item_id)
 
 
-def expand(graph: Graph, depth: int, limit: int) -> list[Occurrence]:
+def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
     """The tree as rows, parents before their children. CycleError where it never ends, TooLargeError."""
     order_of(graph)  # finds a cycle before it is walked
-    rows: list[Occurrence] = []
+    count = 0
     graph_lines = graph.lines
     one: Exact = 1
     stack = [(graph.root.part_number, 1, one, iter(graph_lines.get(graph.root.id, ())))]
@@ -125,19 +246,19 @@ def expand(graph: Graph, depth: int, limit: int) -> list[Occurrence]:
         for line in lines:
             state = line.state
             total = multiplied(factor, line)
-            rows.append(Occurrence(line, parent, level, total))
+            count += 1
+            yield Occurrence(line, parent, level, total)
             below = graph_lines.get(line.child_id)
             if below and level < depth and state.rel_type == "component":
                 stack.append((line.child_part_number, level + 1, total, iter(below)))
                 break
         else:
             stack.pop()
-        if len(rows) > limit:
+        if count > limit:
             raise TooLargeError(
                 f"the expanded BOM of {graph.root.part_number} has more than {limit} lines; "
                 "ask for less with depth="
             )
-    return rows
 
 
 def flatten(graph: Graph, closed: Collection[int] = ()) -> list[FlatRow]:
@@ -146,21 +267,29 @@ def flatten(graph: Graph, closed: Collection[int] = ()) -> list[FlatRow]:
     closed
         assemblies (internal ids) that count as parts.
     """
-    factors: dict[int, Exact] = {graph.root.id: 1}
-    totals: dict[tuple[int, str | None], Exact] = {}
+    nothing: tuple[Exact, Exact, bool] = (0, 0, False)
+    # How much of each assembly, how much of it CAD has no more, and whether a quantity above is in conflict.
+    needs: dict[int, tuple[Exact, Exact, bool]] = {graph.root.id: (1, 0, False)}
+    totals: dict[tuple[int, str | None], tuple[Exact, Exact, bool]] = {}
     shown: dict[tuple[int, str | None], Line] = {}
     for item_id in order_of(graph):
-        if item_id not in factors:
+        if item_id not in needs:
             continue  # below a closed one only
+        factor, lost, disputed = needs[item_id]
         for line in graph.components(item_id):
-            amount = multiplied(factors[item_id], line)
-            if line.child_id not in closed and graph.components(line.child_id):
-                factors[line.child_id] = added(factors.get(line.child_id, 0), amount, line)
+            amount = multiplied(factor, line)
+            gone = amount if line.state.unreferenced_since else multiplied(lost, line)
+            unsure = disputed or graph.told(line) is not None
+            key = (line.child_id, line.state.unit)
+            below = line.child_id not in closed and graph.components(line.child_id)
+            before = needs.get(line.child_id, nothing) if below else totals.get(key, nothing)
+            sums = added(before[0], amount, line), added(before[1], gone, line), before[2] or unsure
+            if below:
+                needs[line.child_id] = sums
             else:
-                key = (line.child_id, line.state.unit)
-                totals[key] = added(totals.get(key, 0), amount, line)
+                totals[key] = sums
                 shown.setdefault(key, line)
-    return [FlatRow(line, key[1], totals[key]) for key, line in shown.items()]
+    return [FlatRow(line, key[1], *totals[key]) for key, line in shown.items()]
 
 
 def multiplied(factor: Exact, line: Line) -> Exact:
@@ -259,3 +388,140 @@ def order_of(graph: Graph) -> list[int]:
         state[child] = False
         stack.append((child, iter(graph.components(child))))
     return done[::-1]
+
+
+DEFAULT_CURRENCY = "EUR"
+
+
+@dataclass(frozen=True, slots=True)
+class CostRow:
+    """A leaf part's share, as the API sends it. ``standard_cost`` None = not stated."""
+
+    part_number: str
+    name: str
+    total_quantity: float
+    unit: str | None
+    standard_cost: float | None
+    currency: str | None
+    total_cost: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class CostRollup:
+    """What an assembly costs; ``totals`` per currency, ``missing`` the part numbers without a cost."""
+
+    rows: Sequence[CostRow]
+    totals: Mapping[str, float]
+    missing: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class MassRow:
+    """A part whose stated mass was taken [kg], as the API sends it.
+
+    ``is_assembly`` where it stands for all below it.
+    """
+
+    part_number: str
+    name: str
+    total_quantity: float
+    mass_kg: float | None
+    total_mass_kg: float | None
+    is_assembly: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MassRollup:
+    """The mass of one assembly [kg]; ``stated`` is what its own ``mass_kg`` says."""
+
+    rows: Sequence[MassRow]
+    total: float
+    missing: Sequence[str]
+    stated: float | None
+
+
+class Part(NamedTuple):
+    """What a roll-up reads of an item."""
+
+    part_number: str
+    name: str
+    description: str
+    properties: Mapping[str, Any]
+    thumbnail_key: str | None = None
+
+
+def parts_of(tx: Tx, graph: Graph) -> dict[int, Part]:
+    """Everything in the graph, by internal id, read once for both roll-ups."""
+    parts = some_parts(tx, {line.child_id for below in graph.lines.values() for line in below})
+    root = graph.root
+    own = Part(root.part_number, root.name, root.description, root.properties, root.thumbnail_key)
+    return {**parts, root.id: own}
+
+
+def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, Part]:
+    """These items, by internal id."""
+    rows = tx.conn.execute(
+        select(
+            items.c.id,
+            items.c.part_number,
+            items.c.name,
+            items.c.description,
+            items.c.properties,
+            items.c.thumbnail_key,
+        ).where(one_of(tx, items.c.id, item_ids))
+    )
+    return {row[0]: Part(*row[1:4], json.loads(row[4]), row[5]) for row in rows}
+
+
+def currency_of(properties: Mapping[str, Any]) -> str:
+    """The currency of an item's cost."""
+    return str(properties.get("currency") or DEFAULT_CURRENCY)
+
+
+def roll_up_cost(graph: Graph, parts: Mapping[int, Part]) -> CostRollup:
+    """Flat BOM times standard cost."""
+    flat = flatten(graph)
+    rows, totals, missing = [], dict[str, Decimal](), []
+    for row in flat:
+        item = parts[row.line.child_id]
+        cost = positive_number(item.properties, "standard_cost")
+        currency = currency_of(item.properties) if cost is not None else None
+        total = exact_product((cost, row.total)) if cost is not None else None
+        if total is None or currency is None:
+            missing.append(item.part_number)
+        else:
+            totals[currency] = exact_sum((totals.get(currency, Decimal(0)), total))
+        shown = None if total is None else float(total)
+        rows.append(CostRow(item.part_number, item.name, plain(row.total), row.unit, cost, currency, shown))
+    return CostRollup(rows, {name: float(total) for name, total in totals.items()}, missing)
+
+
+def roll_up_mass(graph: Graph, parts: Mapping[int, Part], assemblies: Collection[int]) -> MassRollup:
+    """Masses from the leaves up; those ``assemblies`` stand for all that is in them with their own."""
+    amounts: dict[int, Exact] = {}
+    for row in flatten(graph, assemblies):
+        item_id = row.line.child_id
+        amounts[item_id] = added(amounts.get(item_id, 0), row.total, row.line)
+    rows = [_mass_row(parts[one], amount, one in assemblies) for one, amount in amounts.items()]
+    return MassRollup(
+        rows,
+        float(exact_sum(row.total_mass_kg for row in rows if row.total_mass_kg is not None)),
+        [row.part_number for row in rows if row.total_mass_kg is None],
+        positive_number(graph.root.properties, "mass_kg"),
+    )
+
+
+def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
+    """A property as a number of at least 0, None where it is absent or no such number."""
+    value = properties.get(name)
+    if isinstance(value, str):
+        value = read_number(value, points_are_decimal=True).value
+    if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
+        return None
+    return float(value) if 0 <= value < 1e15 else None
+
+
+def _mass_row(item: Part, amount: Exact, is_assembly: bool) -> MassRow:
+    mass = positive_number(item.properties, "mass_kg")
+    total = float(exact_product((mass, amount))) if mass is not None else None
+    return MassRow(item.part_number, item.name, plain(amount), mass, total, is_assembly)

@@ -2,6 +2,13 @@
 // Forms that are sent: a second click sends nothing twice, and what somebody typed into another form of the page
 // is not lost without a question.
 
+// The key of a notice is for this page alone: the address that somebody keeps or sends has none.
+const shown = new URL(location.href);
+if (shown.searchParams.has("said")) {
+  shown.searchParams.delete("said");
+  history.replaceState(history.state, "", shown);
+}
+
 const PATIENCE = 10000; // so long a form that was sent waits for its answer
 let sent = null;
 let given_up = null;

@@ -15,8 +15,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.inertia.geometry.exact.quadrature import Curve, Face, Moments, Surface, integrate
-from silo.inertia.geometry.exact.surfaces import Asked, Basis, Elementary, Nurbs, Turned, basis_functions
+from silo.inertia.geometry.exact import (
+    Asked,
+    Basis,
+    Curve,
+    Elementary,
+    Face,
+    Moments,
+    Nurbs,
+    Surface,
+    Turned,
+    basis_functions,
+    integrate,
+)
 from silo.inertia.model import GeometryCode
 
 Point = Callable[[float, float], tuple[float, float, float]]
@@ -350,7 +361,7 @@ def test_a_face_beside_its_own_edges_is_doubted(
     from OCP.TopLoc import TopLoc_Location
 
     from silo.inertia.geometry.kernel import occt
-    from silo.inertia.geometry.kernel.brep import load_shape
+    from silo.inertia.geometry.kernel.solids import load_shape
 
     shape = load_shape(WAVY, "wavy")
     lids = [face for face in occt.faces_of(shape) if BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane]
@@ -406,7 +417,7 @@ def splines(kind: str) -> tuple[Any, float]:
 def test_splines_of_the_kernel_are_read_as_such(kind: str) -> None:
     """Nothing is asked point by point where numpy can have the surface as a whole; the volume is exact."""
     from silo.inertia.geometry.kernel import occt
-    from silo.inertia.geometry.kernel.moments import _surface, moments
+    from silo.inertia.geometry.kernel.solids import _surface, moments
 
     shape, volume = splines(kind)
     assert not [face for face in occt.faces_of(shape) if isinstance(_surface(face), Asked)]
@@ -419,8 +430,7 @@ def test_both_engines_agree_where_both_converge(box: Any) -> None:
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCone, BRepPrimAPI_MakeTorus
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
-    from silo.inertia.geometry.kernel.moments import moments
-    from silo.inertia.geometry.kernel.solids import measure
+    from silo.inertia.geometry.kernel.solids import measure, moments
 
     axis = gp_Ax2(gp_Pnt(6, 5, 4), gp_Dir(1, 2, 3))
     shape = BRepAlgoAPI_Cut(box(10, 12, 14), BRepPrimAPI_MakeTorus(axis, 3, 1).Shape()).Shape()

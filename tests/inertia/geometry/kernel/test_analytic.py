@@ -33,7 +33,7 @@ from OCP.TopAbs import TopAbs_INTERNAL
 
 from silo.inertia.core import MassProps, combine, combine_arrays, place
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.moments import moments
+from silo.inertia.geometry.kernel.solids import moments
 from silo.inertia.model import Assembly, GeometryCode, Prototype
 
 EXACT = 1e-9

@@ -24,8 +24,7 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
 
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.solids import measure
-from silo.inertia.geometry.mesh import mesh_volume
-from silo.inertia.geometry.together import combined
+from silo.inertia.geometry.together import combined, mesh_volume
 from silo.inertia.model import GeometryCode, Prototype
 
 Read = Callable[..., Any]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import DocumentError
-from silo.inertia.geometry.mesh import (
+from silo.inertia.geometry.together import (
     Mesh,
     components,
     is_inside,
@@ -246,6 +247,71 @@ def test_an_obj_does_not_reach_for_other_files(tmp_path: Path, read_in: Any) -> 
     text = trimesh.exchange.obj.export_obj(brick())
     path.write_text("mtllib ../../../../etc/passwd\nusemtl x\n" + text, "ascii")
     assert only(read_in(path)).volume_m3 == pytest.approx(6e-6)
+
+
+QUAD = "f 4 3 2 1\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("", "", False),
+        (QUAD, "f 4 3 2\nf 4 2 1\n", False),
+        (QUAD, "f -5 -6 -7 -8\n", False),
+        (QUAD, "f 4 3 \\\n2 1\n", True),  # a line that is continued is not read
+        (QUAD, QUAD + "cstype bspline\ndeg 1 1\nsurf 0 1 0 1 1 2 3 4\nparm u 0 0 1 1\nend\n", True),
+    ],
+    ids=["quads", "triangles", "from the end", "continued", "free-form"],
+)
+def test_what_an_obj_file_lists_is_read_or_named(
+    old: str, new: str, said: bool, tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """Its lines are the list: each polygon of n corners has n - 2 triangles."""
+    corners = "".join(f"v {x} {y} {z}\n" for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    rest = "f 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+    path = tmp_path / "part.obj"
+    path.write_text((corners + "o cube\n" + QUAD + rest).replace(old, new) if old else corners + QUAD + rest)
+    assert (GeometryCode.BODY_MISSING in codes_of(read_in(path))) == said
+
+
+def edited(path: Path, edit: Any) -> Path:
+    """A GLB file, its tree edited."""
+    data = path.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + length])
+    edit(tree)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    rest = len(text).to_bytes(4, "little") + b"JSON" + text + data[20 + length :]
+    path.write_bytes(data[:8] + (12 + len(rest)).to_bytes(4, "little") + rest)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("edit", "codes"),
+    [
+        (lambda tree: None, []),
+        (lambda tree: tree["nodes"].append({"mesh": 0}), [GeometryCode.NOT_COUNTED]),
+        (
+            lambda tree: tree["nodes"][0].update(extensions={"EXT_mesh_gpu_instancing": {"attributes": {}}}),
+            [GeometryCode.BODY_MISSING],
+        ),
+        (
+            lambda tree: tree["meshes"][0]["primitives"][0].update(mode=1),  # lines are no body
+            [],
+        ),
+    ],
+    ids=["all", "in no scene", "instanced by an extension", "lines"],
+)
+def test_what_a_glb_file_lists_is_read_or_named(
+    edit: Any, codes: list[str], tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """The nodes of its scene are the list."""
+    scene = trimesh.Scene([brick(), brick(at=(100, 0, 0))])
+    path = tmp_path / "part.glb"
+    scene.export(path)
+    found = codes_of(read_in(edited(path, edit)))
+    assert [code for code in found if code != GeometryCode.UNITS] == codes
 
 
 # --- the mathematics ---------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -152,3 +153,187 @@ def test_what_trimesh_writes_is_read(tmp_path: Path, read_in: Any) -> None:
     trimesh.Scene([trimesh.creation.box((1, 2, 3))]).export(path)
     (part,) = read_in(path).prototypes.values()
     assert part.volume_m3 == pytest.approx(6e-9)
+
+
+SETTINGS, PRUSA = "Metadata/model_settings.config", "Metadata/Slic3r_PE_model.config"
+ROOT = "3D/3dmodel.model"
+
+
+def orca(*subtypes: str) -> str:
+    """The settings of Bambu Studio and Orca Slicer: object 9, whose parts are the objects 1, 2 …"""
+    parts = "".join(
+        f'<part id="{number}" subtype="{word}"><metadata key="name" value="p"/></part>'
+        for number, word in enumerate(subtypes, start=1)
+    )
+    return f'<?xml version="1.0"?><config><object id="9"><metadata key="name"/>{parts}</object></config>'
+
+
+def prusa(*kinds: str) -> str:
+    """PrusaSlicer's: object 1, whose triangles are boxes one after the other."""
+    volumes = "".join(
+        f'<volume firstid="{12 * n}" lastid="{12 * n + 11}"><metadata type="volume" key="name" value="p"/>'
+        f'<metadata type="volume" key="{kind.split()[0]}" value="{kind.split()[1]}"/></volume>'
+        for n, kind in enumerate(kinds)
+    )
+    return f'<?xml version="1.0"?><config><object id="1" instances_count="1">{volumes}</object></config>'
+
+
+def merged(*sizes: tuple[float, float, float]) -> str:
+    """Object 1: several boxes with one corner in the origin, in one mesh."""
+    bodies = [trimesh.creation.box(size).apply_translation(np.array(size) / 2) for size in sizes]
+    whole = trimesh.util.concatenate(bodies)
+    vertices = "".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in whole.vertices.tolist())
+    faces = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in whole.faces.tolist())
+    return (
+        f'<object id="1" type="model"><mesh><vertices>{vertices}</vertices>'
+        f"<triangles>{faces}</triangles></mesh></object>"
+    )
+
+
+ASSEMBLED = '<object id="9" name="o"><components>{}</components></object>'
+MOVED = '<component objectid="2" transform="1 0 0 0 1 0 0 0 1 1 1 1"/>'
+
+SLICED = {
+    "a negative part": (orca("normal_part", "negative_part"), "not_counted", 1000 - 8),
+    "a modifier": (orca("normal_part", "modifier_part"), "not_counted", 1000),
+    "a support enforcer": (orca("normal_part", "support_enforcer"), "not_counted", 1000),
+    "a support blocker": (orca("normal_part", "support_blocker"), "not_counted", 1000),
+    "two parts": (orca("normal_part", "normal_part"), "", 1008),
+}
+
+
+@pytest.mark.parametrize("case", SLICED)
+@pytest.mark.parametrize("scattered", [False, True])
+def test_parts_of_bambu_and_orca(case: str, scattered: bool, write: Any, read_in: Any, codes_of: Any) -> None:
+    """A box of 10 mm, and one of 2 mm in it: subtracted or left out by the slicer's word; parts may lie in
+    files of their own."""
+    config, code, volume = SLICED[case]
+    boxes = box(1, (10, 10, 10)) + box(2, (2, 2, 2))
+    if scattered:
+        path = ' p:path="/3D/Objects/o.model"'
+        used = f'<component{path} objectid="1"/>' + MOVED.replace(" transform", f"{path} transform")
+        parts = {ROOT: model(ASSEMBLED.format(used), '<item objectid="9"/>')}
+        parts["3D/Objects/o.model"] = model(boxes, "")
+    else:
+        used = '<component objectid="1"/>' + MOVED
+        parts = {ROOT: model(boxes + ASSEMBLED.format(used), '<item objectid="9"/>')}
+    assembly = read_in(write({**parts, SETTINGS: config}))
+    total = sum(assembly.prototypes[i.prototype].volume_m3 for i in assembly.instances)
+    assert total == pytest.approx(volume * 1e-9)
+    codes = codes_of(assembly) + [c for p in assembly.prototypes.values() for c in codes_of(p)]
+    assert codes == ([code] if code else [])
+
+
+def test_a_negative_volume_cuts_where_it_stands(write: Any, read_in: Any) -> None:
+    """Both parts are placed, and only corners of 1 mm lie in each other."""
+    place = '<component objectid="{}" transform="1 0 0 0 1 0 0 0 1 {}"/>'
+    corner = box(1, (10, 10, 10)) + box(2, (2, 2, 2))
+    low, high = (5, 0, 0), (14, 9, 9)
+    used = place.format(1, "{} {} {}".format(*low)) + place.format(2, "{} {} {}".format(*high))
+    parts = model(corner + ASSEMBLED.format(used), '<item objectid="9"/>')
+    assembly = read_in(write({ROOT: parts, SETTINGS: orca("normal_part", "negative_part")}))
+    (instance,) = assembly.instances
+    assert assembly.prototypes[instance.prototype].volume_m3 == pytest.approx(999e-9)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "volume", "said"),
+    [
+        (("volume_type ModelPart", "volume_type NegativeVolume"), 1000 - 8, True),
+        (("volume_type ModelPart", "volume_type ParameterModifier"), 1000, True),
+        (("volume_type ModelPart", "volume_type SupportEnforcer"), 1000, True),
+        (("volume_type ModelPart", "volume_type SupportBlocker"), 1000, True),
+        (("modifier 0", "modifier 1"), 1000, True),
+        (("volume_type ModelPart",), 1000, False),
+    ],
+)
+def test_volumes_of_prusaslicer(
+    kinds: tuple[str, ...], volume: float, said: bool, write: Any, read_in: Any, codes_of: Any
+) -> None:
+    """The same, as ranges of the triangles of one mesh."""
+    sizes = [(10.0, 10.0, 10.0), (2.0, 2.0, 2.0)][: len(kinds)]
+    assembly = read_in(write({ROOT: model(merged(*sizes), ITEM), PRUSA: prusa(*kinds)}))
+    (part,) = assembly.prototypes.values()
+    assert part.volume_m3 == pytest.approx(volume * 1e-9)
+    assert ("not_counted" in codes_of(assembly) + codes_of(part)) == said
+
+
+@pytest.mark.parametrize("word", ["support", "anti_overhang", "infill", "cutting"])
+@pytest.mark.parametrize("said", ["True", "False"])
+def test_meshes_of_cura(word: str, said: str, write: Any, read_in: Any, codes_of: Any) -> None:
+    """Supports, blockers and modifiers are objects of their own, with a setting that says so."""
+    setting = (
+        f'<metadatagroup><metadata name="cura:{word}_mesh" type="xs:string">{said}</metadata></metadatagroup>'
+    )
+    boxes = box(1, (10, 10, 10)) + box(2, (2, 2, 2)).replace("<mesh>", setting + "<mesh>")
+    assembly = read_in(write({ROOT: model(boxes, ITEM + '<item objectid="2"/>')}))
+    left_out = said == "True"
+    volume = sum(p.volume_m3 for p in assembly.prototypes.values())
+    assert volume == pytest.approx(1e-6 if left_out else 1.008e-6)
+    assert codes_of(assembly) == ["not_counted"] * left_out
+
+
+@pytest.mark.parametrize("nested", ["what is cut", "what cuts"])
+def test_assemblies_and_negative_volumes(nested: str, write: Any, read_in: Any, codes_of: Any) -> None:
+    """Neither is cut, nor cuts; that is said, and nothing of it is sure."""
+    number = {"what is cut": 1, "what cuts": 2}[nested]
+    inner = f'<object id="8"><components><component objectid="{number}"/></components></object>'
+    used = '<component objectid="1"/><component objectid="2"/>'.replace(f'"{number}"', '"8"')
+    boxes = box(1, (10, 10, 10)) + box(2, (2, 2, 2)) + inner + ASSEMBLED.format(used)
+    parts = [
+        f'<part id="{8 if n == number else n}" subtype="{word}_part"/>'
+        for n, word in ((1, "normal"), (2, "negative"))
+    ]
+    config = f'<config><object id="9">{"".join(parts)}</object></config>'
+    assembly = read_in(write({ROOT: model(boxes, '<item objectid="9"/>'), SETTINGS: config}))
+    assert "invalid_shape" in codes_of(assembly)
+    assert "could not be subtracted" in " ".join(problem.message for problem in assembly.problems)
+
+
+@pytest.mark.parametrize("kind", ["support", "solidsupport", "surface", "other"])
+@pytest.mark.parametrize("inside", [True, False])
+def test_objects_of_another_type_are_left_out(
+    kind: str, inside: bool, write: Any, read_in: Any, codes_of: Any
+) -> None:
+    """Built by themselves or as a component; the message names them."""
+    boxes = box(1, (10, 10, 10)) + box(2, (2, 2, 2), "brim").replace('type="model"', f'type="{kind}"')
+    if inside:
+        used = '<component objectid="1"/><component objectid="2"/>'
+        parts = model(boxes + ASSEMBLED.format(used), '<item objectid="9"/>')
+    else:
+        parts = model(boxes, ITEM + '<item objectid="2"/>')
+    assembly = read_in(write({ROOT: parts}))
+    assert sum(p.volume_m3 for p in assembly.prototypes.values()) == pytest.approx(1e-6)
+    assert codes_of(assembly) == ["not_counted"]
+    assert "brim" in assembly.problems[0].message
+    assert kind in assembly.problems[0].message
+
+
+@pytest.mark.parametrize(
+    ("build", "why"), [('<item objectid="2" printable="0"/>', "not printed"), ("", "built by nothing")]
+)
+def test_what_is_not_printed_is_left_out(
+    build: str, why: str, write: Any, read_in: Any, codes_of: Any
+) -> None:
+    """By the item, or because no item names it."""
+    assembly = read_in(write({ROOT: model(box(1, (10, 10, 10)) + box(2, (2, 2, 2)), ITEM + build)}))
+    assert codes_of(assembly) == ["not_counted"]
+    assert why in assembly.problems[0].message
+
+
+def test_a_body_without_triangles_is_named(write: Any, read_in: Any, codes_of: Any) -> None:
+    """Beside one that has some: a lattice, or nothing at all."""
+    lattice = '<object id="2" name="lattice"><mesh><vertices/><triangles/></mesh></object>'
+    assembly = read_in(write({ROOT: model(box(1, (10, 10, 10)) + lattice, ITEM + '<item objectid="2"/>')}))
+    assert codes_of(assembly) == ["body_missing"]
+    assert "lattice" in assembly.problems[0].message
+
+
+def test_a_negative_volume_that_is_open_is_doubted(write: Any, read_in: Any, codes_of: Any) -> None:
+    """It cannot be subtracted, and nothing is pushed."""
+    holed = re.sub(r"<triangle [^>]*/>", "", box(2, (2, 2, 2)), count=1)
+    used = '<component objectid="1"/>' + MOVED
+    parts = model(box(1, (10, 10, 10)) + holed + ASSEMBLED.format(used), '<item objectid="9"/>')
+    assembly = read_in(write({ROOT: parts, SETTINGS: orca("normal_part", "negative_part")}))
+    (part,) = assembly.prototypes.values()
+    assert codes_of(part) == ["invalid_shape"]

@@ -32,12 +32,10 @@ from silo.bom.errors import DocumentError
 from silo.inertia.core import place
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.closure import beside_edges
-from silo.inertia.geometry.kernel.moments import solid_moments
-from silo.inertia.geometry.measured import Notes
+from silo.inertia.geometry.kernel.solids import beside_edges, solid_moments
 from silo.inertia.geometry.step.read import against_stated, stated_totals
 from silo.inertia.geometry.step.xcaf import Stated, StepFile
-from silo.inertia.model import GeometryCode, Prototype
+from silo.inertia.model import GeometryCode, Note, Prototype
 
 
 def compound(*shapes: Any) -> Any:
@@ -384,9 +382,9 @@ def test_a_spline_face_that_does_not_meet_its_edges_is_doubted(step_part: Any, b
     for offset, codes in ((0.0, []), (1e-2, [GeometryCode.NOT_CONVERGENT])):
         path.write_text(moved_surface(text, "PLANE", offset))
         (solid,) = occt.solids_of(imported(path))
-        notes: Notes = []
+        notes: list[Note] = []
         found = solid_moments(solid, 1e-8, notes)
-        assert [code for code, _ in notes] == codes
+        assert [note.code for note in notes] == codes
         assert abs(found.volume) == pytest.approx(math.pi**2 * 50, rel=1e-3)
 
 

@@ -14,8 +14,8 @@ from OCP.Interface import Interface_Static
 from OCP.Poly import Poly_Triangle, Poly_Triangulation
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shell, TopoDS_Solid
 
-from silo.inertia.geometry.kernel.tessellate import tessellated
-from silo.inertia.geometry.mesh import Mesh
+from silo.inertia.geometry.kernel.occt import tessellated
+from silo.inertia.geometry.together import Mesh
 from silo.inertia.model import GeometryCode
 
 GIVEN = GeometryCode.READER

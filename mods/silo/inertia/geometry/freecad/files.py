@@ -13,24 +13,22 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import DocumentError
-from silo.durable import remove_patiently
 from silo.fcstd import Library
-from silo.folders import scratch_folder
 from silo.inertia.core import is_rigid
-from silo.inertia.geometry.freecad.assembly import assembled
-from silo.inertia.geometry.freecad.members import top_object
 from silo.inertia.geometry.freecad.places import Entries, StoredFacts
-from silo.inertia.geometry.freecad.walk import Leaf, Walk
-from silo.inertia.geometry.graph import Floats
+from silo.inertia.geometry.freecad.walk import Leaf, Walk, assembled
+from silo.inertia.geometry.graph import Floats, Reading, ReadOptions, Report
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers, Task
-from silo.inertia.geometry.kernel.brep import load_shape
-from silo.inertia.geometry.kernel.solids import measure
+from silo.inertia.geometry.kernel.solids import load_shape, measure
 from silo.inertia.geometry.measured import Measured
-from silo.inertia.geometry.options import Reading, ReadOptions, Report
+from silo.platform import remove_patiently, scratch_folder
 
 
 def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Helpers | None = None) -> Reading:
-    """The assembly, part or loose bodies of an FCStd file, with what it links to. Raises DocumentError."""
+    """Return the assembly, part or loose bodies of an FCStd file, with what it links to.
+
+    Raises DocumentError.
+    """
     report("reading", 0, 0)
     helpers = helpers or Helpers()
     entries = Entries()
@@ -42,7 +40,7 @@ def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Help
             document = library.open(path)
             base = os.path.dirname(document.FileName).replace("\\", "/")
             walk = Walk(StoredFacts(entries), base, options.hardware)
-            top = walk.product(top_object(document, options.object_name))
+            top = walk.top(document, options.object_name)
             unpacked = _Unpacked(entries, Path(folder))
 
             def measured(leaves: Sequence[Leaf], done: Callable[[int, int], Any]) -> list[Measured | str]:
@@ -55,11 +53,7 @@ def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Help
                     except DocumentError as error:
                         return str, (error.reason,)
 
-                def here(leaf: Leaf) -> Measured | str:
-                    function, arguments = task(leaf)
-                    return function(*arguments)
-
-                return helpers.all(leaves, here, task, done)
+                return helpers.all(leaves, task, done)
 
             assembly = assembled(walk, top, str(path), options, measured, report)
     finally:
@@ -77,11 +71,11 @@ class _Unpacked:
         self._numbers = count()
 
     def size(self, leaves: Sequence[Leaf]) -> int:
-        """Of all their shapes, in bytes."""
+        """Return the size of all their shapes, in bytes."""
         return sum(self._entries.size(ref.handle.path, ref.handle.entry) for e in leaves for ref in e.shapes)
 
     def files(self, leaf: Leaf) -> list[_File]:
-        """One for each shape that is not empty. Raises DocumentError."""
+        """Yield a value for each shape that is not empty. Raises DocumentError."""
         found = []
         for ref in leaf.shapes:
             data = self._entries.read(ref.handle.path, ref.handle.entry)
@@ -102,7 +96,7 @@ class _File:
 
 
 def measured_files(files: Sequence[_File], eps: float, mesh_check: bool) -> Measured | str:
-    """One product, measured from its shapes in its axes, or what is wrong; the files are taken away.
+    """Return a product, measured from its shapes in its axes, or what is wrong; the files are taken away.
 
     FreeCAD keeps an object's placement as the location of its stored shape; that one is taken off, and the
     walk's own put in its place, since a link may leave it out.

@@ -18,13 +18,13 @@ import numpy as np
 
 from silo.bom.document import LinkProblem
 from silo.bom.errors import DocumentError
-from silo.inertia.geometry.freecad.facts import file_of
 from silo.inertia.geometry.freecad.stated_materials import (
     NOTHING,
     Material,
     card_material,
     linked_material,
 )
+from silo.inertia.geometry.freecad.walk import file_of
 from silo.inertia.geometry.graph import Floats
 
 MAX_ENTRY_BYTES = 1_000_000_000
@@ -44,7 +44,7 @@ class StoredShape:
 
 
 def placed(numbers: Floats) -> Floats:
-    """(4, 4) from x y z and the quaternion x y z w, as FreeCAD orders it; identity where it is none."""
+    """Return (4, 4) from x y z and the quaternion x y z w, as FreeCAD orders it; identity if it is none."""
     x, y, z, w = numbers[3:7]
     norm = x * x + y * y + z * z + w * w
     matrix = np.eye(4)
@@ -73,13 +73,13 @@ def _name(found: re.Match[bytes]) -> str:
 
 
 class StoredFacts:
-    """The facts from FCStd files; see :class:`silo.inertia.geometry.freecad.facts.Facts`."""
+    """The facts from FCStd files; see :class:`silo.inertia.geometry.freecad.walk.Facts`."""
 
     def __init__(self, entries: Entries) -> None:
         self._entries = entries
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
-        """(4, 4) [mm] of the object's own placement; the identity where it has none that is a number."""
+        """Return (4, 4) [mm] of the object's own placement; the identity if it has none that is a number."""
         found = _PLACEMENT.search(_piece(obj, name))
         if found is None:
             return np.eye(4)
@@ -91,7 +91,7 @@ class StoredFacts:
             return np.eye(4)
 
     def places(self, obj: Any) -> list[Floats]:
-        """The placements in the object's ``PlacementList``. DocumentError where they are damaged."""
+        """Return the placements in the object's ``PlacementList``. DocumentError if they are damaged."""
         found = _FILE.search(_piece(obj, "PlacementList"))
         data = self._entries.read(obj.Document.FileName, _name(found)) if found is not None else b""
         if len(data) < 4:
@@ -106,19 +106,19 @@ class StoredFacts:
         )
 
     def shape(self, obj: Any) -> StoredShape | None:
-        """The entry that holds the object's shape, None where it has none."""
+        """Return the entry that holds the object's shape, None if it has none."""
         found = _FILE.search(_piece(obj, "Shape"))
         return StoredShape(file_of(obj), _name(found)) if found is not None else None
 
     def material(self, obj: Any) -> Material:
-        """The material that is linked to the object, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
+        """Return the material that is linked to the object, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
         if (linked := linked_material(obj)) is not None:
             return linked
         found = _UUID.search(_piece(obj, "ShapeMaterial"))
         return card_material(found[1].decode("ascii").lower()) if found is not None else NOTHING
 
     def problem(self, link: Any) -> LinkProblem | None:
-        """What the reader of files left on the link."""
+        """Return what the reader of files left on the link."""
         problem = getattr(link, "LinkProblem", None)
         return problem if isinstance(problem, LinkProblem) else None
 
@@ -135,7 +135,7 @@ class Entries:
         return self._open[path], self._open[path].getinfo(name)
 
     def read(self, path: str, name: str) -> bytes:
-        """The bytes of one entry. Raises DocumentError."""
+        """Return the bytes of one entry. Raises DocumentError."""
         try:
             archive, info = self._info(path, name)
             if info.file_size > MAX_ENTRY_BYTES:
@@ -147,7 +147,7 @@ class Entries:
             raise DocumentError(path, f"its {name} cannot be unpacked: {error}") from error
 
     def size(self, path: str, name: str) -> int:
-        """How many bytes :meth:`read` would return; 0 where it would raise."""
+        """Return how many bytes :meth:`read` would return; 0 if it would raise."""
         try:
             return self._info(path, name)[1].file_size
         except (KeyError, OSError, zipfile.BadZipFile):

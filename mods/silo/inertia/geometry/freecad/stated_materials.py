@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from silo.bom.document import own
-from silo.inertia.materials.cards import card_of
-from silo.inertia.materials.density import DENSEST, LIGHTEST, parse_density
+from silo.inertia.materials import DENSEST, LIGHTEST, card_of, parse_density
 
 NO_MATERIAL = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
 """FreeCAD's "Default": what every untouched part has. Its 1 kg/m^3 is nobody's density."""
@@ -32,7 +31,7 @@ NOTHING = Material()
 
 
 def linked_material(obj: Any) -> Material | None:
-    """The material object that is linked to an object, stored or live; None where there is none."""
+    """Return the material object that is linked to an object, stored or live; None if there is none."""
     linked = own(obj, "Material")
     linked = linked[0] if isinstance(linked, tuple) and linked else linked
     told = own(linked, "Material") if linked is not None and not isinstance(linked, dict) else None
@@ -40,7 +39,7 @@ def linked_material(obj: Any) -> Material | None:
 
 
 def told_material(name: str, density: float | None) -> Material:
-    """A material by name and density [kg/m^3], of which only a sane one counts."""
+    """Return a material by name and density [kg/m^3], of which only a sane one counts."""
     sane = _sane(density)
     if sane is None:
         return Material(name, problem=f"its material '{name}' has no density that can be used")
@@ -58,7 +57,7 @@ def _from_map(told: dict[str, str]) -> Material:
 
 
 def card_material(uuid: str) -> Material:
-    """The material of a card in an installed FreeCAD, or what is wrong with it."""
+    """Return the material of a card in an installed FreeCAD, or what is wrong with it."""
     if uuid == NO_MATERIAL:
         return NOTHING
     card = card_of(uuid)

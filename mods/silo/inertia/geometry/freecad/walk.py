@@ -1,40 +1,88 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""From FreeCAD objects to products and their uses: what :mod:`silo.bom.links` counts, with the placements.
+"""From FreeCAD objects to products and their uses: the chains of :mod:`silo.bom.walk.roles`, with placements.
 
-How FreeCAD places things (``src/App/Link.cpp``, tried with 0.20 and 1.0):
+Nothing here decides what counts. How FreeCAD places things (``src/App/Link.cpp``, tried with 0.20 and 1.0):
 
 * a member of a part or an assembly stands at its own ``Placement`` in it;
 * a link stands at its own placement, then its scale, then its element's placement and scale; the target's own
   placement counts only with ``LinkTransform``, and the same holds at every hop of a chain;
 * an AssemblyLink is a link without it; a flexible one has the placements of its own copies.
 
-What counts: links as in the BOM, hidden or not; of geometry modelled in place, what no sibling consumes (the
-operands of a cut), and of that the visible, where any is. A standard part is one product for each
-designation, wherever it lies, and has the shape of its first occurrence.
+A standard part is one product for each designation, wherever it lies, and has the shape of its first
+occurrence. Lengths are mm here, as FreeCAD has them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
-from silo.bom.document import derived, label_of, object_name, own, relative, same_document
+from silo.bom.document import LinkProblem, derived, first_of, label_of, object_name, own, relative
+from silo.bom.errors import DocumentError, InputError, listed
+from silo.bom.findings import FindingCode
 from silo.bom.model import BomEntry
-from silo.bom.naming import display_name
-from silo.bom.roots import loose_hardware, silent_reader
-from silo.bom.walk.contents import Reader
-from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of, sources
+from silo.bom.resolve import display_name
+from silo.bom.roots import choose_assembly, silent_reader
+from silo.bom.walk.kinds import (
+    REPEATERS,
+    Kind,
+    elements,
+    is_container,
+    is_named_assembly,
+    kind_of,
+    left_out_by,
+)
 from silo.bom.walk.standard import STANDARD_PARTS
-from silo.bom.walk.targets import is_assembly_link, is_link
-from silo.inertia.geometry.freecad.facts import Facts, element_places, file_of, link_placement, scale
-from silo.inertia.geometry.freecad.members import MODELLED, child_named, counted, steps_of
+from silo.bom.walk.targets import Step, is_assembly_link, is_link
+from silo.bom.walk.tree import Contents, Count, Key, Lost, Shown
+from silo.inertia.geometry import measured as checks
 from silo.inertia.geometry.freecad.stated_materials import NOTHING, Material
-from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, in_metres
+from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, ReadOptions, Report, in_metres, unfold
+from silo.inertia.geometry.measured import Measured
+from silo.inertia.model import Assembly, GeometryCode, Note, Prototype
 
-MAX_HOPS = 64
+MAX_ELEMENTS = 1_000_000
+# What a finding of the count means for the mass.
+_TOLD = {
+    FindingCode.CYCLE: "cycle",
+    FindingCode.NO_HARDWARE: "no_hardware",
+    FindingCode.VARIANT: "variant",
+    **dict.fromkeys(
+        (
+            *(FindingCode.SUPPRESSED, FindingCode.EXCLUDED, FindingCode.SUB_ELEMENT_LINK),
+            *(FindingCode.UNSET_LINK, FindingCode.BROKEN_LINK, FindingCode.TOO_DEEP),
+        ),
+        "not_counted",
+    ),
+}
+
+
+class Facts(Protocol):
+    """What a mass needs of objects and a BOM does not, from files (``places.StoredFacts``) or from FreeCAD
+    (``silo.workbench.mass.shapes``)."""
+
+    def placement(self, obj: Any, name: str = "Placement") -> Floats:
+        """(4, 4) of an object's own placement; the identity where it has none."""
+        ...
+
+    def places(self, obj: Any) -> list[Floats]:
+        """(4, 4) each, the object's own ``PlacementList``."""
+        ...
+
+    def shape(self, obj: Any) -> Any:
+        """A handle on the object's shape for whoever measures it; None where it has no such property."""
+        ...
+
+    def material(self, obj: Any) -> Material:
+        """The material that the object itself states."""
+        ...
+
+    def problem(self, link: Any) -> LinkProblem | None:
+        """Why a link has no target, as far as that is known."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +102,13 @@ class Leaf:
     broken: str = ""
 
 
+# An object, the flexible AssemblyLink that it is shown by, and (4, 4) from its axes to those around.
+_Placed = tuple[Any, Any, Floats]
+
+
 @dataclass(eq=False)
 class Walk:
-    """Products of FreeCAD documents, each once; ``notes`` in plain words by code, each once.
+    """Products of FreeCAD documents, each once.
 
     hardware
         False leaves standard parts out.
@@ -69,66 +121,95 @@ class Walk:
     leaves: dict[str, Leaf] = field(default_factory=dict)
     documents: set[str] = field(default_factory=set)
     absent: set[str] = field(default_factory=set)
-    notes: dict[str, list[str]] = field(default_factory=dict)
+    _noted: dict[str, list[str]] = field(default_factory=dict)
     _open: list[str] = field(default_factory=list)
-    _reader: Reader = field(default_factory=silent_reader)
 
-    def note(self, code: str, message: str) -> None:
-        """Keep one remark."""
-        listed = self.notes.setdefault(code, [])
-        if message not in listed:
-            listed.append(message)
+    def __post_init__(self) -> None:
+        self._reader = silent_reader(
+            hardware=self.hardware, counts_beside=True, inspect=lambda link: self.facts.problem(link)
+        )
+
+    def problems(self) -> list[Note]:
+        """What was left out, or counted with a doubt."""
+        for finding in self._reader.notes.findings():
+            if finding.code in _TOLD:
+                self._note(_TOLD[finding.code], finding.message)
+        return [Note(code, message) for code, told in self._noted.items() for message in told]
+
+    def _note(self, code: str, message: str) -> None:
+        told = self._noted.setdefault(code, [])
+        if message not in told:
+            told.append(message)
 
     # --- products ------------------------------------------------------------------------------------------
 
+    def top(self, document: Any, name: str | None) -> str:
+        """The key of what is to be measured: the named object, the assembly, or the document's own part."""
+        found = document.getObject(name) if name is not None else None
+        try:
+            top = found if found is not None else choose_assembly(document, name)
+        except InputError as error:
+            raise DocumentError(document.FileName, str(error)) from error
+        if getattr(top, "is_document_root", False) and (contents := self._reader.contents(top)).is_part:
+            top = contents.own[0].target
+        return self.product(top)
+
     def product(self, obj: Any, copies: Any = None) -> str:
-        """The key of the product ``obj``, in its own axes; ``copies``: a flexible AssemblyLink of it."""
+        """The key of the product ``obj``, in its own axes.
+
+        copies
+            a flexible AssemblyLink of it; or the object itself, if its own shape is all that there is.
+        """
         self.documents.add(file_of(obj))
         key = self._key(obj)
-        if copies is not None:
+        if copies is not None and copies is not obj:
             key += f" as in {object_name(copies)} of {file_of(copies)}"
         if key in self.nodes:
             return key
         if key in self._open or len(self._open) > MAX_DEPTH:
-            self.note("cycle", f"“{label_of(obj)}” contains itself; it is left out where the ring closes")
+            self._note("cycle", f"“{label_of(obj)}” contains itself; it is left out where the ring closes")
             return self._nothing(obj, "it contains itself")
         self._open.append(key)
-        holds = is_container(obj) and kind_of(obj) not in REPEATERS
-        if holds or getattr(obj, "is_document_root", False):
-            self._container(key, obj, self._moved(copies))
+        is_root = bool(getattr(obj, "is_document_root", False))
+        holds = copies is not obj and (is_root or is_container(obj))
+        contents = self._reader.contents(obj) if holds else Contents()
+        if contents.counts or contents.own or (holds and kind_of(obj) not in REPEATERS):
+            self._container(key, obj, contents, self._moved(copies))
         else:
             self._leaf(key, obj, [(obj, np.eye(4))])
         self._open.pop()
         return key
 
-    def _container(self, key: str, obj: Any, moved: dict[str, Floats]) -> None:
-        found = counted(obj, self.facts, self.note)
-        shapes = [member for member in found if kind_of(member) in (*MODELLED, Kind.FOREIGN)]
-        materials = {self.facts.material(member) for member in shapes}
-        own_material = self.facts.material(obj)
-        one_piece = len(shapes) == len(found) and (own_material != NOTHING or len(materials) <= 1)
-        if shapes and one_piece and not is_named_assembly(obj):
-            self._leaf(key, obj, [(member, self.facts.placement(member)) for member in shapes])
+    def _container(self, key: str, obj: Any, contents: Contents, moved: dict[str, Floats]) -> None:
+        if contents.hidden:
+            names = listed([f"“{label_of(one)}”" for one in contents.hidden], 4)
+            self._note("hidden", f"bodies hidden beside visible ones are not counted: {names}")
+        shapes = [one for count in contents.own for one in self._uses(obj, count, contents, moved)]
+        bodies = [(end, place) for end, _, place in shapes if not is_container(end)]
+        materials = {self.facts.material(end) for end, _ in bodies}
+        mine = self.facts.material(obj)
+        one_piece = not contents.counts and len(bodies) == len(shapes)
+        if bodies and one_piece and (mine != NOTHING or len(materials) <= 1) and not is_named_assembly(obj):
+            self._leaf(key, obj, bodies)
             return
         children: list[Child] = []
-        for member in found:
-            children += self._uses(member, moved.get(object_name(member)))
-        if beside := loose_hardware(obj, self._reader):
-            inwards = np.linalg.inv(in_metres(self.facts.placement(obj)))
-            for member in beside:
-                children += [
-                    replace(use, transform=inwards @ use.transform) for use in self._uses(member, None)
-                ]
+        for count in (*contents.own, *contents.counts):
+            for end, copies, place in self._uses(obj, count, contents, moved):
+                if not isinstance(end, Lost) and derived(end, "Mesh::Feature"):
+                    self._note(
+                        "not_counted", f"“{label_of(end)}” is a mesh and no solid; its mass is not counted"
+                    )
+                    continue
+                product = self._lost(end) if isinstance(end, Lost) else self.product(end, copies)
+                children.append(Child(label_of(count.shown.obj), product, in_metres(place)))
         self.nodes[key] = Node(key, self._name(obj), tuple(children))
 
     def _moved(self, link: Any) -> dict[str, Floats]:
         """Member name in the real assembly → where a flexible AssemblyLink's copy of it stands."""
         places: dict[str, Floats] = {}
         for copy in (getattr(link, "Group", None) or ()) if link is not None else ():
-            original = getattr(copy, "LinkedObject", None)
-            original = original[0] if isinstance(original, tuple) else original
-            if original is not None:
-                places[object_name(original)] = link_placement(copy, self.facts)
+            if (original := first_of(getattr(copy, "LinkedObject", None))) is not None:
+                places[object_name(original)] = self._link_placement(copy)
         return places
 
     def _leaf(self, key: str, obj: Any, shapes: Sequence[tuple[Any, Floats]]) -> None:
@@ -149,6 +230,12 @@ class Walk:
         self.leaves[key] = Leaf(broken=reason)
         return key
 
+    def _lost(self, lost: Lost) -> str:
+        file = lost.file.replace("\\", "/")
+        self.absent.add(file)
+        stem = file.rpartition("/")[2].rpartition(".")[0]
+        return self._nothing(lost, f"its file {relative(file, self.base)} cannot be read", stem)
+
     def _key(self, obj: Any) -> str:
         designation, registered = self._reader.standard(obj)
         return product_key(file_of(obj), object_name(obj), "" if registered else designation, self.base)
@@ -164,129 +251,241 @@ class Walk:
         )
         return display_name(entry)
 
-    def _left_out(self, obj: Any) -> bool:
-        """True for standard parts where they are left out; says so."""
-        if self.hardware or not self._is_hardware(obj):
-            return False
-        self.note("no_hardware", "standard parts are left out, as asked: the masses are those of the others")
-        return True
+    # --- where its instances stand ---
 
-    def _is_hardware(self, obj: Any) -> bool:
-        """True for a standard part, and for arrays, compounds and copies of nothing else."""
-        if kind_of(obj) is Kind.STANDARD:
-            return True
-        shown = sources(obj) if kind_of(obj) in REPEATERS else []
-        return bool(shown) and all(map(self._is_hardware, shown))
+    def _uses(
+        self, container: Any, count: Count, contents: Contents, moved: dict[str, Floats]
+    ) -> Iterator[_Placed]:
+        """Every instance of a component in the axes of the container."""
+        shown = count.shown
+        if count.quantity > MAX_ELEMENTS:
+            words = f"{label_of(shown.obj)} claims {count.quantity} elements"
+            raise DocumentError(file_of(container), words)
+        if contents.tree is None:
+            yield from self._placed(shown, count.key, False)
+            return
+        paths = [()] if count.beside else contents.tree.paths(self._reader.key(shown.obj))
+        for path in paths:
+            around = np.linalg.inv(self.facts.placement(container)) if count.beside else np.eye(4)
+            first = moved.get(object_name((*path, shown.obj)[0]))
+            for number, holder in enumerate(path):
+                own_place = self.facts.placement(holder)
+                around = around @ (own_place if number or first is None else first)
+            here = first if not path else None
+            for end, copies, place in self._placed(shown, count.key, True, here):
+                yield end, copies, around @ place
 
-    # --- uses ----------------------------------------------------------------------------------------------
+    def _placed(
+        self, node: Shown, key: Key, with_place: bool, moved: Floats | None = None
+    ) -> Iterator[_Placed]:
+        """What an object shows of a component, in the axes around the object.
 
-    def _uses(self, member: Any, moved: Floats | None) -> list[Child]:
-        name = label_of(member)
-        kind = kind_of(member)
-        if self._left_out(member):
-            return []
-        if kind is Kind.DRAFT_ARRAY:
-            return self._draft_array(member)
-        if kind is Kind.COMPOUND and self._is_hardware(member):
-            outer = self.facts.placement(member)
-            uses = (use for source in sources(member) for use in self._resolved(source, True, None, MAX_HOPS))
-            return [Child(name, key, in_metres(outer @ inner)) for key, inner in uses]
-        if kind in (Kind.LINK, Kind.ASSEMBLY_LINK):
-            self._remark(member)
-        found = self._resolved(member, True, moved, MAX_HOPS)
-        return [Child(name, key, in_metres(matrix)) for key, matrix in found]
+        with_place
+            with the object's own placement; ``moved`` stands for it.
+        """
+        obj, kind = node.obj, node.kind
+        if kind in (Kind.LINK, Kind.ELEMENT, Kind.ASSEMBLY_LINK):
+            yield from self._linked(node, key, with_place, moved)
+            return
+        outer = self.facts.placement(obj) if with_place else np.eye(4)
+        outer = outer if moved is None else moved
+        below = [inner for inner, _ in node.below if key in inner.worth]
+        if not below:
+            yield node.worth[key][0], None, outer
+        elif node.tree is not None:
+            for inner in below:
+                for path in node.tree.paths(self._reader.key(inner.obj)):
+                    around = outer
+                    for holder in path:
+                        around = around @ self.facts.placement(holder)
+                    yield from _moved_by(around, self._placed(inner, key, True))
+        elif kind is Kind.DRAFT_ARRAY:
+            yield from self._draft_array(node, key, outer, below)
+        else:
+            is_copy = kind is Kind.COPY
+            if derived(obj, "Part::Mirroring"):
+                outer, is_copy = _mirror(obj), False
+            for inner in below:
+                yield from _moved_by(outer, self._placed(inner, key, not is_copy))
 
-    def _resolved(
-        self, obj: Any, with_place: bool, moved: Floats | None, hops: int
-    ) -> list[tuple[str, Floats]]:
-        """Products that an object stands for, each with (4, 4) [mm] from its axes to those around ``obj``."""
-        if hops <= 0:
-            return [(self._nothing(obj, "its chain of links does not end"), np.eye(4))]
-        own_place = moved if moved is not None else link_placement(obj, self.facts)
-        outer = own_place if with_place else np.eye(4)
-        if is_assembly_link(obj):
-            flexible = obj if own(obj, "Rigid") is False else None
-            return [(key, outer @ inner) for key, inner in self._followed(obj, False, hops, flexible)]
-        if is_link(obj) or derived(obj, "App::LinkElement"):
-            outer = outer @ scale(obj)
-            inside = self._followed(obj, own(obj, "LinkTransform") is True, hops, None)
-            places = element_places(obj, self.facts) if is_link(obj) else [np.eye(4)]
-            return [(key, outer @ place @ inner) for place in places for key, inner in inside]
-        if self._left_out(obj):
-            return []
-        return [(self.product(obj), outer)]
+    def _draft_array(self, node: Shown, key: Key, outer: Floats, below: list[Shown]) -> Iterator[_Placed]:
+        obj = node.obj
+        places = self.facts.places(obj)
+        if not places and self.facts.shape(obj) is not None:
+            yield obj, obj, outer  # one shape, as older FreeCADs save arrays without links
+            return
+        for inner in below:
+            seen = list(self._placed(inner, key, own(obj, "LinkTransform") is True))
+            if not places:
+                words = f"the array “{label_of(obj)}” was saved without its placements; counted once"
+                self._note("not_counted", words)
+            for place in places or [np.eye(4)]:
+                yield from _moved_by(outer @ place, seen)
 
-    def _followed(self, link: Any, with_place: bool, hops: int, flexible: Any) -> list[tuple[str, Floats]]:
-        target = getattr(link, "LinkedObject", None)
-        sub: Any = ""
-        if isinstance(target, tuple):
-            target, sub = target
-        if target is None:
-            return [(self._broken(link), np.eye(4))]
-        steps = steps_of(sub)
-        if steps is None:  # a reference to a face or an edge of something is no component
-            words = f"“{label_of(link)}” leads to {sub} of a part and not to a part; it has no mass"
-            self.note("not_counted", words)
-            return []
-        if flexible is not None and not is_assembly_link(target):
-            return [(self.product(target, copies=flexible), np.eye(4))]
-        if not steps:
-            return self._resolved(target, with_place, None, hops - 1)
-        outer = self.facts.placement(target) if with_place else np.eye(4)
-        for step in steps[:-1]:
-            target = child_named(target, step)
-            if target is None:
-                return [(self._broken(link, step), np.eye(4))]
-            outer = outer @ self.facts.placement(target)
-        last = child_named(target, steps[-1])
-        if last is None:
-            return [(self._broken(link, steps[-1]), np.eye(4))]
-        return [(key, outer @ inner) for key, inner in self._resolved(last, True, None, hops - 1)]
+    def _linked(self, node: Shown, key: Key, with_place: bool, moved: Floats | None) -> Iterator[_Placed]:
+        target = self._reader.resolve(node.obj)
+        steps = target.way or (Step(node.obj),)
+        around = self._along(steps, with_place, moved)
+        below = [inner for inner, _ in node.below if key in inner.worth]
+        last = steps[-1].obj
+        is_placed = own(last, "LinkTransform") is True if target.by_link else bool(target.way)
+        if target.variant is not None or not below:
+            end = target.obj if target.variant is None else target.variant
+            if end is None:
+                end = node.worth[key][0]
+            elif is_placed:
+                around = [place @ self.facts.placement(end) for place in around]
+            flexible = is_assembly_link(last) and own(last, "Rigid") is False
+            for place in around:
+                yield end, last if flexible else None, place
+            return
+        # What somebody put into a flexible AssemblyLink himself stands in the link's own axes.
+        own_parts = is_assembly_link(node.obj)
+        for inner in below:
+            seen = list(self._placed(inner, key, own_parts or is_placed))
+            for place in around:
+                yield from _moved_by(place, seen)
 
-    def _broken(self, link: Any, missing: str = "") -> str:
-        problem = self.facts.problem(link)
-        if missing or problem is None:
-            return self._nothing(link, f"its target {missing or 'is gone'} cannot be found")
-        if problem.file:
-            stem = problem.file.replace("\\", "/").rpartition("/")[2].rpartition(".")[0]
-            self.absent.add(f"{file_of(link).rpartition('/')[0]}/{problem.file}")
-            why = problem.detail or problem.code.value.replace("_", " ")
-            return self._nothing(link, f"its file {problem.file} cannot be read: {why}", stem)
-        return self._nothing(link, "its target is unset or gone")
+    def _along(self, steps: Sequence[Step], with_place: bool, moved: Floats | None) -> list[Floats]:
+        """(4, 4) of each instance that a chain of links shows."""
+        around = [np.eye(4)]
+        for number, step in enumerate(steps):
+            obj = step.obj
+            is_placed = own(steps[number - 1].obj, "LinkTransform") is True if step.by_link else True
+            here = np.eye(4)
+            if number == 0 and moved is not None:
+                here = moved
+            elif is_placed and (number or with_place):
+                here = self._link_placement(obj)
+            places = [here]
+            if is_link(obj) or derived(obj, "App::LinkElement"):
+                here = here @ scale(obj)
+                places = [here @ one for one in self._element_places(obj, step.index)]
+            around = [outer @ one for outer in around for one in places]
+        return around
 
-    def _draft_array(self, array: Any) -> list[Child]:
-        base = getattr(array, "Base", None)
-        base = base[0] if isinstance(base, tuple) else base
-        places = self.facts.places(array)
-        if base is None or (not places and self.facts.shape(array) is not None):
-            return [Child(label_of(array), self.product(array), in_metres(self.facts.placement(array)))]
-        count = own(array, "Count", 0)
-        if not places and isinstance(count, int) and count > 1:
-            words = f"the array “{label_of(array)}” was saved without its {count} placements; counted once"
-            self.note("not_counted", words)
-        inside = self._resolved(base, own(array, "LinkTransform") is True, None, MAX_HOPS)
-        outer = self.facts.placement(array)
+    def _link_placement(self, link: Any) -> Floats:
+        """A link's own placement; ``Placement`` and ``LinkPlacement`` are equal if both exist."""
+        names = getattr(link, "PropertiesList", ())
+        has_both = "Placement" in names or "LinkPlacement" not in names
+        return self.facts.placement(link, "Placement" if has_both else "LinkPlacement")
+
+    def _element_places(self, link: Any, index: int | None) -> list[Floats]:
+        """(4, 4) [mm] of each element of a link array that is not left out; one identity for a plain link."""
+        count = own(link, "ElementCount", 0)
+        if not is_link(link) or not isinstance(count, int) or count <= 0:
+            return [np.eye(4)]
+        if count > MAX_ELEMENTS:
+            raise DocumentError(file_of(link), f"the link {link.Name} claims {count} elements")
+        if len(listed_ones := elements(link)) == count:
+            wanted = listed_ones if index is None else listed_ones[index : index + 1]
+            return [
+                self._link_placement(one) @ scale(one)
+                for one in wanted
+                if index is not None or not left_out_by(one)
+            ]
+        places = self.facts.places(link)
+        scales = [_diagonal(list(vector)) for vector in own(link, "ScaleList") or ()]
+        one = np.eye(4)
         return [
-            Child(label_of(array), key, in_metres(outer @ place @ inner))
-            for place in places or [np.eye(4)]
-            for key, inner in inside
+            (places[n] if n < len(places) else one) @ (scales[n] if n < len(scales) else one)
+            for n in (range(count) if index is None else [index])
         ]
 
-    def _remark(self, link: Any) -> None:
-        target = getattr(link, "LinkedObject", None)
-        target = target[0] if isinstance(target, tuple) else target
-        if target is not None and same_document(target.Document, link.Document):
-            if own(link, "LinkCopyOnChangeSource") is not None:
-                words = f"“{label_of(link)}” is a variant of its part; its mass is that of the variant"
-                self.note("variant", words)
-            elif not self._is_hardware(target):
-                self.note(
-                    "in_document",
-                    f"“{label_of(link)}” is a link within its own document: its mass counts, "
-                    "though it is no line of the BOM",
-                )
+
+def _moved_by(outer: Floats, placed: Any) -> Iterator[_Placed]:
+    for end, copies, place in placed:
+        yield end, copies, outer @ place
+
+
+def _mirror(obj: Any) -> Floats:
+    """(4, 4) [mm] of the plane that a mirror image is mirrored at."""
+    normal, base = (np.array(tuple(own(obj, name) or (0.0, 0.0, 0.0)), float) for name in ("Normal", "Base"))
+    length = float(np.linalg.norm(normal))
+    matrix = np.eye(4)
+    if np.isfinite(length) and length > 1e-12:
+        normal = normal / length
+        matrix[:3, :3] -= 2 * np.outer(normal, normal)
+        matrix[:3, 3] = 2 * normal * float(normal @ base)
+    return matrix
+
+
+def file_of(obj: Any) -> str:
+    """The path of the object's file, with "/"; "" while it is unsaved."""
+    name = getattr(getattr(obj, "Document", None), "FileName", "") or ""
+    return name.replace("\\", "/")
+
+
+def scale(link: Any) -> Floats:
+    """(4, 4) diagonal of a link's scale. A zero would flatten the part; FreeCAD takes it as 1."""
+    vector = own(link, "ScaleVector")
+    parts = list(vector) if vector is not None else []
+    factor = own(link, "Scale")
+    if not parts and isinstance(factor, int | float):
+        parts = [float(factor)] * 3
+    return _diagonal(parts)
+
+
+def _diagonal(parts: list[float]) -> Floats:
+    matrix = np.eye(4)
+    for axis, part in enumerate(parts[:3]):
+        if np.isfinite(part) and abs(part) > 1e-9:
+            matrix[axis, axis] = part
+    return matrix
 
 
 def product_key(path: str, name: str, designation: str, base: str) -> str:
     """What identifies a product: a standard part by its designation, any other by its file and its object."""
     return f"{STANDARD_PARTS}{designation}" if designation else f"{relative(path, base)}#{name}"
+
+
+# --- the assembly, whoever measures the shapes ---
+
+Measure = Callable[[Sequence[Leaf], Callable[[int, int], Any]], Sequence[Measured | str]]
+"""Measures products, or says why the shapes of one cannot be had; calls back with (number, of how many)."""
+
+
+def assembled(
+    walk: Walk, top: str, source: str, options: ReadOptions, measure: Measure, report: Report
+) -> Assembly:
+    """The assembly that the walk found below the product ``top``. InputError where it does not end."""
+    name = walk.nodes[top].name
+    unfolded = unfold(walk.nodes, [Child(name, top)], options.max_instances)
+    keys = unfolded.placed
+    found = measure(
+        [walk.leaves[key] for key in keys], lambda number, total: report("measuring", number, total)
+    )
+    prototypes = {key: _prototype(walk, key, one) for key, one in zip(keys, found, strict=True)}
+    problems = walk.problems()
+    return checks.assembled(unfolded, prototypes, problems, name=name, source=source, unit="mm")
+
+
+def one_by_one(measure: Callable[[Leaf], Measured]) -> Measure:
+    """One product after the other; ``measure`` raises DocumentError where the shapes cannot be had."""
+
+    def measured(leaves: Sequence[Leaf], done: Callable[[int, int], Any]) -> list[Measured | str]:
+        found: list[Measured | str] = []
+        for number, leaf in enumerate(leaves, start=1):
+            done(number, len(leaves))
+            try:
+                found.append(measure(leaf))
+            except DocumentError as error:
+                found.append(error.reason)
+        return found
+
+    return measured
+
+
+def _prototype(walk: Walk, key: str, found: Measured | str) -> Prototype:
+    leaf = walk.leaves[key]
+    measured = Measured((), (), None, False) if isinstance(found, str) else found
+    broken = leaf.broken or (found if isinstance(found, str) else "")
+    stated = leaf.material
+    return measured.prototype(
+        key,
+        walk.nodes[key].name,
+        *([Note("material", stated.problem)] if stated.problem else []),
+        empty=Note(GeometryCode.NO_GEOMETRY, broken) if broken else None,
+        step_density=stated.density,
+        step_material=stated.name,
+    )

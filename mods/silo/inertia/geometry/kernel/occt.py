@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The one door to the geometry kernel: OpenCASCADE through OCP 8.
+"""What is asked of the geometry kernel everywhere: labels, parts of shapes, triangles, placements.
 
 Importing this module imports the kernel (half a second and 200 MB): only the readers do, and they run in a
 child process.
@@ -7,36 +7,16 @@ child process.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
-from silo.bom.errors import ConfigError
-
-try:
-    import OCP
-except ModuleNotFoundError as error:  # pragma: no cover - the development environment always has it
-    raise ConfigError(
-        "STEP files and FreeCAD shapes need the geometry kernel, which is not installed: "
-        'pip install "silo-mod[inertia]"'
-    ) from error
-
-if int(OCP.__version__.split(".")[0]) < 8:  # pragma: no cover - the development environment has a newer one
-    raise ConfigError(
-        f"the geometry kernel OCP {OCP.__version__} loses placements that scale or mirror; wanted version 8: "
-        'pip install "silo-mod[inertia]"'
-    )
-
-try:
-    from OCP.BRep import BRep_Tool
-except ImportError as error:  # pragma: no cover - a machine without a desktop's libraries
-    if "cannot open shared object file" not in str(error):
-        raise
-    raise ConfigError(
-        f"the geometry kernel lacks a library of the system ({error}). "
-        "On Debian and Ubuntu: apt-get install libgl1"
-    ) from error
-
+import numpy as np
+from OCP.Bnd import Bnd_Box
+from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
+from OCP.BRepBndLib import BRepBndLib
+from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepTools import BRepTools
 from OCP.collections import Sequence_TDF_Label
 from OCP.GeomAbs import (
     GeomAbs_Circle,
@@ -51,9 +31,12 @@ from OCP.Message import Message
 from OCP.TCollection import TCollection_AsciiString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Tool
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHAPE, TopAbs_SHELL, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHAPE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
-from OCP.TopoDS import TopoDS
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS, TopoDS_Iterator
+
+from silo.inertia.geometry.together import Floats, Mesh, joined, mesh_volume
 
 _ELEMENTARY = (GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus)
 
@@ -66,27 +49,27 @@ def quiet() -> None:
 
 
 def labels(fill: Callable[[Any], Any]) -> list[Any]:
-    """The labels that ``fill`` puts into the kernel's sequence."""
+    """Return the labels that ``fill`` puts into the kernel's sequence."""
     sequence = Sequence_TDF_Label()
     fill(sequence)
     return [sequence.Value(i) for i in range(1, sequence.Length() + 1)]
 
 
 def entry(label: Any) -> str:
-    """The label's address in its document, such as ``0:1:1:3``."""
+    """Return the label's address in its document, such as ``0:1:1:3``."""
     text = TCollection_AsciiString()
     TDF_Tool.Entry_s(label, text)
     return str(text.ToCString())
 
 
 def name_of(label: Any) -> str:
-    """The label's name, "" where it has none."""
+    """Return the label's name, "" if it has none."""
     attribute = attribute_of(label, TDataStd_Name)
     return str(attribute.Get().ToExtString()) if attribute is not None else ""
 
 
 def attribute_of(label: Any, kind: Any) -> Any | None:
-    """The label's attribute of class ``kind``, or None.
+    """Return the label's attribute of class ``kind``, or None.
 
     Asked with IsAttribute first: FindAttribute on a label without the attribute ends the process with a
     segmentation fault for some classes (seen in 7.9 and 8.0).
@@ -99,47 +82,50 @@ def attribute_of(label: Any, kind: Any) -> Any | None:
 
 
 def solids_of(shape: Any) -> list[Any]:
-    """All solids of a shape, placed."""
+    """Return all solids of a shape, placed."""
     return _explored(shape, TopAbs_SOLID)
 
 
 def faces_of(shape: Any) -> list[Any]:
-    """All faces of a shape, placed and oriented."""
+    """Return all faces of a shape, placed and oriented."""
     return [TopoDS.Face(face) for face in _explored(shape, TopAbs_FACE)]
 
 
 def edges_of(shape: Any) -> list[Any]:
-    """All edges of a face or a solid, each as often as it is used: a seam twice."""
+    """Return all edges of a face or a solid, each as often as it is used: a seam twice."""
     return [TopoDS.Edge(edge) for edge in _explored(shape, TopAbs_EDGE)]
 
 
 def loose_shells_of(shape: Any) -> list[Any]:
-    """The shells of a shape that stand in no solid, placed."""
+    """Return the shells of a shape that stand in no solid, placed."""
     return _explored(shape, TopAbs_SHELL, TopAbs_SOLID)
 
 
 def loose_faces_of(shape: Any) -> list[Any]:
-    """The faces of a shape that stand in no shell, placed and oriented."""
+    """Return the faces of a shape that stand in no shell, placed and oriented."""
     return [TopoDS.Face(face) for face in _explored(shape, TopAbs_FACE, TopAbs_SHELL)]
 
 
 def has_edges(shape: Any) -> bool:
-    """True where there is any edge, in a face or alone."""
+    """Report whether there is any edge, in a face or alone."""
     return not shape.IsNull() and TopExp_Explorer(shape, TopAbs_EDGE).More()
 
 
 def has_surface(face: Any) -> bool:
-    """False for a face that holds triangles only (tessellated STEP)."""
+    """Report whether a face has more than triangles (tessellated STEP)."""
     return BRep_Tool.Surface_s(face) is not None
 
 
 def is_elementary(face: Any) -> bool:
-    """True for a plane, a cylinder, a cone, a sphere or a torus."""
+    """Report whether it is a plane, a cylinder, a cone, a sphere or a torus."""
     return BRepAdaptor_Surface(face, False).GetType() in _ELEMENTARY
 
 
 def is_plain(solid: Any) -> bool:
-    """True where all faces are elementary, and all edges straight or round in them: integrals are exact."""
+    """Report whether all faces are elementary, and all edges straight or round in them.
+
+    Integrals are exact.
+    """
     for face in faces_of(solid):
         surface = BRepAdaptor_Surface(face, False).GetType()
         if surface not in _ELEMENTARY:
@@ -152,9 +138,20 @@ def is_plain(solid: Any) -> bool:
 
 
 def is_flat(solid: Any) -> bool:
-    """True where all faces are planes and all edges straight: its triangles are the very solid."""
+    """Report whether all faces are planes and all edges straight: its triangles are the very solid."""
     planes = (BRepAdaptor_Surface(face, False).GetType() == GeomAbs_Plane for face in faces_of(solid))
     return all(planes) and all(BRepAdaptor_Curve(edge).GetType() == GeomAbs_Line for edge in edges_of(solid))
+
+
+def inside(shape: Any) -> Iterator[Any]:
+    """Yield what lies directly in a shape, placed and oriented.
+
+    The kernel's iterator does not keep the shape that it reads: this frame does.
+    """
+    iterator = TopoDS_Iterator(shape, True, True)
+    while iterator.More():
+        yield iterator.Value()
+        iterator.Next()
 
 
 def _explored(shape: Any, kind: Any, outside: Any = TopAbs_SHAPE) -> list[Any]:
@@ -166,3 +163,115 @@ def _explored(shape: Any, kind: Any, outside: Any = TopAbs_SHAPE) -> list[Any]:
         found.append(explorer.Current())
         explorer.Next()
     return found
+
+
+MM = 1e-3
+"""The kernel counts in mm."""
+
+
+Level = tuple[float, float]
+"""How fine a mesh is: linear deflection in diagonals of the box, and angle [rad]."""
+
+PICTURE: Level = (0.005, 0.3)
+COARSE: Level = (0.01, 0.5)
+FINE: Level = (0.001, 0.12)
+
+CLOSE = 0.01
+"""A relative deviation of the volume below this is agreement: chords cut about that much off a cylinder."""
+
+FINE_ENOUGH = 30_000
+"""Triangles from where a finer mesh takes seconds, and chords are no excuse any more."""
+
+
+def cross_check(
+    solid: Any, volume_m3: float | None, *, small: bool = False
+) -> tuple[Mesh, float | None, int]:
+    """Compare meshes of a solid with ``volume_m3`` (> 0; None: nothing to compare), as few as are needed.
+
+    ``small``: the solid is hardly seen in its product's picture, so a coarse mesh of it is tried first.
+
+    The mesher fails now and then where the geometry does not: a face without triangles at one fineness is
+    there at another, and thin curved wires lose several per cent to chords. So one closed mesh that agrees
+    clears a solid, and so does what two closed ones converge to, their chord error going with the square of
+    the angle. Bad geometry is as wrong at every fineness.
+
+    Returns a mesh for the picture, the relative deviation of the best closed mesh (None if none is
+    closed), and how many faces have no triangles in the picture's mesh.
+    """
+    tried: list[tuple[int, bool, Mesh]] = []
+    closed: list[tuple[float, float]] = []
+    deviation: float | None = None
+    for level in (COARSE, PICTURE, FINE) if small else (PICTURE, COARSE, FINE):
+        if level is FINE and max(len(mesh) for *_, mesh in tried) > FINE_ENOUGH:
+            break
+        mesh, missing = tessellated(solid, level)
+        tried.append((missing, level is not PICTURE, mesh))
+        if volume_m3 is not None and not missing:
+            volume = abs(mesh_volume(mesh))
+            limits = [volume + (volume - v) * level[1] ** 2 / (a**2 - level[1] ** 2) for a, v in closed]
+            closed.append((level[1], volume))
+            off = min(abs(v / volume_m3 - 1) for v in (volume, *limits))
+            deviation = off if deviation is None else min(off, deviation)
+        if not missing and (deviation is None or deviation < CLOSE):
+            break
+    missing, _, picture = min(tried, key=lambda t: t[:2])
+    return picture, deviation, missing
+
+
+def tessellated(shape: Any, level: Level = PICTURE) -> tuple[Mesh, int]:
+    """Return the triangles of a shape in m, and how many of its faces could not be meshed."""
+    size = box(shape)[1]
+    BRepTools.Clean_s(shape)
+    BRepMesh_IncrementalMesh(shape, max(level[0] * size, 1e-7), False, level[1], False)
+    return triangles(shape)
+
+
+def triangles(shape: Any) -> tuple[Mesh, int]:
+    """Return the triangles that lie on a shape's faces already, in m, and how many faces have none."""
+    parts: list[Mesh] = []
+    missing = 0
+    for face in faces_of(shape):
+        located = TopLoc_Location()
+        triangulation = BRep_Tool.Triangulation_s(face, located)
+        if triangulation is None:
+            missing += 1
+            continue
+        parts.append(_face_mesh(triangulation, located, face.Orientation() == TopAbs_REVERSED))
+    return joined(parts), missing
+
+
+def _face_mesh(triangulation: Any, located: Any, backwards: bool) -> Mesh:
+    node, triangle = triangulation.Node, triangulation.Triangle
+    points = np.array([xyz(node(i)) for i in range(1, triangulation.NbNodes() + 1)])
+    faces = np.array([triangle(i).Get() for i in range(1, triangulation.NbTriangles() + 1)]) - 1
+    if not located.IsIdentity():
+        matrix = trsf_matrix(located.Transformation())
+        points = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return Mesh(points * MM, faces[:, ::-1] if backwards else faces)
+
+
+def box(shape: Any) -> tuple[Floats, float]:
+    """Return the middle (3,) and diagonal [mm] of the shape's box."""
+    low, high = bounds(shape)
+    return (low + high) / 2, float(np.linalg.norm(high - low))
+
+
+def bounds(shape: Any) -> tuple[Floats, Floats]:
+    """Return the lowest and highest corner [mm] of the shape's box; zeros if it is empty."""
+    found = Bnd_Box()
+    BRepBndLib.Add_s(shape, found)
+    if found.IsVoid():
+        return np.zeros(3), np.zeros(3)
+    return np.array(xyz(found.CornerMin())), np.array(xyz(found.CornerMax()))
+
+
+def xyz(point: Any) -> tuple[float, float, float]:
+    """Return a kernel point or vector as numbers."""
+    return point.X(), point.Y(), point.Z()
+
+
+def trsf_matrix(trsf: Any) -> Floats:
+    """Return a kernel transformation as (4, 4), lengths in mm as the kernel has them."""
+    value = trsf.Value
+    rows = [[value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)]
+    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])

@@ -3,38 +3,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from silo.inertia.geometry.checks import assembled, implausible_size
-from silo.inertia.geometry.graph import bottom_up, unfold
+from silo.bom.errors import counted, listed
+from silo.inertia.geometry.graph import Reading, ReadOptions, Report, bottom_up, unfold
 from silo.inertia.geometry.helpers import Helpers
-from silo.inertia.geometry.kernel.brep import measure_all
-from silo.inertia.geometry.mesh import Floats
-from silo.inertia.geometry.options import Reading, ReadOptions, Report
-from silo.inertia.geometry.step.prepare import Prepared
-from silo.inertia.geometry.step.siblings import Siblings
-from silo.inertia.geometry.step.xcaf import Stated, StepFile, load
-from silo.inertia.geometry.together import combined
-from silo.inertia.model import GeometryCode, GeometryProblem, Prototype
-from silo.inertia.wording import counted
+from silo.inertia.geometry.kernel.solids import measure_all
+from silo.inertia.geometry.measured import assembled, implausible_size
+from silo.inertia.geometry.step.text import Prepared
+from silo.inertia.geometry.step.xcaf import Siblings, Stated, StepFile, load
+from silo.inertia.geometry.together import Floats, combined
+from silo.inertia.model import GeometryCode, Note, Prototype
 
 
 def read_step(
     path: Path,
     options: ReadOptions,
     report: Report,
-    helpers: Helpers | None = None,
+    helpers: Helpers,
     text: Callable[[], Prepared] | None = None,
 ) -> Reading:
-    """The assembly of a STEP file, with what belongs to it from beside it. Raises DocumentError.
+    """Return the assembly of a STEP file, with what belongs to it from beside it. Raises DocumentError.
 
     text
-        gives what was found in the file's text, where that was begun already.
+        gives what was found in the file's text, if that was begun already.
     """
-    helpers = helpers or Helpers()
     report("reading", 0, 0)
     step = load(path, max_instances=options.max_instances, text=text() if text is not None else None)
     siblings = Siblings(step, options, helpers, lambda name: report(f"reading {name}", 0, 0))
@@ -49,27 +46,47 @@ def read_step(
     )
     step.measured.update(zip(unmeasured, found, strict=True))
     prototypes = {key: _prototype(step, key, siblings.problems.get(key)) for key in unfolded.placed}
-    problems = [*split_problems(siblings), *stated_totals(step, prototypes)]
+    problems = [*step.said, *split_problems(siblings), *stated_totals(step, prototypes)]
     problems += implausible_size(prototypes, step.unit or "mm")
-    if not step.unit and any(prototype.volume_m3 for prototype in prototypes.values()):
-        words = "the file states no unit of length that is understood; it was read as mm"
-        problems.append(GeometryProblem(GeometryCode.UNITS, words))
+    problems += unitless(step, prototypes)
     name = step.nodes[step.roots[0].product].name if len(step.roots) == 1 else path.stem
     assembly = assembled(unfolded, prototypes, problems, name=name, source=str(path), unit=step.unit)
     return Reading(assembly, tuple(siblings.used), tuple(siblings.missing), kept=step.kept)
 
 
-def _prototype(step: StepFile, key: str, known: GeometryProblem | None) -> Prototype:
+def unitless(step: StepFile, prototypes: Mapping[str, Prototype]) -> Iterator[Note]:
+    """Report products whose lengths have no unit: the kernel takes mm, or, in an assembly, reads nothing."""
+    for read, what in (
+        (True, "mm are taken"),
+        (False, "their bodies cannot be read; export them with a unit"),
+    ):
+        found = [
+            f"“{step.nodes[key].name}”"
+            for key, prototype in prototypes.items()
+            if bool(prototype.volume_m3) is read
+            and ((read and not step.unit) or (step.facts[key].bodies and not step.facts[key].unit_mm))
+        ]
+        if found:
+            words = (
+                f"the file states no unit of length that is understood for {listed(found, 4)}; without one, "
+            )
+            yield Note(GeometryCode.UNITS, words + what)
+
+
+def _prototype(step: StepFile, key: str, known: Note | None) -> Prototype:
     node, facts, stated, measured = step.nodes[key], step.facts[key], step.stated[key], step.measured[key]
-    problems = []
+    problems = list(step.problems.get(key, ()))
+    if any(problem.code == GeometryCode.BODY_MISSING for problem in problems):  # the surfaces left are of it
+        said = tuple(p for p in measured.problems if p.code != GeometryCode.BODY_MISSING)
+        measured = replace(measured, problems=said)
     if measured.solids and not node.children:
         whole = combined(measured.solids)
         problems += against_stated(whole.volume_m3, whole.com_m, stated)
     if facts.density_problem:
-        problems.append(GeometryProblem(GeometryCode.UNITS, facts.density_problem))
+        problems.append(Note(GeometryCode.UNITS, facts.density_problem))
     if key in step.unnamed:
         words = f"it has no name in the file; called '{node.name}' after what holds it"
-        problems.append(GeometryProblem(GeometryCode.NAME, words))
+        problems.append(Note(GeometryCode.NAME, words))
     return measured.prototype(
         key,
         node.name,
@@ -86,12 +103,14 @@ STATED_TOLERANCE = 1e-3
 """Files state volumes from their own integrations, 2.6e-5 off in one published by the format's authors."""
 
 
-def against_stated(volume: float, com: Floats, stated: Stated) -> list[GeometryProblem]:
-    """A part's volume [m^3] and centre (3,) [m] against the validation properties that the file gives."""
+def against_stated(volume: float, com: Floats, stated: Stated) -> list[Note]:
+    """Compare a part's volume [m^3] and centre (3,) [m] with the validation properties that the file
+    gives.
+    """
     problems = []
     if stated.volume_m3 is not None and abs(volume - stated.volume_m3) > STATED_TOLERANCE * volume:
         problems.append(
-            GeometryProblem(
+            Note(
                 GeometryCode.STATED_VOLUME,
                 f"the file states a volume of {stated.volume_m3:.6g} m3, the geometry has {volume:.6g} m3 "
                 f"({volume / stated.volume_m3 - 1:+.2%})"
@@ -103,7 +122,7 @@ def against_stated(volume: float, com: Floats, stated: Stated) -> list[GeometryP
         distance = float(np.linalg.norm(com - np.array(stated.centroid_m)))
         if distance > STATED_TOLERANCE * max(volume, 0.0) ** (1 / 3):
             problems.append(
-                GeometryProblem(
+                Note(
                     GeometryCode.STATED_CENTROID,
                     f"the file states a centre of volume {distance * 1e3:.4g} mm away from the geometry's",
                 )
@@ -111,23 +130,22 @@ def against_stated(volume: float, com: Floats, stated: Stated) -> list[GeometryP
     return problems
 
 
-def split_problems(siblings: Siblings) -> list[GeometryProblem]:
-    """Which files a split assembly was completed from, and which it lacks."""
+def split_problems(siblings: Siblings) -> list[Note]:
+    """Report which files a split assembly was completed from, and which it lacks."""
     problems = []
     if siblings.used:
-        names = ", ".join(path.name for path in siblings.used[:5])
-        more = f" and {len(siblings.used) - 5} more" if len(siblings.used) > 5 else ""
+        names = listed([path.name for path in siblings.used])
         problems.append(
-            GeometryProblem(
+            Note(
                 GeometryCode.EXTERNAL_FILE,
                 f"a split assembly: geometry read from {counted(len(siblings.used), 'file')} beside it "
-                f"({names}{more})",
+                f"({names})",
             )
         )
     if siblings.missing:
         names = ", ".join(sorted(set(siblings.missing))[:5])
         problems.append(
-            GeometryProblem(
+            Note(
                 GeometryCode.NO_GEOMETRY,
                 f"{counted(len(siblings.missing), 'product')} without geometry, here or beside the file "
                 f"({names}); put their files into its folder, or export the assembly as one file",
@@ -136,8 +154,8 @@ def split_problems(siblings: Siblings) -> list[GeometryProblem]:
     return problems
 
 
-def stated_totals(step: StepFile, prototypes: Mapping[str, Prototype]) -> list[GeometryProblem]:
-    """Assemblies whose stated volume is not what their content adds up to."""
+def stated_totals(step: StepFile, prototypes: Mapping[str, Prototype]) -> list[Note]:
+    """Report assemblies whose stated volume is not what their content adds up to."""
     if not any(stated.volume_m3 for stated in step.stated.values()):
         return []
     volumes: dict[str, float] = {}
@@ -151,7 +169,7 @@ def stated_totals(step: StepFile, prototypes: Mapping[str, Prototype]) -> list[G
             )
             if node.children and stated and abs(volumes[key] / stated - 1) > STATED_TOLERANCE:
                 problems.append(
-                    GeometryProblem(
+                    Note(
                         GeometryCode.STATED_VOLUME,
                         f"the file states {stated:.6g} m3 for the assembly '{node.name}', "
                         f"its parts add up to {volumes[key]:.6g} m3",

@@ -3,14 +3,20 @@
 
 Products are kept as the kernel's document (XCAF) has them, with two corrections that real files need. The
 kernel splits a product with mixed bodies into an assembly of unnamed leaves; those are given back to the
-product around them. And it opens files that a STEP file names, wherever they are; a copy without those names
-is read instead, and :mod:`siblings` looks for the files by our rules.
+product around them. And it opens files that a STEP file names, wherever they are: :mod:`text` takes the names
+out, and :class:`Siblings` looks for the files by our rules.
+
+SolidWorks and CATIA write one file per part, and an assembly file whose products hold nothing. All readers
+tried give such an assembly no solid, and no message. Here a product without geometry is looked for as
+``<product name>.STEP`` (.step, .stp; case ignored) in the assembly's folder and some levels below it, never
+outside of it, whatever path the file itself names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,21 +28,34 @@ from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
 from OCP.XCAFDoc import XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
 
-from silo.bom.errors import DocumentError
-from silo.folders import scratch_folder
-from silo.inertia.geometry.graph import Child, Node, in_metres
+from silo.bom.errors import DocumentError, InputError, counted
+from silo.inertia.geometry.graph import (
+    Child,
+    Node,
+    ReadOptions,
+    bare_stem,
+    bottom_up,
+    clean,
+    file_key,
+    in_metres,
+    is_generic,
+    step_files,
+)
+from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.tessellate import MM, trsf_matrix
-from silo.inertia.geometry.labels import clean, is_generic
+from silo.inertia.geometry.kernel.occt import MM, trsf_matrix
+from silo.inertia.geometry.kernel.solids import measure
 from silo.inertia.geometry.measured import Measured
-from silo.inertia.geometry.step.prepare import Prepared, prepare
-from silo.inertia.geometry.step.product_text import ProductFacts, Products
-from silo.inertia.geometry.step.regroup import MARK
+from silo.inertia.geometry.step.bodies import Bodies
+from silo.inertia.geometry.step.part21 import ProductFacts, Products
+from silo.inertia.geometry.step.text import MARK, Prepared, prepare
+from silo.inertia.model import GeometryCode, Note
+from silo.platform import scratch_folder
 
 
 @dataclass(frozen=True, eq=False)
 class Stated:
-    """Validation properties that the file gives for a product: [m^3] and (x, y, z) [m], None where absent."""
+    """Validation properties that the file gives for a product: [m^3] and (x, y, z) [m], None if absent."""
 
     volume_m3: float | None = None
     centroid_m: tuple[float, float, float] | None = None
@@ -48,6 +67,8 @@ class StepFile:
 
     shapes, measured
         of each product with a shape of its own: the kernel's, or what was measured of them already.
+    problems, said
+        of a product, and of the file: bodies that the text names and the kernel did not give.
     empty
         products without children and without any edge or face: their geometry is somewhere else.
     kept
@@ -63,21 +84,21 @@ class StepFile:
     facts: dict[str, ProductFacts] = field(default_factory=dict)
     stated: dict[str, Stated] = field(default_factory=dict)
     unnamed: set[str] = field(default_factory=set)
+    problems: dict[str, tuple[Note, ...]] = field(default_factory=dict)
+    said: list[Note] = field(default_factory=list)
     roots: list[Child] = field(default_factory=list)
     kept: tuple[Any, ...] = ()
 
     def take_in(self, other: StepFile) -> None:
         """Add another file's products; its keys must be its own."""
-        self.nodes.update(other.nodes)
-        self.shapes.update(other.shapes)
-        self.measured.update(other.measured)
-        self.facts.update(other.facts)
-        self.stated.update(other.stated)
-        self.unnamed.update(other.unnamed)
+        for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
+            if isinstance(mine, dict | set):
+                mine.update(theirs)
+        self.said += other.said
 
     def take_shape(self, key: str, other: str) -> None:
         """Give the product ``key`` the shape of ``other``, or none if that has none."""
-        for known in (self.shapes, self.measured):
+        for known in (self.shapes, self.measured, self.problems):
             known.pop(key, None)
             if other in known:
                 known[key] = known[other]  # type: ignore[assignment]
@@ -86,10 +107,10 @@ class StepFile:
 def load(
     path: Path, prefix: str = "", max_instances: int = 1_000_000, text: Prepared | None = None
 ) -> StepFile:
-    """Read one STEP file. ``prefix`` goes before every key. DocumentError where it cannot be read.
+    """Read one STEP file. ``prefix`` goes before every key. DocumentError if it cannot be read.
 
     text
-        what :func:`prepare` found, where somebody asked it already.
+        what :func:`prepare` found, if somebody asked it already.
     """
     with scratch_folder("silo-step-") as folder:
         text = text or prepare(path, Path(folder), max_instances)
@@ -130,6 +151,7 @@ class _Walk:
 
     def __init__(self, path: Path, prefix: str, document: Any, reader: Any, products: Products) -> None:
         self._tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+        self._reader = reader
         self._transfer = reader.Reader().WS().TransferReader()
         self._prefix = prefix
         self._products = products
@@ -145,6 +167,7 @@ class _Walk:
             self._file.roots.append(Child(self._file.nodes[key].name, key))
         if not self._file.roots:
             raise DocumentError(str(self._file.path), "holds no product and no shape")
+        self._complete()
         self._file.empty = [
             key
             for key, shapes in self._file.shapes.items()
@@ -152,6 +175,39 @@ class _Walk:
             and not any(occt.has_edges(shape) or occt.faces_of(shape) for shape in shapes)
         ]
         return self._file
+
+    def _complete(self) -> None:
+        """Add the bodies that the kernel's reader dropped, or say that they are missing."""
+        file, bodies = self._file, Bodies(self._reader, self._products)
+        groups: dict[int, list[str]] = {}
+        for key, facts in file.facts.items():
+            groups.setdefault(id(facts), []).append(key)
+        if not self._owners:
+            named = sum(len(facts.bodies) for facts in self._products.facts.values())
+            solids = sum(len(occt.solids_of(shape)) for own in file.shapes.values() for shape in own)
+            if solids < named:
+                words = (
+                    f"the file has {counted(named, 'body', 'bodies')}, {solids} were read: volume is missing"
+                )
+                file.said.append(Note(GeometryCode.BODY_MISSING, words))
+            return
+        nameless = [s for key, own in file.shapes.items() if not file.facts[key].bodies for s in own]
+        file.said += [bodies.problem(n) for n in bodies.dropped(self._products.stray, nameless)]
+        for keys in groups.values():
+            # A product of mixed bodies may stand in several leaves: together they have what the text names.
+            key, facts = keys[0], file.facts[keys[0]]
+            said = []
+            for number in bodies.dropped(facts.bodies, [s for k in keys for s in file.shapes.get(k, ())]):
+                if (shape := bodies.made(number, facts)) is None:
+                    said.append(bodies.problem(number))
+                else:
+                    file.shapes.setdefault(key, []).append(shape)
+                    file.nodes[key] = replace(file.nodes[key], has_geometry=True)
+            if facts.hidden:
+                what = counted(facts.hidden, "of its bodies is", "of its bodies are")
+                words = f"{what} hidden in the file (INVISIBILITY), and counted like all others"
+                said.append(Note(GeometryCode.HIDDEN, words))
+            file.problems[key] = tuple(said)
 
     def _visit_all(self, top: str, label: Any) -> None:
         waiting = [(top, label, self._fallback)]
@@ -177,7 +233,7 @@ class _Walk:
         return Node(key, name, tuple(children), has_geometry=bool(own)), inside
 
     def _inside(self, label: Any) -> tuple[list[Child], list[_Used], list[Any], ProductFacts | None]:
-        """Uses of products, the products, the shapes that are the label's own, and their facts."""
+        """Return uses of products, the products, the shapes that are the label's own, and their facts."""
         children: list[Child] = []
         inside: dict[str, _Used] = {}
         own: list[Any] = []
@@ -192,7 +248,7 @@ class _Walk:
         return children, list(inside.values()), own, known
 
     def _components(self, label: Any) -> Iterator[tuple[Any, _Used]]:
-        """Uses and what they use; groups of our own making are seen through."""
+        """Return uses and what they use; groups of our own making are seen through."""
         if not self._tool.IsAssembly_s(label):
             return
         for component in occt.labels(lambda found: self._tool.GetComponents_s(label, found)):
@@ -234,7 +290,9 @@ class _Walk:
 
 
 def _owners(reader: Any, products: Products) -> dict[int, tuple[Any, int]]:
-    """id of the kernel's entity object → that object (kept alive, so that the id stays its own), product."""
+    """Map the id of the kernel's entity object → that object (kept alive, so that the id stays its own),
+    product.
+    """
     model = reader.Reader().StepModel()
     if model.NbEntities() != products.count:
         # The kernel left an entity out; from there on its numbers are not ours. Names must do.
@@ -253,21 +311,151 @@ def _stated(label: Any) -> Stated:
     )
 
 
-_UNITS = {
-    "millimetre": "mm",
-    "millimeter": "mm",
-    "metre": "m",
-    "meter": "m",
-    "centimetre": "cm",
-    "centimeter": "cm",
-    "micrometre": "um",
-    "inch": "inch",
-    "foot": "foot",
-}
+_UNITS = {"millimetre": "mm", "metre": "m", "centimetre": "cm", "micrometre": "um"}
 
 
 def _unit(reader: Any) -> str:
     lengths, angles, solid_angles = (Sequence_TCollection_AsciiString() for _ in range(3))
     reader.Reader().FileUnits(lengths, angles, solid_angles)
     names = {str(lengths.Value(i).ToCString()).strip().lower() for i in range(1, lengths.Length() + 1)}
-    return " and ".join(sorted(_UNITS.get(name, name) for name in names))
+    return " and ".join(sorted(_UNITS.get(name.replace("meter", "metre"), name) for name in names))
+
+
+class Siblings:
+    """The files that may hold missing products; ``problems`` by product key, ``used`` paths in order."""
+
+    def __init__(
+        self, top: StepFile, options: ReadOptions, helpers: Helpers, reading: Callable[[str], None]
+    ) -> None:
+        self._top = top
+        self._options = options
+        self._helpers = helpers
+        self._reading = reading
+        self._root = Path(os.path.realpath(top.path)).parent
+        self._index: dict[str, list[Path]] | None = None
+        self._loaded: dict[Path, StepFile | str] = {}
+        self._open = {Path(os.path.realpath(top.path))}
+        self.problems: dict[str, Note] = {}
+        self.used: list[Path] = []
+        self.missing: list[str] = []
+
+    def resolve(self) -> None:
+        """Fill every product without geometry that has a file; note on the others why not."""
+        waiting = self._top.empty
+        while waiting:
+            found = {key: self._find(key) for key in waiting}
+            self._load([path for path, _ in found.values() if path is not None])
+            waiting = []
+            for key, (path, reason) in found.items():
+                if path is None:
+                    self.missing.append(self._top.nodes[key].name)
+                    self.problems[key] = Note(GeometryCode.NO_GEOMETRY, reason)
+                    continue
+                try:
+                    waiting += self._fill(key, path)
+                except DocumentError as error:
+                    self.problems[key] = Note(
+                        GeometryCode.EXTERNAL_FILE, f"its file {path.name} cannot be read: {error.reason}"
+                    )
+
+    def _load(self, wanted: list[Path]) -> None:
+        """Read files that are not read yet, large ones first, by as many processes as help."""
+        paths = [path for path in dict.fromkeys(wanted) if path not in self._loaded]
+        paths = paths[: max(self._options.max_siblings - len(self._loaded), 0)]
+        sizes = {path: path.stat().st_size for path in paths if path.is_file()}
+        paths.sort(key=lambda path: -sizes.get(path, 0))
+        if len(paths) > 1 and sum(sizes.values()) >= WORTH_HELP and self._helpers.start():
+            self._helpers.load_kernel()
+        options = self._options
+        rows = [
+            (path, f"{path.relative_to(self._root).as_posix()}#", options.eps, options.mesh_check)
+            for path in paths
+        ]
+        read = self._helpers.all(
+            rows,
+            lambda row: (part_file, row),
+            lambda number, _: self._reading(paths[number - 1].name),
+        )
+        self._loaded.update(zip(paths, read, strict=True))
+
+    def _find(self, key: str) -> tuple[Path | None, str]:
+        node, facts = self._top.nodes[key], self._top.facts[key]
+        wanted = [bare_stem(document) for document in facts.documents] + [node.name, facts.part_number]
+        found: list[Path] = []
+        for name in filter(None, wanted):
+            found = [p for p in self._files().get(file_key(name), ()) if p not in self._open]
+            if found:
+                break
+        if not found:
+            return None, (
+                f"the file holds no geometry for it, and no file '{node.name}.STEP' lies in the folder"
+                if self._options.siblings
+                else "the file holds no geometry for it, and files beside it are not to be used"
+            )
+        nearest = min(len(p.parts) for p in found)
+        best = [p for p in found if len(p.parts) == nearest]
+        if len(best) > 1:
+            names = ", ".join(str(p.relative_to(self._root)) for p in best)
+            return None, f"the file holds no geometry for it, and several files are named after it: {names}"
+        return best[0], ""
+
+    def _files(self) -> dict[str, list[Path]]:
+        if self._index is None:
+            self._index = {}
+            for path in step_files(self._root, self._options.sibling_depth) if self._options.siblings else ():
+                self._index.setdefault(file_key(path.stem), []).append(path)
+        return self._index
+
+    def _fill(self, key: str, path: Path) -> list[str]:
+        """Put the file's content in the product's place; returns products that are empty in turn."""
+        part = self._loaded.get(path)
+        if part is None:
+            raise DocumentError(
+                str(path), f"more than {self._options.max_siblings} files belong to this assembly"
+            )
+        if isinstance(part, str):
+            raise DocumentError(str(path), part)
+        empty: list[str] = []
+        if path not in self.used:
+            empty = part.empty
+            self._top.take_in(part)
+            self.used.append(path)
+        self._hang(key, part.roots, path)
+        return empty
+
+    def _hang(self, key: str, roots: list[Child], path: Path) -> None:
+        node = self._top.nodes[key]
+        content = self._top.nodes[roots[0].product] if len(roots) == 1 else None
+        children = content.children if content is not None else tuple(roots)
+        filled = replace(node, children=children, has_geometry=bool(content and content.has_geometry))
+        self._top.nodes[key] = filled
+        try:
+            bottom_up(self._top.nodes, key)
+        except InputError as error:
+            self._top.nodes[key] = node
+            raise DocumentError(str(path), "it contains the assembly that needs it") from error
+        self._top.take_shape(key, roots[0].product if content is not None else "")
+        if content is not None:
+            here, there = self._top.facts[key], self._top.facts[roots[0].product]
+            self._top.facts[key] = replace(
+                here,
+                part_number=here.part_number or there.part_number,
+                material=here.material or there.material,
+                density=here.density if here.density is not None else there.density,
+            )
+            if self._top.stated[key] == Stated():
+                self._top.stated[key] = self._top.stated[roots[0].product]
+
+
+def part_file(path: Path, prefix: str, eps: float, mesh_check: bool) -> StepFile | str:
+    """Return a part's own file, read and measured, without the kernel's shapes; or what is wrong with it."""
+    try:
+        part = load(path, prefix)
+    except DocumentError as error:
+        return error.reason
+    part.measured = {
+        key: measure(shapes, eps=eps, mesh_check=mesh_check) for key, shapes in part.shapes.items()
+    }
+    part.shapes.clear()
+    part.kept = ()
+    return part

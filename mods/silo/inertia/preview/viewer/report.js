@@ -114,7 +114,9 @@ function filter() {
   const words = by("filter").value.toLocaleLowerCase().split(/\s+/).filter(Boolean);
   let shown = 0;
   partRows.forEach((tr) => {
-    const text = tr.textContent.toLocaleLowerCase();
+    const [link, ...cells] = tr.cells;
+    const name = link.querySelector("select")?.selectedOptions[0]?.textContent ?? link.textContent;
+    const text = [name, ...cells.map((cell) => cell.textContent)].join(" ").toLocaleLowerCase();
     tr.hidden = !words.every((word) => text.includes(word));
     shown += !tr.hidden;
   });
@@ -122,9 +124,99 @@ function filter() {
 }
 filter();
 
+// ---- the link map: which link has which part, by path
+const drafts = data.views.map((view) => ({ name: view.name, colour: view.colour }));
+const COLOURS = ["#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#76b7b2", "#edc948", "#9c755f"];
+const owners = new Map();
+data.parts.forEach((part) => {
+  let link = drafts.findIndex((draft) => (draft.name || "(no link)") === part.link);
+  if (link < 0) link = drafts.push({ name: "", colour: "#888888" }) - 1;
+  for (const path of part.paths) owners.set(path, { link, mass: part.mass });
+});
+let chosen = 0;
+const selects = partRows.map((tr, row) => {
+  const select = make("select", undefined, { "aria-label": "Link of " + data.parts[row].name });
+  select.addEventListener("change", () => give(data.parts[row].paths, Number(select.value)));
+  tr.cells[0].replaceChildren(select);
+  return select;
+});
+
+function give(paths, link) {
+  for (const path of paths) if (owners.has(path)) owners.get(path).link = link;
+  for (const body of objects.bodies) {
+    if (!paths.includes(body.userData.path)) continue;
+    body.material = body.material.clone();
+    body.material.color.set(drafts[link].colour);
+  }
+  refresh();
+  draw();
+}
+
+function refresh() {
+  const weights = drafts.map(() => [0, 0]);
+  for (const { link, mass } of owners.values()) {
+    weights[link][0] += 1;
+    weights[link][1] += mass || 0;
+  }
+  by("drafts").replaceChildren(...drafts.map((draft, i) => {
+    const line = make("div", undefined, { class: "draft" });
+    const pick = make("input", undefined, { type: "radio", name: "draft", "aria-label": "Clicks go to " + (draft.name || "no link") });
+    pick.checked = i === chosen;
+    pick.addEventListener("change", () => { chosen = i; by("editing").checked = true; });
+    const swatch = make("span", "", { class: "swatch" });
+    swatch.style.background = draft.colour;
+    const name = make("input", undefined, { type: "text", placeholder: "in no link", "aria-label": "Name" });
+    name.value = draft.name;
+    name.addEventListener("change", () => { draft.name = name.value.trim(); refresh(); });
+    const [count, mass] = weights[i];
+    line.append(pick, swatch, name, make("span", `${count} parts, ${kilograms(mass)}`, { class: "mass" }));
+    return line;
+  }));
+  selects.forEach((select, row) => {
+    select.replaceChildren(...drafts.map((draft, i) => make("option", draft.name || "(no link)", { value: i })));
+    const links = new Set(data.parts[row].paths.map((path) => owners.get(path).link));
+    select.value = links.size === 1 ? [...links][0] : "";
+  });
+  by("yaml").textContent = yaml();
+}
+
+// Each line is as high up as everything below belongs to one link.
+function yaml() {
+  const above = new Map();
+  const levels = (path) => path.split("/").map((_, n, all) => all.slice(0, n + 1).join("/"));
+  for (const [path, { link }] of owners) {
+    for (const level of levels(path)) above.set(level, (above.get(level) || new Set()).add(drafts[link].name));
+  }
+  const lines = new Map();
+  for (const [path, { link }] of owners) {
+    const { name } = drafts[link];
+    if (!name) continue;
+    if (!lines.has(name)) lines.set(name, new Set());
+    lines.get(name).add("path:" + levels(path).find((level) => above.get(level).size === 1));
+  }
+  const text = ["links:"];
+  for (const [name, paths] of lines) {
+    text.push(`  ${JSON.stringify(name)}:`, ...[...paths].map((path) => "    - " + JSON.stringify(path)));
+  }
+  return text.join("\n") + "\n";
+}
+
+by("new").addEventListener("click", () => {
+  chosen = drafts.push({ name: `link_${drafts.length + 1}`, colour: COLOURS[drafts.length % COLOURS.length] }) - 1;
+  by("editing").checked = true;
+  refresh();
+});
+by("save").addEventListener("click", () => {
+  const file = URL.createObjectURL(new Blob([yaml()], { type: "application/yaml" }));
+  const link = make("a", "", { href: file, download: "map.yaml" });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(file), 1000);
+});
+
 // ---- links beside the view, and the view
 const objects = { links: [], ellipsoids: [], centres: [], bodies: [] };
 let draw = () => {};
+refresh();
 
 function choice(text, mass, colour, checked, change) {
   const label = make("label");
@@ -159,13 +251,6 @@ choice("see through bodies", undefined, null, false, (on) => {
     material.needsUpdate = true;
   }
 });
-
-function picture() {
-  const image = make("img", undefined, { alt: "The links, their centres of mass and inertia ellipsoids" });
-  image.src = "data:image/png;base64," + by("png").textContent;
-  by("view").prepend(image);
-  by("picked").textContent = "This browser shows no 3D (WebGL); here is a picture instead.";
-}
 
 function start() {
   const text = atob(by("glb").textContent);
@@ -250,13 +335,18 @@ function start() {
     ray.setFromCamera(at, camera);
     const seen = objects.bodies.filter((body) => objects.links[body.userData.link].visible);
     const hit = ray.intersectObjects(seen, false)[0];
-    const view = hit && data.views[hit.object.userData.link];
+    if (hit && by("editing").checked) give([hit.object.userData.path], chosen);
+    const view = hit && drafts[owners.get(hit.object.userData.path)?.link ?? hit.object.userData.link];
     by("picked").textContent = hit ? `${view.name || "in no link"}: ${hit.object.userData.path}` : "";
   });
 }
 
 if (data.shapes) {
-  try { start(); } catch (error) { by("view").querySelector("canvas")?.remove(); draw = () => {}; picture(); }
+  try { start(); } catch (error) {
+    by("view").querySelector("canvas")?.remove();
+    draw = () => {};
+    by("picked").textContent = "This browser shows no 3D (WebGL); the tables below hold everything else.";
+  }
 } else {
   by("picked").textContent = "There are no shapes to show: the geometry was read without meshes.";
 }

@@ -1,0 +1,666 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What each object of an assembly is, and what it brings: one pass, which everything else reads.
+
+Each object in an assembly has exactly one :class:`Role`. What is a component brings what it shows. A link
+brings what its target brings, once per element; a Draft array what its original brings, once per instance; a
+link group, a compound, an inline part or a folder what its members bring. That ends in an object of another
+file, in a standard part, in an object with an identity of its own, or in geometry of this very file: an *own
+part*, which is no item yet. How an object comes to bring something is kept (:class:`Shown`), so masses and
+people can follow the same chain.
+
+* An object counts once, however many lists of the tree name it; each link group that shows it counts.
+* What shows others is counted; the others count where they lie only if they are visible there. The original
+  of an array and the members of a compound never do.
+* What lies in something suppressed or excluded is left out with it.
+* What a cut, a boolean or a fusion consumes is no piece to buy, wherever that feature lies.
+* A broken link brings a :class:`Lost` component with its quantity, and a finding that blocks.
+
+Nothing here depends on where the assembly is used, so each is read once (:class:`Reader`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+from silo.bom.document import LinkProblem, first_of, label_of, located, own, same_document
+from silo.bom.errors import DocumentError
+from silo.bom.findings import FindingCode
+from silo.bom.model import document_identity, identity_of, own_identity
+from silo.bom.walk.kinds import (
+    COMPONENTS,
+    INLINE,
+    REPEATERS,
+    Kind,
+    consumed,
+    draft_count,
+    elements,
+    is_array,
+    is_named_assembly,
+    kind_of,
+    left_out_by,
+    no_component,
+    sources,
+    survey_of,
+)
+from silo.bom.walk.notes import Notes
+from silo.bom.walk.standard import STANDARD_PARTS, designation
+from silo.bom.walk.targets import (
+    Inspect,
+    Target,
+    is_assembly_link,
+    is_link,
+    own_parts,
+    resolve_target,
+    stale_copies,
+)
+from silo.bom.walk.tree import Contents, Count, Key, KeyOf, Lost, Role, Shown, Tree, Worth, add
+
+# Groups that link to groups: a file does not need many of these, an attack does.
+_MAX_NESTING = 32
+# A link without a target, and one that leads back to itself, stand for no component.
+_NO_COMPONENT_LOST = (FindingCode.UNSET_LINK, FindingCode.CYCLE)
+# What may have an identity of its own and is a component then.
+DECLARABLE = REPEATERS | {Kind.LOCAL, Kind.FOREIGN, Kind.CONTAINER, Kind.LINK_GROUP}
+_COUNTABLE = COMPONENTS | REPEATERS | {Kind.ELEMENT, Kind.STANDARD}
+SHOWING = COMPONENTS | REPEATERS | {Kind.ELEMENT}
+_GEOMETRY = REPEATERS | {Kind.LOCAL}
+
+
+_COUNTS = (Role.COMPONENT, Role.HOLDER)
+
+
+class Reader:
+    """Reads assemblies, each once, and keeps what it learnt of the objects that it met on the way.
+
+    beside
+        finds what counts with an assembly though it lies beside it.
+    hardware
+        False leaves standard parts out.
+    """
+
+    def __init__(
+        self,
+        notes: Notes,
+        key: KeyOf,
+        inspect: Inspect | None,
+        *,
+        beside: Callable[[Any], Iterable[Any]] = lambda _container: (),
+        hardware: bool = True,
+    ) -> None:
+        self.notes = notes
+        self.key = key
+        self.beside = beside
+        self.hardware = hardware
+        self._inspect = inspect
+        self._known: dict[Key, Contents] = {}
+        self._not_components: dict[Key, str] = {}
+        self._designations: dict[Key, tuple[str, bool]] = {}
+        self._eaten: dict[str, dict[Key, Any]] = {}
+
+    def contents(self, container: Any) -> Contents:
+        """What an assembly holds; read once however often it is used."""
+        key = self.key(container)
+        if key not in self._known:
+            self.notes.reading = key[0]
+            try:
+                self._known[key] = Reading(self, container).contents(container)
+            except DocumentError as error:
+                self.notes.unreadable(container, error)
+                self._known[key] = Contents(holds_components=True)
+        return self._known[key]
+
+    def brings(self, obj: Any) -> list[Any]:
+        """The components that one object shows, each once; no own parts."""
+        try:
+            return Reading(self, obj).brought_by(obj)
+        except DocumentError:
+            return []
+
+    def resolve(self, link: Any) -> Target:
+        """The end of a link."""
+        return resolve_target(link, self._inspect)
+
+    def eaten(self, document: Any, features: Iterable[Any]) -> dict[Key, Any]:
+        """What the features of a document consume: key → the feature.
+
+        features
+            of a document that does not say which objects it has.
+        """
+        path = getattr(document, "FileName", "") or f"{id(document):x}"
+        if path not in self._eaten:
+            listed = [obj for obj, _ in survey_of(document).of({Kind.LOCAL})]
+            self._eaten[path] = consumed(listed or features, self.key)
+        return self._eaten[path]
+
+    def no_component(self, key: Key, target: Any) -> str:
+        """What the target is instead of a component; "" where it may be one."""
+        if key not in self._not_components:
+            self._not_components[key] = no_component(target)
+        return self._not_components[key]
+
+    def standard(self, obj: Any, key: Key | None = None) -> tuple[str, bool]:
+        """The designation of a standard part, "" for anything else; and whether it is an item of its own.
+
+        It is where somebody registered that very object. What identifies the document it lies in is that of
+        the part beside it, except where there is none.
+        """
+        key = key or self.key(obj)
+        known = self._designations.get(key)
+        if known is None:
+            text = designation(obj)
+            known = self._designations[key] = (text, bool(text) and _is_registered(obj))
+        return known
+
+    def component(self, obj: Any) -> Key:
+        """What identifies a component: of standard parts their designation, of others the key."""
+        key = self.key(obj)
+        text, registered = self.standard(obj, key)
+        return (STANDARD_PARTS, text) if text and not registered else key
+
+
+def _is_registered(fastener: Any) -> bool:
+    if own_identity(fastener):
+        return True
+    document = getattr(fastener, "Document", None)
+    if not document_identity(document):
+        return False
+    others = (obj for obj in getattr(document, "Objects", ()) or () if obj is not fastener)
+    return all(kind_of(obj) in (Kind.NOTHING, Kind.FOLDER) for obj in others)
+
+
+class Reading:
+    """One assembly while it is being read."""
+
+    def __init__(self, reader: Reader, container: Any) -> None:
+        self._reader = reader
+        self._notes = reader.notes
+        self._key = reader.key
+        self._document = container.Document
+        self._path, _ = reader.key(container)
+        # The assembly's own identity on something in it means the assembly itself.
+        self._identity = (identity_of(container) or "").lower()
+        self._is_root = getattr(container, "is_document_root", False)
+        self._nodes: dict[Key, Shown] = {}
+        self._trees: dict[Key, Tree] = {}
+        self._ones: dict[Key, Worth] = {}
+        self._links: set[Key] = set()
+        self._wholes: set[Key] = set()
+        self._inside: set[Key] = set()
+        self._shown: set[Key] = set()
+        self._covered: set[Key] = set()
+        self._gone: set[Key] = set()
+        self._roles: dict[Key, Role] = {}
+        self._holds_components = False
+        self._main: Tree | None = None
+        self._hidden: list[Any] = []
+        # What was entered and not yet left, the assembly first; and the ways that led back into themselves.
+        self._open: dict[Key, Any] = {}
+        self._rings: list[dict[Key, Any]] = []
+
+    def contents(self, container: Any) -> Contents:
+        """The contents of an assembly."""
+        top, kind = self._key(container), kind_of(container)
+        if kind in REPEATERS:
+            node = self._node(top, container, kind)
+            leaves = [(node, 1)] if node is not None and node.worth else []
+            counts, mine = self._split(leaves)
+            mine = [one for one in mine if one.target is not container]
+            return Contents(counts, mine, {top: Role.COMPONENT}, self._holds_components or bool(counts))
+        self._open[top] = container
+        tree = self._tree(top, container)
+        self._main = tree
+        self._shown = self.shown_by([one for one in tree.members.values() if one[1] in SHOWING])
+        leaves = self._leaves(tree)
+        counts, mine = self._split(leaves)
+        beside = list(self._reader.beside(container)) if tree.members else []
+        for obj in beside:
+            if self._key(obj) in tree.members:
+                self._notes.two_roles(obj)
+        loose = [obj for obj in beside if self._key(obj) not in self._shown]
+        nodes = [node for obj in loose if (node := self._node(self._key(obj), obj, kind_of(obj))) is not None]
+        self._roles.update({self._key(node.obj): Role.COMPONENT for node in nodes})
+        self._notes.beside_counted(container, loose)
+        counts += self._split([(node, 1) for node in nodes], beside=True)[0]
+        is_part = self._is_root and not self._holds_components and self._is_one_part(counts or mine)
+        if is_part:
+            counts, mine = [], [*counts, *mine]
+        self._report_rings()
+        for key in self._shown:
+            self._roles.setdefault(key, Role.SOURCE)
+        for one in (*counts, *mine):
+            if self._roles.get(self._key(one.shown.obj)) is not Role.COMPONENT:
+                self._notes.two_roles(one.shown.obj)
+        holds = self._holds_components or bool(counts)
+        return Contents(counts, mine, self._roles, holds, is_part, self._hidden, tree)
+
+    def _is_one_part(self, counts: list[Count]) -> bool:
+        """True for a file whose one component is its own only part: it is that part, no assembly of it."""
+        only = counts[0] if len(counts) == 1 else None
+        return (
+            only is not None
+            and only.quantity == 1
+            and only.target is only.shown.obj
+            and not only.key[0].startswith(STANDARD_PARTS)
+        )
+
+    def brought_by(self, obj: Any) -> list[Any]:
+        """The components that one object of the document shows."""
+        node = self._node(self._key(obj), obj, kind_of(obj))
+        return [one.target for one in self._split([(node, 1)])[0]] if node is not None else []
+
+    # --- which objects count -------------------------------------------------------------------------------
+
+    def _tree(self, key: Key, container: Any) -> Tree:
+        if (known := self._trees.get(key)) is None:
+            known = self._trees[key] = Tree(container, self._key, self._is_closed)
+            self._find_wholes(known, container)
+            self._find_repeated(known)
+        return known
+
+    def _is_closed(self, obj: Any, kind: Kind) -> bool:
+        """True for an inline container that a person declared a component of its own."""
+        return kind in DECLARABLE and self._is_declared(obj)
+
+    def _is_declared(self, obj: Any) -> bool:
+        """True for an object with an identity of its own."""
+        identity = own_identity(obj)
+        return bool(identity) and identity is not None and identity.lower() != self._identity
+
+    def _is_mine(self, target: Any) -> bool:
+        """True for an object of this file; FreeCAD makes two documents of one that it opened by two paths."""
+        if isinstance(target, Lost):
+            return False
+        return same_document(target.Document, self._document) or bool(
+            self._path and self._key(target)[0] == self._path
+        )
+
+    def _is_own(self, target: Any) -> bool:
+        """True for geometry of this file that nobody declared."""
+        if not self._is_mine(target) or self._is_declared(target):
+            return False
+        return not self._reader.standard(target)[0]
+
+    def _find_wholes(self, tree: Tree, container: Any) -> None:
+        """Parts that hold nothing but geometry: each is one own part, not piece by piece."""
+        mixed, full = set[Key](), set[Key]()
+        for name, (obj, kind) in tree.members.items():
+            if kind in _GEOMETRY and not self._is_declared(obj) and self._is_geometry(obj, kind):
+                full.update(tree.above(name))
+            elif (
+                kind in COMPONENTS or kind in _COUNTABLE or kind is Kind.FOREIGN or self._is_closed(obj, kind)
+            ):
+                mixed.update(tree.above(name))
+            elif kind is Kind.CONTAINER and is_named_assembly(obj):
+                mixed.update((name, *tree.above(name)))
+        wholes = full - mixed
+        if tree.top in wholes and kind_of(container) is Kind.CONTAINER and not is_named_assembly(container):
+            self._wholes.add(tree.top)
+        if not wholes.difference((tree.top,)):
+            return
+        for name, (_, kind) in tree.members.items():
+            if not self._wholes.isdisjoint(tree.around(name)):
+                self._inside.add(name)
+            elif kind is Kind.CONTAINER and name in wholes:
+                self._wholes.add(name)
+
+    def _is_geometry(self, obj: Any, kind: Kind, depth: int = 0) -> bool:
+        """True if an object shows geometry only."""
+        if kind not in REPEATERS:
+            return kind is Kind.LOCAL
+        return depth < _MAX_NESTING and all(
+            self._is_geometry(one, kind_of(one), depth + 1) for one in sources(obj)
+        )
+
+    def _find_repeated(self, tree: Tree) -> None:
+        """What arrays and compounds show never counts where it lies; nor do elements of link arrays."""
+        has_elements = any(kind is Kind.ELEMENT for _, kind in tree.members.values())
+        for name, (obj, kind) in tree.members.items():
+            if kind is Kind.LINK and has_elements:
+                self._inside.update(map(self._key, elements(obj)))
+            elif kind is Kind.COMPOUND or (kind is Kind.DRAFT_ARRAY and tree.times(name)):
+                # The first instance of an array stands where its original lies.
+                covered = self._covered if tree.times(name) else self._gone
+                covered.update(map(self._key, sources(obj)))
+
+    def shown_by(self, objects: list[tuple[Any, Kind]]) -> set[Key]:
+        """The objects of the document that these show, directly or not."""
+        found: set[Key] = set()
+        while objects:
+            for one in self._shows(*objects.pop()):
+                if one is None or not self._is_mine(one) or (key := self._key(one)) in found:
+                    continue
+                found.add(key)
+                kind = kind_of(one)
+                objects.append((one, kind))
+                if kind in INLINE and key not in self._trees:
+                    objects += self._tree(key, one).members.values()
+        return found
+
+    def _shows(self, obj: Any, kind: Kind) -> list[Any]:
+        if kind in REPEATERS:
+            return sources(obj)
+        if kind not in SHOWING or kind is Kind.ASSEMBLY_LINK:
+            return []
+        try:
+            linked = getattr(obj, "LinkedObject", None)
+        except DocumentError:  # whoever counts it says so
+            return []
+        if isinstance(linked, tuple):
+            is_near = linked[0] is not None and self._is_mine(linked[0])
+            linked = self._reader.resolve(obj).obj if is_near else None
+        return [linked, first_of(own(obj, "LinkCopyOnChangeSource"))]
+
+    def _leaves(self, tree: Tree) -> list[tuple[Shown, int]]:
+        """What counts in a container, and how often; and the role of each object that lies in it."""
+        leaves: list[tuple[Shown, int]] = []
+        for name, (obj, kind) in tree.members.items():
+            try:
+                role, node = self._judged(tree, name, obj, kind)
+            except DocumentError as error:
+                self._unreadable(obj, error)
+                role, node = Role.COMPONENT, None
+            if tree is self._main:
+                self._roles[name] = role
+            else:  # shown only through what led here
+                self._roles.setdefault(name, Role.SOURCE if role in _COUNTS else role)
+            if node is not None:
+                leaves.append((node, tree.times(name)))
+        return self._without_hidden_geometry(tree, leaves)
+
+    def _judged(self, tree: Tree, name: Key, obj: Any, kind: Kind) -> tuple[Role, Shown | None]:
+        if kind is Kind.NOTHING:
+            return Role.CONSTRUCTION, None
+        if name in self._inside:
+            return Role.INSIDE, None
+        # Few assemblies have anything covered or shown twice; to climb for each takes long in deep ones.
+        around = (name, *tree.around(name)) if self._covered or self._shown else ()
+        if not self._covered.isdisjoint(around):
+            return Role.SOURCE, None
+        if name in self._gone:
+            return Role.LEFT_OUT, None
+        if not tree.times(name):
+            if left_out_by(obj) and any(tree.times(one) for one in tree.holders[name]):
+                self._report_left_out(obj, kind)
+            return Role.LEFT_OUT, None
+        if kind in INLINE and name not in self._wholes and not self._is_closed(obj, kind):
+            return Role.HOLDER, None
+        if any(one in self._shown and not tree.visible(one) for one in around):
+            return Role.SOURCE, None
+        node = self._node(name, obj, kind)
+        if node is None or not node.worth:
+            return Role.CONSTRUCTION, None
+        return self._unconsumed(tree, name, node)
+
+    def _report_left_out(self, obj: Any, kind: Kind) -> None:
+        """What goes with its container needs no word of its own, nor does what is nothing to buy."""
+        if kind in _COUNTABLE or kind in INLINE or kind in DECLARABLE:
+            self._is_left_out(obj)
+            self._holds_components |= kind is Kind.DRAFT_ARRAY or kind in COMPONENTS
+
+    def _unconsumed(self, tree: Tree, name: Key, node: Shown) -> tuple[Role, Shown | None]:
+        """Without standard parts and geometry that a feature consumes; a part of another file stays."""
+        if all(key[0] != STANDARD_PARTS and key[0] != self._path for key in node.worth):
+            return Role.COMPONENT, node
+        if len(tree.members) < 2 and not self._is_hardware(node):  # to ask every feature takes long
+            return Role.COMPONENT, node
+        features = (obj for obj, kind in tree.members.values() if kind is Kind.LOCAL)
+        eaten = self._reader.eaten(self._document, features)
+        feature = next((eaten[one] for one in (name, *tree.above(name)) if one in eaten), None)
+        if feature is None:
+            return Role.COMPONENT, node
+        if self._is_hardware(node):
+            self._notes.consumed(node.obj, feature)
+        left = {
+            key: one
+            for key, one in node.worth.items()
+            if key[0] != STANDARD_PARTS and not (key[0] == self._path and self._is_own(one[0]))
+        }
+        if not left:
+            return Role.OPERAND, None
+        return Role.COMPONENT, Shown(node.obj, node.kind, left, node.below, node.tree)
+
+    @staticmethod
+    def _is_hardware(node: Shown) -> bool:
+        return any(key[0] == STANDARD_PARTS for key in node.worth)
+
+    def _without_hidden_geometry(
+        self, tree: Tree, leaves: list[tuple[Shown, int]]
+    ) -> list[tuple[Shown, int]]:
+        """Of geometry modelled in the file only what is visible is shown, except where nothing else is."""
+
+        hidden = set()
+        for node, _ in leaves:
+            if node.kind not in DECLARABLE or tree.visible(name := self._key(node.obj)):
+                continue
+            if all(key[0] == self._path and self._is_own(target) for key, (target, _) in node.worth.items()):
+                hidden.add(name)
+        if not hidden or len(hidden) == len(leaves):
+            return leaves
+        self._roles.update(dict.fromkeys(hidden, Role.CONSTRUCTION))
+        self._hidden += [tree.members[name][0] for name in hidden]
+        return [leaf for leaf in leaves if self._key(leaf[0].obj) not in hidden]
+
+    def _split(
+        self, leaves: Iterable[tuple[Shown, int]], *, beside: bool = False
+    ) -> tuple[list[Count], list[Count]]:
+        """The components, and the parts of this file that are no items yet."""
+        counts: list[Count] = []
+        mine: list[Count] = []
+        for node, times in leaves:
+            link = self._key(node.obj) in self._links
+            for key, (target, quantity) in node.worth.items():
+                count = Count(node, key, quantity * times, link, link and is_array(node.obj), beside)
+                is_mine = key[0] == self._path and self._is_own(target)
+                (mine if is_mine else counts).append(count)
+        return counts, mine
+
+    def _report_rings(self) -> None:
+        """Links that lead back to what holds them block, except where they bring nothing anyway."""
+        for ring in self._rings:
+            links = [obj for obj in ring.values() if is_link(obj)]
+            if not links or any(key in self._nodes and self._nodes[key].worth for key in ring):
+                for obj in ring.values():
+                    self._notes.loop(obj)
+                continue
+            for link in links:
+                self._notes.in_document(link, self._reader.resolve(link).obj, leads_back=True)
+
+    # --- what each of them brings ---
+
+    def _node(self, key: Key, obj: Any, kind: Kind) -> Shown | None:
+        """What one object brings; each is looked at once, so groups of groups cost no more than they hold.
+
+        None for a ring, for what is nested too deep, and for what is damaged.
+        """
+        if (known := self._nodes.get(key)) is not None:
+            return known
+        if key in self._open:
+            ring = list(self._open)[list(self._open).index(key) :]
+            self._rings.append({one: self._open[one] for one in ring})
+            return None
+        if len(self._open) > _MAX_NESTING:
+            self._notes.too_deep(obj, _MAX_NESTING)
+            return None
+        self._open[key] = obj
+        try:
+            node = self._made(key, obj, kind)
+        except DocumentError as error:
+            # One damaged object must not hide the others; the finding blocks the BOM all the same.
+            self._unreadable(obj, error)
+            return None
+        finally:
+            del self._open[key]
+        self._nodes[key] = node
+        return node
+
+    def _unreadable(self, obj: Any, error: DocumentError) -> None:
+        self._holds_components = True
+        self._notes.unreadable(obj, error)
+
+    def _made(self, key: Key, obj: Any, kind: Kind) -> Shown:
+        if kind in COMPONENTS or kind is Kind.ELEMENT:
+            return self._link(key, obj, kind)
+        if kind is Kind.STANDARD:
+            return Shown(obj, kind, self._standard(obj))
+        if kind is Kind.LOCAL or self._is_closed(obj, kind) or key in self._wholes:
+            return Shown(obj, kind, {key: (obj, 1)})
+        if kind is Kind.FOREIGN:
+            return Shown(obj, kind, self._imported(key, obj))
+        if kind in REPEATERS:
+            return self._repeater(key, obj, kind)
+        if kind not in INLINE:
+            return Shown(obj, kind, {})
+        tree = self._tree(key, obj)
+        if key in self._wholes:
+            return Shown(obj, kind, {key: (obj, 1)})
+        leaves = self._leaves(tree)
+        return Shown(obj, kind, self._sum(leaves), tuple(leaves), tree=tree)
+
+    @staticmethod
+    def _sum(leaves: Iterable[tuple[Shown, int]]) -> Worth:
+        worth: Worth = {}
+        for node, times in leaves:
+            add(worth, node.worth, times)
+        return worth
+
+    def _standard(self, fastener: Any) -> Worth:
+        if not self._reader.hardware:
+            self._notes.no_hardware(fastener)
+            return {}
+        return {self._reader.component(fastener): (fastener, 1)}
+
+    def _imported(self, key: Key, obj: Any) -> Worth:
+        """What A2plus imported is the part in the file that it came from."""
+        file = own(obj, "sourceFile")
+        is_file = isinstance(file, str) and file.lower().endswith(".fcstd")
+        ask = getattr(obj.Document, "imported", None) if is_file else None
+        if ask is None:
+            self._notes.foreign(obj)
+            return {key: (obj, 1)}
+        found = ask(file.replace("\\", "/"))
+        if not isinstance(found, LinkProblem):
+            if getattr(found, "is_document_root", False):
+                inner = self._reader.contents(found)
+                found = inner.own[0].target if inner.is_part else found
+            return {self._key(found): (found, 1)}
+        self._holds_components = True
+        problem = replace(found, file=located(found.file, obj.Document.FileName))
+        self._notes.broken(obj, problem)
+        lost = Lost(problem.file, "", label_of(obj))
+        return {lost.key: (lost, 1)}
+
+    def _repeater(self, key: Key, obj: Any, kind: Kind) -> Shown:
+        listed = sources(obj)
+        shown = [one for one in listed if not self._is_left_out(one)]
+        nodes = [self._node(self._key(one), one, kind_of(one)) for one in shown]
+        below = [(node, 1) for node in nodes if node is not None and node.worth]
+        worth = self._sum(below)
+        one_piece = kind is Kind.COMPOUND and bool(worth) and self._is_geometry(obj, kind)
+        if not listed or (one_piece and all(self._is_own(target) for target, _ in worth.values())):
+            return Shown(obj, kind, {key: (obj, 1)})
+        if not worth or kind is not Kind.DRAFT_ARRAY:
+            return Shown(obj, kind, worth, tuple(below))
+        count = draft_count(obj)
+        if count is None:
+            self._notes.unknown_array(obj, shown[0])
+        elif not all(self._is_own(target) for target, _ in worth.values()):
+            self._notes.draft_array(obj, shown[0], count)
+        below = [(node, count or 1) for node, _ in below]
+        return Shown(obj, kind, self._sum(below), tuple(below))
+
+    def _is_left_out(self, obj: Any) -> bool:
+        """True for an object that is left out; says so."""
+        mark = left_out_by(obj)
+        if mark == "Suppressed":
+            self._notes.suppressed(obj)
+        elif mark:
+            self._notes.excluded(obj)
+        return bool(mark)
+
+    def _link(self, key: Key, link: Any, kind: Kind) -> Shown:
+        nothing = Shown(link, kind, {})
+        if self._is_left_out(link):
+            self._holds_components = True
+            return nothing
+        for element in elements(link):
+            self._is_left_out(element)
+        target = self._reader.resolve(link)
+        if target.obj is None:
+            self._holds_components = True
+            self._notes.broken(link, target.problem)
+            return Shown(link, kind, self._lost_by(link, target))
+        if target.element:
+            self._notes.sub_element(link, target.element)
+        elif target.excluded:
+            self._holds_components = True
+            self._notes.excluded(link, target.obj)
+        elif not target.instances:  # every element is left out
+            self._holds_components = True
+        else:
+            return self._whole_object(key, link, kind, target)
+        return nothing
+
+    @staticmethod
+    def _lost_by(link: Any, target: Target) -> Worth:
+        """A broken link counts like any other where it says what it stood for; else its finding must do."""
+        problem = target.problem
+        if problem is None or not problem.file or problem.code in _NO_COMPONENT_LOST or not target.instances:
+            return {}
+        lost = Lost(problem.file, problem.obj, label_of(link))
+        return {lost.key: (lost, target.instances)}
+
+    def _whole_object(self, key: Key, link: Any, kind: Kind, target: Target) -> Shown:
+        if self._is_mine(target.obj):
+            return self._in_document(link, kind, target)
+        name = self._key(target.obj)
+        if words := self._reader.no_component(name, target.obj):
+            self._notes.no_component(link, target.obj, words)
+            return Shown(link, kind, {})
+        # An object of another file is a component, whatever it is.
+        text, _ = self._reader.standard(target.obj, name)
+        if text:
+            worth = self._standard(target.obj)
+        else:
+            worth = self._ones.setdefault(name, {name: (target.obj, 1)})
+        if not worth:
+            return Shown(link, kind, worth)
+        if is_link(link):
+            self._links.add(key)
+            self._notes.link_type(link)
+        self._remarks(link, target)
+        if target.instances != 1:
+            worth = {brought: (obj, count * target.instances) for brought, (obj, count) in worth.items()}
+        if not is_assembly_link(link):
+            return Shown(link, kind, worth)
+        parts = own_parts(link, target.obj, self._key)
+        nodes = [self._node(self._key(part), part, kind_of(part)) for part in parts]
+        below = [(node, 1) for node in nodes if node is not None]
+        worth = dict(worth)
+        add(worth, self._sum(below))
+        return Shown(link, kind, worth, tuple(below))
+
+    def _in_document(self, link: Any, kind: Kind, target: Target) -> Shown:
+        """A link within the file brings what its target brings, which may be nothing."""
+        obj = target.obj
+        node = self._node(self._key(obj), obj, kind_of(obj))
+        below = ((node, target.instances),) if node is not None and node.worth else ()
+        if not below:
+            if not any(self._key(link) in ring for ring in self._rings):
+                self._notes.in_document(link, obj)
+        elif target.mirrored:
+            self._notes.mirrored(link, obj)
+        if below and target.variant is not None:
+            self._notes.variant(link, obj)
+        return Shown(link, kind, self._sum(below), below)
+
+    def _remarks(self, link: Any, target: Target) -> None:
+        if target.mirrored:
+            self._notes.mirrored(link, target.obj)
+        if target.variant is not None:
+            self._notes.variant(link, target.obj)
+        if is_assembly_link(link):
+            gone, new = stale_copies(link, target.obj, self._key)
+            if gone or new:
+                self._notes.stale(link, target.obj, gone, new)

@@ -1,0 +1,526 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Mesh files: STL, OBJ, PLY and GLB through trimesh, and 3MF.
+
+A mesh has a volume only if it is closed and its triangles agree on what is outside. What is not so is
+computed all the same and said: a number from an open mesh looks like any other number.
+
+3MF files (3MF Core Specification 1.3, with the Production Extension's parts in several model files).
+
+Read here and not by trimesh, whose 3MF loader needs two further packages of 31 MB for it, drops the names of
+components and takes any XML. The meshes still go the way of all others, through trimesh.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
+from typing import Any, NoReturn
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from silo.bom.errors import ConfigError, DocumentError, counted
+from silo.inertia.geometry.graph import (
+    MAX_DEPTH,
+    MESH_UNITS,
+    Child,
+    Kind,
+    Node,
+    Reading,
+    ReadOptions,
+    Report,
+    in_metres,
+    unfold,
+)
+from silo.inertia.geometry.measured import Measured, assembled, implausible_size
+from silo.inertia.geometry.together import Floats, Mesh, enclosed, welded, without
+from silo.inertia.model import GeometryCode, Note, Prototype
+
+MAX_COORDINATE = 1e12
+"""Of mesh files, in their own unit; nothing that is made is as large, and larger ones overflow an inertia."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshScene:
+    """Meshes by name in file units, their placed uses, and the file's unit [m], None if it states none.
+
+    ``said`` is by mesh, that of the whole file under "".
+    """
+
+    meshes: Mapping[str, Mesh]
+    nodes: Mapping[str, Node]
+    roots: tuple[Child, ...]
+    unit_name: str
+    unit_m: float | None
+    said: Mapping[str, Sequence[Note]] = field(default_factory=dict)
+
+
+def read_mesh(path: Path, kind: Kind, options: ReadOptions, report: Report) -> Reading:
+    """Return the assembly of a mesh file: one instance, or those of its scene. Raises DocumentError."""
+    report("reading", 0, 0)
+    scene = _scene(path, kind)
+    unit, unit_name, problems = _unit(scene, options)
+    with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is checked
+        unfolded = unfold(scene.nodes, scene.roots, options.max_instances)
+    for instance in unfolded.instances:
+        _check(path, f"the placement of '{instance.name}'", instance.transform)
+    unfolded.instances = [replace(i, transform=in_metres(i.transform, unit)) for i in unfolded.instances]
+    unfolded.frames = {path: in_metres(frame, unit) for path, frame in unfolded.frames.items()}
+    prototypes = {}
+    for number, key in enumerate(unfolded.placed, start=1):
+        report("measuring", number, len(unfolded.placed))
+        mesh = scene.meshes[key]
+        said = scene.said.get(key, ())
+        name = scene.nodes[key].name
+        prototypes[key] = _prototype(key, name, Mesh(mesh.vertices * unit, mesh.faces), said)
+    problems += [*scene.said.get("", ())]
+    problems += implausible_size(prototypes, unit_name)
+    return Reading(
+        assembled(unfolded, prototypes, problems, name=path.stem, source=str(path), unit=unit_name)
+    )
+
+
+def checked_mesh(path: Path, what: str, vertices: ArrayLike, faces: ArrayLike) -> Mesh:
+    """Return the triangles of a file, welded. Raises DocumentError for coordinates that cannot be meant."""
+    points = np.asarray(vertices, dtype=np.float64)
+    _check(path, what, points)
+    return welded(points, np.asarray(faces, dtype=np.int64))
+
+
+def _check(path: Path, what: str, numbers: Floats) -> None:
+    if not (np.abs(numbers) <= MAX_COORDINATE).all():  # NaN is no more so than infinity
+        reason = f"{what} has numbers that are not finite, or larger than {MAX_COORDINATE:g}"
+        raise DocumentError(str(path), f"{reason}; repair the file or export it again")
+
+
+def _scene(path: Path, kind: Kind) -> MeshScene:
+    if kind is Kind.THREEMF:
+        return read_3mf(path)
+    try:
+        import trimesh
+    except ImportError as error:  # pragma: no cover - the development environment always has it
+        raise ConfigError(
+            'mesh files need trimesh, which is not installed: pip install "silo-mod[inertia]"'
+        ) from error
+    try:
+        # Infinite coordinates are refused below, in words; numpy's own would be about trimesh.
+        with path.open("rb") as stream, np.errstate(all="ignore"):
+            # Unprocessed: what trimesh would mend in silence is what we have to report.
+            loaded = trimesh.load_scene(stream, file_type=kind.value, process=False)
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise DocumentError(str(path), f"cannot be read as {kind.value}: {error}") from error
+    return _from_trimesh(path, kind, loaded)
+
+
+def _from_trimesh(path: Path, kind: Kind, loaded: Any) -> MeshScene:
+    meshes: dict[str, Mesh] = {}
+    nodes: dict[str, Node] = {}
+    for name, geometry in loaded.geometry.items():
+        faces = getattr(geometry, "faces", None)
+        if faces is None or not len(faces):
+            continue
+        meshes[name] = checked_mesh(path, f"the mesh '{name}'", geometry.vertices, faces)
+        nodes[name] = Node(name, path.stem if len(loaded.geometry) == 1 else name, (), True)
+    if not meshes:
+        raise DocumentError(str(path), "holds no triangles")
+    roots = _tree(loaded.graph, nodes)
+    glb = kind is Kind.GLB
+    said: list[Note] = []
+    if kind in (Kind.OBJ, Kind.GLB):
+        used = [loaded.graph.transforms.node_data[n].get("geometry") for n in loaded.graph.nodes_geometry]
+        read = (
+            sum(name in nodes for name in used)
+            if glb
+            else sum(len(m.faces) for m in loaded.geometry.values())
+        )
+        said = _unread(path.read_bytes(), glb, read)
+    return MeshScene(meshes, nodes, roots, "m" if glb else "", 1.0 if glb else None, {"": said})
+
+
+_POLYGON = re.compile(rb"^[ \t]*(f[ \t](?:[^\n]*\\\r?\n)*[^\n]*|surf[ \t])", re.MULTILINE)
+_TRIANGLES = (4, 5, 6)
+"""Ways to draw a primitive of glTF that make triangles."""
+
+
+def _unread(data: bytes, glb: bool, read: int) -> list[Note]:
+    """Compare what was read with the file's list: placed primitives of a GLB, polygons of an OBJ file."""
+    left_out = 0
+    if glb:
+        scene = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+        nodes, meshes = scene.get("nodes", []), scene.get("meshes", [])
+        waiting = list((scene.get("scenes") or [{}])[scene.get("scene", 0)].get("nodes", ()))
+        placed = set[int]()
+        while waiting:
+            if (node := waiting.pop()) not in placed:
+                placed.add(node)
+                waiting += nodes[node].get("children", ())
+        full = {n for n, node in enumerate(nodes) if "mesh" in node}
+        left_out = len(full - placed)
+        drawn = [meshes[nodes[n]["mesh"]].get("primitives", ()) for n in full & placed]
+        listed = sum(one.get("mode", 4) in _TRIANGLES for primitives in drawn for one in primitives)
+        listed += sum("EXT_mesh_gpu_instancing" in nodes[n].get("extensions", ()) for n in placed)
+    else:
+        lines = [line.split() for line in _POLYGON.findall(data)]
+        listed = sum(max(len(line) - 3, 0) if line[0] == b"f" else 1 for line in lines)
+    said = []
+    if read < listed:
+        what = "placed meshes" if glb else "triangles and free-form surfaces"
+        words = f"the file has {listed} {what}, and {read} were read: volume is missing"
+        said.append(Note(GeometryCode.BODY_MISSING, words))
+    if left_out:
+        words = f"{counted(left_out, 'node')} of the file in no scene: left out"
+        said.append(Note(GeometryCode.NOT_COUNTED, words))
+    return said
+
+
+def _tree(graph: Any, nodes: dict[str, Node]) -> tuple[Child, ...]:
+    """Return the scene's own tree as nodes; a branch with neither meshes nor branches is left out."""
+    children: Mapping[str, list[str]] = graph.transforms.children
+
+    def use(name: str, parent: str, above: tuple[str, ...]) -> Child | None:
+        if name in above or len(above) > MAX_DEPTH:
+            return None
+        edge = graph.transforms.edge_data[(parent, name)]
+        matrix = np.asarray(edge.get("matrix", np.eye(4)), dtype=np.float64)
+        below = [use(child, name, (*above, name)) for child in children.get(name, ())]
+        inside = [child for child in below if child is not None]
+        mesh = graph.transforms.node_data[name].get("geometry")
+        if mesh in nodes:
+            if not inside:
+                return Child(str(name), mesh, matrix)
+            inside.insert(0, Child(nodes[mesh].name, mesh))
+        if not inside:
+            return None
+        nodes[f"node:{name}"] = Node(f"node:{name}", str(name), tuple(inside))
+        return Child(str(name), f"node:{name}", matrix)
+
+    top = graph.base_frame
+    roots = [use(child, top, (top,)) for child in children.get(top, ())]
+    found = [root for root in roots if root is not None]
+    mesh = graph.transforms.node_data.get(top, {}).get("geometry")
+    return tuple([Child(nodes[mesh].name, mesh)] if mesh in nodes else []) + tuple(found)
+
+
+def _unit(scene: MeshScene, options: ReadOptions) -> tuple[float, str, list[Note]]:
+    if options.mesh_unit is not None:
+        if options.mesh_unit not in MESH_UNITS:
+            raise ConfigError(f"mesh_unit: wanted one of {', '.join(MESH_UNITS)}, got '{options.mesh_unit}'")
+        return MESH_UNITS[options.mesh_unit], options.mesh_unit, []
+    if scene.unit_m is not None:
+        return scene.unit_m, scene.unit_name, []
+    problem = Note(
+        GeometryCode.UNITS,
+        "the format states no unit of length; read as mm. Name the unit if it is another",
+    )
+    return MESH_UNITS["mm"], "mm", [problem]
+
+
+def _prototype(key: str, name: str, mesh: Mesh, said: Sequence[Note]) -> Prototype:
+    problems = list(said)
+    solid = enclosed(mesh, problems)
+    solids = (solid,) if solid.volume_m3 else ()
+    return Measured(solids, tuple(problems), mesh, has_faces=True).prototype(key, name)
+
+
+MAX_MODEL_BYTES = 2_000_000_000
+MAX_MODELS = 2_000
+_RELATIONS = "_rels/.rels"
+_MODEL_TYPE = "3dmodel"
+_BAMBU, _PRUSA = "Metadata/model_settings.config", "Metadata/Slic3r_PE_model.config"
+_CURA = tuple(f"cura:{word}_mesh" for word in ("support", "anti_overhang", "infill", "cutting"))
+"""What Cura says of an object that only tells how others are printed."""
+_NEGATIVE = ("negative_part", "NegativeVolume")
+_PART = ("", "model", "normal_part", "ModelPart")
+"""What is the part, by the object's type or by the slicer's word. All else is not, or is negative."""
+
+
+Corner = tuple[float, float, float]
+
+
+@dataclass(eq=False)
+class _Object:
+    name: str = ""
+    kind: str = ""
+    vertices: list[Corner] = field(default_factory=list)
+    faces: list[tuple[int, int, int]] = field(default_factory=list)
+    components: list[tuple[str, str, Floats]] = field(default_factory=list)
+
+
+@dataclass(eq=False)
+class _Model:
+    """One .model part: objects by id, build items, unit."""
+
+    unit: str = "millimeter"
+    objects: dict[str, _Object] = field(default_factory=dict)
+    items: list[tuple[str, str, Floats]] = field(default_factory=list)
+    unprinted: list[str] = field(default_factory=list)
+
+
+def read_3mf(path: Path) -> MeshScene:
+    """Return the scene of a 3MF file. Raises DocumentError."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _Package(path, archive).scene()
+    except zipfile.BadZipFile as error:
+        raise DocumentError(str(path), f"is a damaged zip file ({error}); save it again") from error
+
+
+_NOT_CUT = "a negative volume could not be subtracted"
+
+
+class _Package:
+    def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
+        self._path = path
+        self._archive = archive
+        self._models: dict[str, _Model] = {}
+        self._meshes: dict[str, Mesh] = {}
+        self._nodes: dict[str, Node] = {}
+        self._reached: set[str] = set()
+        self._said: dict[str, list[Note]] = defaultdict(list)
+        self._slicer = _Slicer()
+        for name in {_BAMBU, _PRUSA}.intersection(archive.namelist()):
+            self._parse(name, self._slicer.start)
+
+    def scene(self) -> MeshScene:
+        root = self._root()
+        model = self._model(root)
+        roots = []
+        for part, number, transform in model.items:
+            if self._is_left_out("", part or root, number):
+                continue
+            key = self._add(part or root, number, ())
+            roots.append(Child(self._nodes[key].name, key, transform))
+        if not roots:
+            self._fail("builds nothing: no object is listed to be made")
+        if model.unit not in MESH_UNITS:
+            self._fail(f"states the unit '{model.unit}', which 3MF does not know")
+        unit_m = MESH_UNITS[model.unit]
+        for number, found in model.objects.items():
+            if f"{PurePosixPath(root).name}#{number}" not in self._reached and found.kind in _PART:
+                why = "is marked as not printed" if number in model.unprinted else "is built by nothing"
+                self._say("", f"object {number} “{found.name}” {why}: left out")
+        return MeshScene(self._meshes, self._nodes, tuple(roots), model.unit, unit_m, self._said)
+
+    def _say(self, key: str, words: str, code: GeometryCode = GeometryCode.NOT_COUNTED) -> None:
+        self._said[key].append(Note(code, words))
+
+    def _is_left_out(self, role: str, part: str, number: str) -> bool:
+        """Report an object that is not the part, by the slicer's word or by its own type."""
+        self._reached.add(f"{PurePosixPath(part).name}#{number}")
+        found = self._model(part).objects.get(number)
+        words = [word for word in (role, found.kind if found else "") if word not in (*_PART, *_NEGATIVE)]
+        if words and found:
+            self._say("", f"object {number} “{found.name}” is not the part ({words[0]}): left out")
+        return bool(words)
+
+    def _root(self) -> str:
+        names = self._archive.namelist()
+        if _RELATIONS in names:
+            finder = _Relations()
+            self._parse(_RELATIONS, finder.start)
+            if finder.target.lstrip("/") in names:
+                return finder.target.lstrip("/")
+        models = [name for name in names if name.lower().endswith(".model")]
+        if not models:
+            self._fail("holds no 3D model")
+        return models[0]
+
+    def _model(self, name: str) -> _Model:
+        name = name.lstrip("/")
+        if name not in self._models:
+            if len(self._models) >= MAX_MODELS:
+                self._fail(f"is spread over more than {MAX_MODELS} model files")
+            reader = _ModelReader()
+            self._parse(name, reader.start, reader.text)
+            self._models[name] = reader.model
+        return self._models[name]
+
+    def _add(self, part: str, number: str, inside: tuple[str, ...]) -> str:
+        key = f"{PurePosixPath(part).name}#{number}"
+        if key in inside:
+            self._fail(f"its object {number} contains itself")
+        if key in self._nodes:
+            return key
+        found = self._model(part).objects.get(number)
+        if found is None:
+            self._fail(f"refers to an object {number} that it does not hold")
+        children: list[Child] = []
+        cuts: list[Mesh] = []
+        for other, child, transform in found.components:
+            role = self._slicer.roles.get((number, child), "")
+            if self._is_left_out(role, other or part, child):
+                continue
+            child_key = self._add(other or part, child, (*inside, key))
+            if role not in _NEGATIVE:
+                children.append(Child(self._nodes[child_key].name, child_key, transform))
+            elif child_key in self._meshes:
+                cuts.append(self._meshes[child_key].moved(transform))
+            else:
+                self._say(
+                    "", f"the negative volume {child} is an assembly: {_NOT_CUT}", GeometryCode.INVALID_SHAPE
+                )
+        faces = dict(enumerate(found.faces))
+        for kind, first, last in self._slicer.volumes.get(number, ()):
+            if kind not in _PART:
+                taken = [faces.pop(row) for row in range(first, last + 1) if row in faces]
+                if kind not in _NEGATIVE:
+                    self._say("", f"a volume of object {number} is not the part ({kind}): left out")
+                elif taken:
+                    cuts.append(self._mesh(number, found.vertices, taken))
+        if faces:
+            self._meshes[key] = self._mesh(number, found.vertices, list(faces.values()))
+            self._carve(key, cuts)
+        elif not found.components:
+            words = f"object {number} “{found.name}” has no triangles: its volume is missing"
+            self._say("", words, GeometryCode.BODY_MISSING)
+        name = found.name or (self._path.stem if not inside else f"object {number}")
+        whole = tuple(self._carved(key, child, cuts) for child in children)
+        self._nodes[key] = Node(key, name, whole, bool(faces))
+        return key
+
+    def _carved(self, parent: str, child: Child, cuts: Sequence[Mesh]) -> Child:
+        """Return the use of a mesh of its own, without the negative volumes beside it."""
+        if cuts and child.product not in self._meshes:
+            words = f"“{child.name}” is an assembly: {_NOT_CUT} from it"
+            self._say("", words, GeometryCode.INVALID_SHAPE)
+        if not cuts or child.product not in self._meshes:
+            return child
+        key = f"{parent}-{child.name}-{child.product}"
+        self._meshes[key] = self._meshes[child.product]
+        self._nodes[key] = replace(self._nodes[child.product], key=key)
+        inverse = np.asarray(np.linalg.inv(child.transform), dtype=np.float64)
+        self._carve(key, [cut.moved(inverse) for cut in cuts])
+        return replace(child, product=key)
+
+    def _carve(self, key: str, cuts: Sequence[Mesh]) -> None:
+        for cut in cuts:
+            if (left := without(self._meshes[key], cut)) is None:
+                words = f"the mesh or the volume does not close: {_NOT_CUT}"
+                self._say(key, words, GeometryCode.INVALID_SHAPE)
+            else:
+                self._meshes[key] = left
+                self._say(key, "the slicer's negative volume was subtracted")
+
+    def _mesh(self, number: str, vertices: Sequence[Corner], rows: Sequence[tuple[int, int, int]]) -> Mesh:
+        faces = np.array(rows, dtype=np.int64)
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            self._fail(f"its object {number} has triangles of vertices that it does not hold")
+        return checked_mesh(self._path, f"its object {number}", vertices, faces)
+
+    def _parse(
+        self,
+        name: str,
+        start: Callable[[str, dict[str, str]], None],
+        text: Callable[[str], None] | None = None,
+    ) -> None:
+        try:
+            info = self._archive.getinfo(name)
+            if info.file_size > MAX_MODEL_BYTES:
+                self._fail(f"its part {name} would unpack to {info.file_size / 1e9:.1f} GB")
+            parser = expat.ParserCreate(namespace_separator=" ")
+            parser.StartElementHandler = start
+            parser.CharacterDataHandler, parser.buffer_text = text, True
+            parser.StartDoctypeDeclHandler = self._doctype
+            with self._archive.open(info) as stream:
+                parser.ParseFile(stream)
+        except KeyError:
+            self._fail(f"names a part {name} that it does not hold")
+        except (expat.ExpatError, ValueError, zipfile.BadZipFile, EOFError) as error:
+            self._fail(f"its part {name} is damaged: {error}")
+
+    def _doctype(self, *_: object) -> NoReturn:
+        self._fail("declares a document type, which no 3MF file does; it is not read")
+
+    def _fail(self, reason: str) -> NoReturn:
+        raise DocumentError(str(self._path), reason)
+
+
+class _Relations:
+    def __init__(self) -> None:
+        self.target = ""
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        if _local(tag) == "Relationship" and attributes.get("Type", "").lower().endswith(_MODEL_TYPE):
+            self.target = self.target or attributes.get("Target", "")
+
+
+class _Slicer:
+    """What a slicer says of the parts of an object (Bambu, Orca), or of ranges of its triangles (Prusa)."""
+
+    def __init__(self) -> None:
+        self.roles: dict[tuple[str, str], str] = {}
+        self.volumes: dict[str, list[tuple[str, int, int]]] = defaultdict(list)
+        self._object = ""
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        kind, key, value = tag, attributes.get("key", ""), attributes.get("value", "")
+        if kind == "object":
+            self._object = attributes.get("id", "")
+        elif kind == "part":
+            self.roles[self._object, attributes.get("id", "")] = attributes.get("subtype", "")
+        elif kind == "volume":
+            first, last = int(attributes["firstid"]), int(attributes["lastid"])
+            self.volumes[self._object].append(("", first, last))
+        elif key == "volume_type" or (key, value) == ("modifier", "1"):
+            volumes = self.volumes[self._object]
+            volumes[-1:] = [(value if key == "volume_type" else "modifier", *one[1:]) for one in volumes[-1:]]
+
+
+class _ModelReader:
+    def __init__(self) -> None:
+        self.model = _Model()
+        self._object = _Object()
+        self._metadata = ""
+
+    def text(self, data: str) -> None:
+        if self._metadata in _CURA and data.strip().casefold() == "true":
+            self._object.kind = self._metadata
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        kind = _local(tag)
+        self._metadata = attributes.get("name", "") if kind == "metadata" else ""
+        if kind == "vertex":
+            x, y, z = float(attributes["x"]), float(attributes["y"]), float(attributes["z"])
+            self._object.vertices.append((x, y, z))
+        elif kind == "triangle":
+            a, b, c = int(attributes["v1"]), int(attributes["v2"]), int(attributes["v3"])
+            self._object.faces.append((a, b, c))
+        elif kind == "object":
+            self._object = _Object(attributes.get("name", "").strip(), attributes.get("type", ""))
+            self.model.objects[attributes.get("id", "")] = self._object
+        elif kind == "component":
+            self._object.components.append(_use(attributes))
+        elif kind == "item" and attributes.get("printable") == "0":
+            self.model.unprinted.append(attributes.get("objectid", ""))
+        elif kind == "item":
+            self.model.items.append(_use(attributes))
+        elif kind == "model":
+            self.model.unit = attributes.get("unit", "millimeter")
+
+
+def _use(attributes: dict[str, str]) -> tuple[str, str, Floats]:
+    part = next((value for name, value in attributes.items() if _local(name) == "path"), "")
+    return part, attributes.get("objectid", ""), _matrix(attributes.get("transform", ""))
+
+
+def _matrix(text: str) -> Floats:
+    """Read a placement: 3MF writes row vectors, v' = v M, twelve numbers row by row; ours are columns."""
+    matrix = np.eye(4)
+    if text.strip():
+        numbers = np.array([float(word) for word in text.split()])
+        if numbers.size != 12 or not np.isfinite(numbers).all():
+            raise ValueError(f"a transform needs 12 numbers, got '{text[:60]}'")
+        matrix[:3, :] = numbers.reshape(4, 3).T
+    return matrix
+
+
+def _local(tag: str) -> str:
+    return tag.rpartition(" ")[2]

@@ -1,0 +1,519 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A project folder and Silo: which files belong to a commit, how each stands, and what is sent.
+
+The one rule of what belongs to a commit, for the add-on and the command line: what the committed files link
+to inside the project's root, with themselves, if it differs from what is in Silo. Backups, locks and hidden
+files are not files of the project; a link out of the root is reported, and so is one to nothing.
+
+The file of one item goes to that item. A file of several items or of none has a UUID of its own, which the
+project remembers (:class:`silo.files.Project`) before the first request. A file that is known by its identity
+and lies at another place than before has moved.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+
+from silo.api.files import DocumentId, checksum_of
+from silo.api.wire import Revision
+from silo.bom.errors import (
+    DocumentError,
+    InputError,
+    NotFoundError,
+    RouteMissingError,
+    SeveralAssembliesError,
+)
+from silo.bom.links import extract, file_bom
+from silo.bom.model import Extraction, held_items
+from silo.fcstd import Library
+from silo.fcstd.linked import recorded_paths
+from silo.fcstd.locate import Found, Locator
+from silo.files import Kept, Project, content_hash, documents_in
+from silo.outbox.entry import SAME_PART, UNKNOWN, Commit, InFile, new_key
+from silo.outbox.store import Store, on_top, seen
+from silo.platform import one_path
+from silo.vault.pull import file_revisions
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+
+
+class State(StrEnum):
+    """How a file of the project stands to Silo."""
+
+    SAME = "same"  # is in Silo as it is here
+    NEW = "not in Silo"
+    EDITED = "edited"  # here, since it was committed or pulled
+    NEWER = "newer in Silo"  # and not edited here
+    BOTH = "edited, and newer in Silo"
+    WAITING = "waiting"  # its commit is in the queue
+    NO_ITEM = "of an item that this server does not have"
+
+
+@dataclass(frozen=True)
+class ProjectFile:
+    """A file of the project.
+
+    place
+        its path relative to the root, with ``/``.
+    document
+        its UUID in Silo; that of its item, if it has one.
+    item
+        the item whose revisions are the file's; "" for several or none.
+    held
+        (identity, object) of each item in it, the main part first.
+    bom
+        of its assembly, None for a part; ``problem`` says why there is none though there might be one.
+    kept
+        what the project remembers of it.
+    moved_from
+        its place before, which is empty now.
+    """
+
+    path: str
+    place: str
+    sha256: str
+    uid: str
+    document: str
+    item: str = ""
+    held: tuple[tuple[str, str], ...] = ()
+    bom: Extraction | None = field(default=None, repr=False)
+    problem: str = ""
+    kept: Kept | None = None
+    moved_from: str = ""
+
+    @property
+    def base(self) -> str:
+        """The content that it was made from, as far as the project remembers; "" where it does not."""
+        known = self.kept is not None and self.kept.document.lower() == self.document.lower()
+        return self.kept.sha256 if known and self.kept is not None else ""
+
+
+@dataclass(frozen=True)
+class Belonging:
+    """What belongs to a commit: files, linked ones before those that link to them.
+
+    outside, missing
+        (place, link as recorded): links out of the root, and links to nothing.
+    unreadable
+        (place, reason).
+    gone
+        places that the project remembers, where no file is any more.
+    doubtful
+        (place, place of the file of the same item): copies of a registered part.
+    """
+
+    project: Project
+    files: tuple[ProjectFile, ...]
+    outside: tuple[tuple[str, str], ...] = ()
+    missing: tuple[tuple[str, str], ...] = ()
+    unreadable: tuple[tuple[str, str], ...] = ()
+    gone: tuple[str, ...] = ()
+    doubtful: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A file and how it stands; ``newest``: its newest revision in Silo, None where there is none."""
+
+    file: ProjectFile
+    state: State
+    newest: Revision | None = None
+
+
+def find_project(tops: Sequence[str], root: str | None = None) -> Project:
+    """Return the project that files or folders belong to.
+
+    It is the given root, else the folder above them that is marked as one, else the folder that was named,
+    else the folder that holds all that the file links to. Raises InputError.
+    """
+    if root is not None:
+        if not os.path.isdir(root):
+            raise InputError(f"{root} is no folder; name the folder of the project")
+        return Project(one_path(root))
+    found = {marked.root for top in tops if (marked := Project.of(top)) is not None}
+    if len(found) > 1:
+        raise InputError(
+            f"these files are of several projects: {', '.join(sorted(found))}; commit each alone"
+        )
+    if found:
+        return Project(found.pop())
+    folders = [one_path(top) for top in tops if os.path.isdir(top)]
+    if len(folders) == len(tops) == 1:
+        return Project(folders[0])
+    files = [one_path(top) for top in documents_in(tops)]
+    if not files:
+        raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(tops)}")
+    reached = [os.path.dirname(path) for path in _reached(files, Locator())[0]]
+    try:
+        common = os.path.commonpath(reached)
+    except ValueError:  # on Windows: files on several drives
+        common = os.path.dirname(files[0])
+    # The root of the disk, or the home folder, is no project.
+    if common == os.path.expanduser("~") or len(Path(common).parts) < 3:
+        common = os.path.dirname(files[0])
+    return Project(common)
+
+
+def read_project(tops: Sequence[str], project: Project, *, hardware: bool = True) -> Belonging:
+    """Return what belongs to a commit of these files or folders. Changes nothing."""
+    paths = [one_path(path) for path in documents_in(tops)]
+    stray = [path for path in paths if project.place(path) is None]
+    if stray:
+        raise InputError(f"{stray[0]} lies outside the project {project.root}; name its folder with --root")
+    locator = Locator(project.root)
+    order, unreadable, outside, missing = _reached(paths, locator, project)
+    known = project.files()
+    gone = {place: kept for place, kept in known.items() if not os.path.exists(project.path(place))}
+    files: list[ProjectFile] = []
+    with Library(project.root) as library:
+        for path in order:
+            try:
+                files.append(_read(path, project, known, library, hardware=hardware))
+            except (DocumentError, OSError) as error:
+                reason = error.reason if isinstance(error, DocumentError) else str(error)
+                unreadable.append((project.place(path) or path, reason))
+    files, doubtful = _one_file_per_item(files)
+    files = [_moved(file, gone, files) for file in files]
+    moved = {file.moved_from for file in files}
+    return Belonging(
+        project,
+        tuple(files),
+        tuple(outside),
+        tuple(missing),
+        tuple(unreadable),
+        tuple(sorted(set(gone) - moved)),
+        tuple(doubtful),
+    )
+
+
+def _reached(
+    paths: Iterable[str], locator: Locator, project: Project | None = None
+) -> tuple[list[str], list[tuple[str, str]], list[tuple[str, str]], list[tuple[str, str]]]:
+    """The files and all that they link to, linked ones first; what is unreadable, outside, missing."""
+    order: list[str] = []
+    unreadable: list[tuple[str, str]] = []
+    outside: list[tuple[str, str]] = []
+    missing: list[tuple[str, str]] = []
+    entered: set[str] = set()
+
+    def name(path: str) -> str:
+        return (project.place(path) if project is not None else None) or path
+
+    def links(path: str) -> Iterator[str]:
+        try:
+            recorded = recorded_paths(path)
+        except DocumentError as error:
+            if project is not None:
+                unreadable.append((name(path), error.reason))
+            return
+        for one in recorded:
+            found = locator.find(one, (os.path.dirname(path),))
+            if isinstance(found, Found):
+                yield found.real
+                continue
+            anywhere = Locator().find(one, (os.path.dirname(path),))
+            (outside if isinstance(anywhere, Found) else missing).append((name(path), one))
+
+    for top in paths:
+        stack = [(top, links(top))] if top not in entered else []
+        entered.add(top)
+        while stack:
+            path, below = stack[-1]
+            following = next((one for one in below if one not in entered), None)
+            if following is None:
+                stack.pop()
+                order.append(path)
+            else:
+                entered.add(following)
+                stack.append((following, links(following)))
+    bad = {place for place, _ in unreadable}
+    return [path for path in order if name(path) not in bad], unreadable, outside, missing
+
+
+def _read(
+    path: str, project: Project, known: Mapping[str, Kept], library: Library, *, hardware: bool
+) -> ProjectFile:
+    place = project.place(path) or path
+    document, sha256 = library.open(path), content_hash(path)
+    problem = ""
+    item: str | None = None
+    bom: Extraction | None = None
+    try:
+        item, bom = file_bom(document, walk=lambda top: extract(top, hardware=hardware))
+    except SeveralAssembliesError as error:
+        problem = str(error)
+    held = held_items(document)
+    main = [one for one in held if one[0] == item]
+    held = (*main, *(one for one in held if one not in main))
+    kept = known.get(place)
+    own = "" if item else (kept.document if kept is not None else "")
+    return ProjectFile(
+        path, place, sha256, str(document.Uid), item or own, item or "", held, bom, problem, kept
+    )
+
+
+def _one_file_per_item(files: Sequence[ProjectFile]) -> tuple[list[ProjectFile], list[tuple[str, str]]]:
+    """Let an item have one file: a copy with other content is a document of its own, and is reported."""
+    owner: dict[str, ProjectFile] = {}
+    for file in sorted(files, key=lambda one: (one.kept is None or one.kept.document != one.item, one.place)):
+        if file.item:
+            owner.setdefault(file.item.lower(), file)
+    found, doubtful = [], []
+    for file in files:
+        first = owner.get(file.item.lower(), file)
+        if first.place != file.place:
+            doubtful.append((file.place, first.place))
+            if first.sha256 != file.sha256:
+                own = file.kept.document if file.kept and file.kept.document != file.item else ""
+                file = replace(file, document=own, item="", held=(), bom=None)
+        found.append(file)
+    return found, doubtful
+
+
+def _moved(file: ProjectFile, gone: Mapping[str, Kept], files: Sequence[ProjectFile]) -> ProjectFile:
+    """The file with its place before: a remembered file is gone, and only this one can be it."""
+    if file.kept is not None and (file.kept.document == file.document or not file.document):
+        return file
+    rules: tuple[Callable[[Kept], bool], ...] = (
+        (lambda kept: bool(file.item) and kept.document.lower() == file.item.lower()),
+        (lambda kept: not file.item and kept.sha256 == file.sha256),
+        (lambda kept: not file.item and bool(kept.uid) and kept.uid == file.uid),
+    )
+    taken = {one.document for one in files if one.place != file.place}
+    for fits in rules:
+        places = [place for place, kept in gone.items() if kept.document not in taken and fits(kept)]
+        if len(places) == 1:
+            before = gone[places[0]]
+            return replace(file, document=before.document, kept=before, moved_from=places[0])
+    return file
+
+
+def name_documents(found: Belonging, client: SiloClient | None, *, new: bool = True) -> Belonging:
+    """Give each file without an item its UUID, and write them down before the first request that has one.
+
+    new
+        False: only those that Silo has, and nothing is written.
+
+    A folder that remembers nothing (a copy of the files alone) learns from the files in Silo that link to a
+    file which document it is.
+    """
+    known = _linked_documents(found, client) if client is not None else {}
+    files = [
+        file
+        if file.document
+        else replace(file, document=known.get(file.place) or (str(uuid4()) if new else ""))
+        for file in found.files
+    ]
+    named = {
+        new.place: Kept(new.document, "", new.uid)
+        for old, new in zip(found.files, files, strict=True)
+        if not old.document
+    }
+    if new:
+        found.project.note(named)  # also without any: the file marks the root, from which places are counted
+    return replace(found, files=tuple(files))
+
+
+def _linked_documents(found: Belonging, client: SiloClient) -> dict[str, str]:
+    """Place → document, as the newest revisions of the registered files above record their links."""
+    nameless = {file.place for file in found.files if not file.document}
+    known: dict[str, str] = {}
+    users = [file for file in found.files if file.item] if nameless else []
+    for file in users:
+        try:
+            links = client.get_document(file.item).links
+        except RouteMissingError:
+            return {}
+        except NotFoundError:
+            continue
+        folder = os.path.dirname(file.place)
+        for link in links:
+            place = os.path.normpath(os.path.join(folder, link.path)).replace(os.sep, "/")
+            if link.document and place in nameless:
+                known.setdefault(place, link.document)
+    return known
+
+
+def compare(found: Belonging, client: SiloClient | None, store: Store) -> list[Standing]:
+    """Return how each file stands to the server, in the same order. One request if it knows documents.
+
+    client
+        None: the server cannot be asked now, and what the project remembers counts.
+    """
+    newest = newest_files(found.files, client) if client is not None else _remembered(found.files)
+    strange = [one.item for one in found.files if one.item and one.document.lower() not in newest]
+    here = set(client.get_items_by_uuid(strange) if client is not None else strange)
+    waiting = {(entry.identity, entry.sha256) for entry in store.entries() if entry.file_left}
+    standings = []
+    for file in found.files:
+        revision = newest.get(file.document.lower())
+        state = _state(file, revision, client)
+        if revision is None and file.item and file.item not in here:
+            state = State.NO_ITEM
+        if (file.document, file.sha256) in waiting and (state is not State.SAME or client is None):
+            state = State.WAITING
+        standings.append(Standing(file, state, revision))
+    return standings
+
+
+def _remembered(files: Iterable[ProjectFile]) -> dict[str, Revision]:
+    """The content that each file was made from, as if it were the newest."""
+    return {
+        file.document.lower(): Revision(revision_number=0, file_checksum=file.base)
+        for file in files
+        if file.base
+    }
+
+
+def newest_files(files: Iterable[ProjectFile], client: SiloClient) -> dict[str, Revision]:
+    """Return the newest revision of each file in Silo, by its UUID in lower case.
+
+    A Silo without documents is asked for the main item of each file; of a file without any it knows nothing,
+    so what was sent from here counts.
+    """
+    several = [file for file in files if file.document]
+    try:
+        return dict(client.get_documents(file.document for file in several))
+    except RouteMissingError:
+        pass
+    main = {file.document.lower(): file.held[0][0] for file in several if file.held}
+    items = client.get_items_by_uuid(main.values())
+    found = _remembered(file for file in several if not file.held)
+    for document, uuid in main.items():
+        item = items.get(uuid)
+        if item is not None and (known := file_revisions(client.revisions(item.part_number))):
+            found[document] = known[0]
+    return found
+
+
+def _state(file: ProjectFile, newest: Revision | None, client: SiloClient | None) -> State:
+    if newest is None:
+        return State.NEW
+    there, base = checksum_of(newest), file.base
+    if there == file.sha256:
+        return State.SAME
+    if there == base:
+        return State.EDITED
+    if not there:  # a server without checksums: what was committed from here is all that is known
+        return State.SAME if base == file.sha256 else State.EDITED
+    if base == file.sha256 or client is None:
+        return State.NEWER
+    older = {checksum_of(one) for one in client.revisions(_address(file, client))}
+    return State.NEWER if file.sha256 in older else State.BOTH
+
+
+def _address(file: ProjectFile, client: SiloClient) -> str:
+    item = client.get_item_by_uuid(file.item) if file.item else None
+    return item.part_number if item is not None else DocumentId(file.document)
+
+
+def commits(
+    found: Belonging,
+    standings: Sequence[Standing],
+    *,
+    comment: str = "",
+    allow_missing: bool = False,
+    over_newer: bool = False,
+    boms: bool = True,
+) -> Iterator[tuple[ProjectFile, Commit]]:
+    """Make the commits of what belongs and is not in Silo: files that differ, and the BOMs of the assemblies.
+
+    over_newer
+        also files that are newer in Silo, which a person saw: on top of those.
+    boms
+        also the BOMs of files that are in Silo already.
+    """
+    users = _users(found)
+    for one in standings:
+        file = one.file
+        wanted = one.state in (State.NEW, State.EDITED) or (over_newer and one.state is State.BOTH)
+        bom = file.bom if file.item and (wanted or (boms and one.state is State.SAME)) else None
+        if not wanted and bom is None:
+            continue
+        commit = Commit(
+            path=file.path,
+            label=file.place,
+            identity=file.document,
+            taken_at=time.time(),
+            key=new_key(),
+            comment=comment,
+            file=Path(file.path) if wanted else None,
+            sha256="" if wanted else file.sha256,
+            extraction=bom,
+            allow_missing=allow_missing,
+            remark=file.problem,
+            origin=(file.base or UNKNOWN) if wanted else file.sha256,
+            document=InFile(file.held, not file.item, users.get(file.place, "")).to_json(),
+            renamed=SAME_PART if file.moved_from else "",
+        )
+        if one.state is State.BOTH and one.newest is not None:
+            newer = one.newest.model_dump(mode="json", exclude={"properties", "links"})
+            commit = replace(commit, on_top_of=seen(newer), comment=on_top(comment, newer))
+        yield file, commit
+
+
+def _users(found: Belonging) -> dict[str, str]:
+    """Place → an item whose file links to it, for a Silo that keeps other files as attachments."""
+    users: dict[str, str] = {}
+    registered = [file for file in found.files if file.item]
+    for file in registered:
+        folder = os.path.dirname(file.path)
+        locator = Locator(found.project.root)
+        for recorded in recorded_paths(file.path):
+            target = locator.find(recorded, (folder,))
+            if isinstance(target, Found) and (place := found.project.place(target.real)):
+                users.setdefault(place, file.item)
+    top = registered[-1].item if registered else ""
+    return {file.place: users.get(file.place, top) for file in found.files}
+
+
+def keep(project: Project, store: Store, file: ProjectFile, commit: Commit, server: str) -> None:
+    """Put a commit into the queue, and remember its content as the one that later edits are made from."""
+    store.add(commit, server)
+    if commit.file is not None:
+        remember(project, [file])
+
+
+def send_along(
+    path: str, client: SiloClient | None, store: Store, server: str, skip: Container[str] = (), **how: Any
+) -> int:
+    """Put into the queue what a committed file links to and is not in Silo; how many files.
+
+    skip
+        files that a person has decided about.
+    how
+        as for :func:`commits`.
+    """
+    found = read_project([path], find_project([path]))
+    if all(file.item and file.path in skip for file in found.files):
+        return 0
+    found = name_documents(found, client)
+    standings = compare(found, client, store)
+    remember(found.project, (one.file for one in standings if one.state in (State.SAME, State.WAITING)))
+    count = 0
+    for file, commit in commits(found, standings, boms=False, **how):
+        if file.path not in skip:
+            keep(found.project, store, file, commit, server)
+            count += 1
+    return count
+
+
+def remember(project: Project, files: Iterable[ProjectFile]) -> None:
+    """Remember files as they are in Silo, or on their way there."""
+    known: dict[str, Kept | None] = {}
+    for file in files:
+        kept = Kept(file.document, file.sha256, file.uid)
+        if file.moved_from:
+            known[file.moved_from] = None
+        if kept != file.kept or file.moved_from:
+            known[file.place] = kept
+    if known:
+        project.note(known)

@@ -1,0 +1,2059 @@
+<?xml version="1.0" encoding="utf-8"?>
+<!DOCTYPE TS>
+<TS version="2.1" sourcelanguage="en">
+    <context>
+        <name>Silo</name>
+        <message>
+            <location filename="../../addon.py" />
+            <source>{name} has no Silo part number yet. Register it first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>History</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../buttons.py" />
+            <source>Save a copy</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../buttons.py" />
+            <source>This document is not open any more.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../buttons.py" />
+            <source>[Silo] This document is not open: </source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../buttons.py" />
+            <source>[Silo] Not opened, for it is not on the Silo server in use: </source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../buttons.py" />
+            <source>No browser could be opened. The address was copied.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../buttons.py" />
+            <source>[Silo] No browser could be opened; the address was copied: </source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../buttons.py" />
+            <source>[Silo] These objects are not in the document any more.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../buttons.py" />
+            <source>[Silo] The first {n} of {all} objects are selected.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../commit/flow.py" />
+            <source>Commit to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>What changed?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>A comment for this revision (may stay empty)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Register it in Silo as well: it has no part number yet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Looking for what colleagues committed since…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>This file is committed:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>This file is committed, and {n} file below it that has unsaved edits, that one first:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>This file is committed, and {n} files below it that have unsaved edits, the lowest first:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>{n} more was only recomputed; check it to commit it all the same.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>{n} more were only recomputed; check them to commit them all the same.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>File</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>State</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Select:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>edited</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>all</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>none</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>only this file</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../settings/page.py" />
+            <source>Commit</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Ctrl+Return</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Cancel</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>What somebody else has changed is left out, unless you choose otherwise:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>(no comment)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../commit/flow.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>Somebody</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Commit to Silo – {who} committed since you opened</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Commit to Silo – changed on disk since you opened</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Do it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>leave out</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>open theirs beside mine</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>take theirs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>commit mine on top</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>the file on disk was changed since you opened it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{who} committed revision {n}; yours was made from {base}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>a file that is no revision in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>revision {n}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{name}: {theirs} in theirs, {mine} in yours</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{name}: {base} → {mine} by both of you</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{name}: {base} → {theirs} by them, {mine} by you</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{name}: {base} → {theirs} by them, as before in yours</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{name}: {base} → {mine} by you, as before in theirs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <location filename="../../pane/activity.py" />
+            <source>… and {n} more line</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>… and {n} more lines</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>Looking at the linked files</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <location filename="../../session/session.py" />
+            <source>Looking for colleagues' commits</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>Its BOM was not synced: it is not as it was committed. Commit it.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>Not committed: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>No Silo server is set up: the files are saved, and wait to be sent.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>There is no connection now: the files are saved, and sent later.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>It has no Silo part number yet, so it was not sent.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <location filename="../../pane/entries.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>Register Parts…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>Saved, but not in Silo: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>Make the one that is meant active: double-click it in the tree.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>unsaved edits: will be saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>recomputed only: nothing differs from the file</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>saved already</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>has no file yet: save it under a name first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>FreeCAD has loaded it only in part and cannot save these edits: open the file itself and make them there</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>the file is read-only: these edits are not saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>made by a newer FreeCAD: saving it here would destroy its assemblies, so it is not saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>the file is damaged, and FreeCAD has opened what it could read of it: fetch the file again, or check that nothing is missing and save it in FreeCAD yourself</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>{name} has no file yet. Save it under a name first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>It was closed before it was saved: open it and commit it again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../dependencies.py" />
+            <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>not registered: left out of the BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>Part number in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>What Silo knows of this component</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Help on Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>The documentation is not there: {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Install what Silo needs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Silo needs these Python packages: {names}.
+They are installed in {folder}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Install</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <location filename="../../gui/widgets.py" />
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
+            <source>Close</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Installing. This takes a minute or two…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>The packages are in {folder}. Start FreeCAD again to use Silo.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>Try again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>They could not be installed: {reason}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/widgets.py" />
+            <location filename="../../settings/page.py" />
+            <location filename="../../start.py" />
+            <source>Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/widgets.py" />
+            <source>Your commits are being copied to the outbox. They are sent when FreeCAD is started the next time.
+Commits that are not copied by then may have to be committed again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/widgets.py" />
+            <source>Close without waiting</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Mass of {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Copy the table, for a spreadsheet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Copy</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../register/flow.py" />
+            <source>Part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Mass of one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Mass</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Volume of one, cm³</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <source>Material</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <source>Remarks</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Mass of the assembly</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>This FreeCAD's Python has no numpy, which masses need.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Measuring {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Reading the assembly…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Part {n} of {total}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>face {n} of {total}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/rows.py" />
+            <source>1 part has no mass; it is missing from the sum.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/rows.py" />
+            <source>{n} parts have no mass; they are missing from the sum.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/rows.py" />
+            <source>No part of this assembly has a material with a density.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/rows.py" />
+            <source>{mass} in {pieces}, centre of mass at {x}, {y}, {z} mm</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/rows.py" />
+            <source>1 piece</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/rows.py" />
+            <source>{n} pieces</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/rows.py" />
+            <source>no material with a density</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{n} items committed</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{n} new items</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{n} new revisions</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>… and {n} more lines; the preview shows all</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Nothing has happened yet. Commit an assembly with File → Commit to Silo, and what becomes of it is shown here.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Show older…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Stop</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>… and {n} more</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Retry all</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Send now</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Send all {n} of another address to {host}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/dock.py" />
+            <source>Database Activity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>BOM not synced: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Committed: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>BOM unchanged</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Revision {n} uploaded</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>The file is in Silo already</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>{n} item in the Silo BOM is not referenced by components in this assembly.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>{n} items in the Silo BOM are not referenced by components in this assembly.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Incomplete: {n} component is missing; its known line stays as it is.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Incomplete: {n} components are missing; their known lines stay as they are.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>The file is in Silo. The BOM waits until these are mended:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Show all…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>Same part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>New part…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>Show</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>{number}: the assembly has {cad}, a manual line in Silo says {silo}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>[Silo BOM] … and {n} more of these; the preview lists them all.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>The server no longer knows what happened since. See its own activity page.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Some activity may be missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Revision {n} of {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>New item: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Archived: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>View in Silo →</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{who} committed {name} (revision {n}) since you opened it.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Settings…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>No Silo server is set up yet.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Connected to {host}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{host} is read-only now. Commits wait here until it takes changes again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{host} works only in part. What cannot be sent waits here.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>No connection to {host}. Commits wait here and are sent later.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{host} does not accept the token.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Connecting to {host}…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{host} sends no live events; what you commit is shown all the same.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{host} (live events are off)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} thing waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} things wait to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} thing waits for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} things wait for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>, {urgent} of them for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Send to {host}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Retry</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Open theirs beside mine</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Take theirs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Commit mine on top</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Save a copy…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Discard</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>BOM in Silo: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Comparing with Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
+            <source>Part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
+            <source>Name</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/flow.py" />
+            <source>Assembly</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>In Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>What a sync does</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Show only lines that differ</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Sync although links are broken (the lines that they stand for stay as they are)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Select the instances in the 3D view and the tree</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Compare again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Compare with 3D view</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Does the BOM explain each solid that FreeCAD shows? Selects what it does not</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Mend links</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Sync</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Sync the {n} sub-assembly that differs too, before this one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Sync the {n} sub-assemblies that differ too, before this one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>This assembly has no Silo part number yet. Register it to sync its BOM.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>{n} broken link: the BOM is not synced until it is mended.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>{n} broken links: the BOM is not synced until they are mended.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>… and {n} more rows</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>Without a part number: left out until registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>Not counted, or counted with a remark</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>… more rows than can be shown here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>new in the assembly: will be added</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>will take the assembly's quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>manual line in Silo with another quantity: a person decides there</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>not in the assembly: kept, marked unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>manual line: not touched</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>its file is missing: the line stays as it is</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>missing: {file}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} to add</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} with another quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} in conflict</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>Nothing to sync: all {n} lines agree with Silo.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{name} holds no assembly, so it has no BOM.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>BOM in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{name} is not open any more. Open it, then compare again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <location filename="../../session/session.py" />
+            <source>Comparing with Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>Nothing was synced: {name} was edited since the comparison. This is it now.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <location filename="../../register/flow.py" />
+            <source>Register Components</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Looking for components without a part number…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Component</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Type</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Category</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Ask after each commit</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Register Selected</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Skip All</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Register</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>guess: {category}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Keep</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Undeclare</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Declare</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Components</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Standard parts</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Modelled in this file, not counted</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Modelled in this file, and counted</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Consumable</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Tool</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>its unsaved edits are saved too</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>open in another FreeCAD: close it there first, or saving there undoes this</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>the file is read-only</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>has edits, but is loaded only in part: open the file itself first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>has changed on disk since you opened it: open it again first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>the file is missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>has no file yet: save it first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>made by a newer FreeCAD: cannot be saved here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Standard part: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>{name} ({n} copies)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>{number} (kept)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>same or new part?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>one for each</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>new</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>{number} or later</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>{number} (new)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>same part: keep {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>new part: a new number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>a new number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>different parts: a number for each copy</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>stays as it is</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>registering…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>counts once</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>counts {n} times</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>would count once; check it if it is a part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>would count {n} times; check it if it is a part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>imported from {file}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>equal by their labels only</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>carries the identity of {number}, as another file does</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>the same content as {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Silo has this very file as {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Silo has {number} with the same name</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Silo was not searched for parts that look alike: {problem}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>All components of {name} have their Silo part number.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>All of these have their part number now.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Where files carry one identity, choose in the column Part number: the same part, or a new one?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>({n} more after these)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>The following component has no Silo part number and will be excluded from the BOM until registered:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Looking for components without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Asking for the next number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Registering</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Revision</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>When</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Who</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Comment</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>newest</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>yours</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Replace edited files (copies are kept)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Fetching…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Opened.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Open from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Part number, name or description</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Open</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Project folder:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Nothing found.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>with the newest of all that it links to</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>It has no file in Silo.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Choose the project folder first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>History of {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Get This Revision as a Copy…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Asking Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Comparing…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>BOM: {changes}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>No change of the BOM.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Choose a folder</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Fetching from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Yours is kept for {n} days at {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>It links to {names}, not in this folder: Open from Silo… fetches them.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Took {who}'s revision {n}: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Took the file on disk: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Not fetched: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Searching</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Asking Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>This server does not know the item of this document.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Comparing revisions</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{name} has edits that are not in Silo; it was left alone.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{name} is open in FreeCAD; it was left alone.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{path}, which {name} links to, was not fetched: {reason}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/online.py" />
+            <source>No Silo server is set up yet. Enter its address in the Silo preferences.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/online.py" />
+            <source>{file} → {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/session.py" />
+            <source>Connecting</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/session.py" />
+            <source>Keeping the commit</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/session.py" />
+            <source>It is kept, and sent once the disk takes a copy of its file.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/session.py" />
+            <source>Sending to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/session.py" />
+            <source>Outbox</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Server</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Address</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Log in…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>API token</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>FreeCAD's preferences (a plain file)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Keep the token in</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Check the server's certificate</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>the system's own, unless a file is given</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Certificate authorities</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Test the connection</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Ask for a comment</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Sync the BOM of an assembly after its file is committed</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Then ask about components without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Count standard parts (screws, nuts, washers) in the BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>hold the BOM back until they are mended</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>sync without them (they become unreferenced)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Where links are broken</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Part number schema</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Window</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Show what happens in Silo as it happens</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Commit in the File menu of every workbench</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Reading the settings</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>the keyring of the system ({name})</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>unchanged; enter another one to replace it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>none yet: make one on the server's page</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Keeping the token</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Asking the server…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Testing the connection</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Let FreeCAD in on the page that opens. It shows the code {code}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Waiting for the browser</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>You are logged in. Press OK to keep the token.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Asking for the login page</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>Enter the server's address too: a token belongs to its server.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>Enter the address of the server first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>Connected as {user} ({role}); the server is in {mode} mode.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>This server has no page for that. Make a token on its account page.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>No server is set up. To try it out, run: silo-mod serve</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>In use: {url} ({from}).</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>SILO_SSL_VERIFY decides about the certificate.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>from the environment variable SILO_API_URL</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>from this page</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>from the configuration file of silo-mod</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>Token: from the environment variable SILO_API_TOKEN.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>Token: from the system's keyring.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>Token: from FreeCAD's preferences, a plain file.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>Token: from the configuration file of silo-mod.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>Token: none.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../start.py" />
+            <source>Silo is installed more than once: {folders}. Only {used} is used; remove the others.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../start.py" />
+            <source>Keep the BOM of an assembly in step with Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
+            <source>BOM Updated: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
+            <source>+{n} added</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
+            <source>~{n} qty changed</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
+            <source>⚠{n} unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
+            <source>⚡{n} in conflict</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
+            <source>no changes</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
+            <source>{n} component has no Silo part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
+            <source>{n} components have no Silo part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
+            <source>The category rules of this Silo are not used until they are mended: {problem}</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Origin_Commit</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Commit to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Save this document and its changed sub-assemblies, upload them as new revisions, and bring the BOM to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Saves this document and the edited ones below it, uploads each as a new revision with your comment, and brings the BOM to Silo. Nothing is ever deleted there.</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_BOM</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Compare BOM with Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Show how the BOM of this assembly differs from the one in Silo</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_RegisterParts</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Register Parts…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Give part numbers to the components of this assembly that have none</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Mass</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Mass of the Assembly…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Mass and centre of mass from the parts' shapes and materials, with what is missing</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Activity</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Database Activity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Show what happens in Silo, and what waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Open</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Open from Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Find an item in Silo and open its file with all that it links to</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_History</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>History…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>The revisions of this document: who, when, and what changed in the BOM</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Settings</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Silo Settings…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Server, token, and what a commit does</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Help</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Help on Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Open the page that explains the commands, the pane and the messages</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_InstallPackages</name>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Install What Silo Needs…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Install the Python packages that Silo needs</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+</TS>

@@ -1,0 +1,555 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The one summary of a product over its whole graph: what is open, mass and cost, counts, the last change.
+
+Every view, export and answer shows it and counts nothing itself. It is kept per assembly
+(``product_summaries``) and made from the assembly's own lines and the kept summaries of what is in it, so
+that after a change only the way up is made again. Only ``component`` lines are followed.
+
+**When it is valid.** What changes an item, its BOM or its file announces an event, but for a refused sync,
+which only says so. What is kept of the item and of all that it is in goes in the same transaction
+(``db.engine``). A read makes what is missing from its own snapshot. A thread keeps it later, under the lock
+of the event log, and only what no event since that snapshot concerns: so nothing that is kept is old, and
+looking changes nothing.
+
+**Always closed.** If an assembly is kept, so are all assemblies in it; so what is not kept has nothing kept
+above it, and outdating an item stops there.
+
+Mass: each leaf's ``mass_kg`` [kg] times its total quantity. If something below a sub-assembly has no mass but
+the sub-assembly states ``mass_kg``, that stands for the whole of it. Cost: each leaf's ``standard_cost``, per
+``currency``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from decimal import Decimal
+from itertools import chain, islice, zip_longest
+from typing import Any, NamedTuple
+
+from sqlalchemy import ColumnElement, delete, or_, select
+
+from silo.bom.errors import CycleError, counted
+from silo.bom.numbers import as_decimal, exact_product, exact_sum
+from silo_server import events
+from silo_server.db.engine import EVENT_LOCK, Database, Tx, insert_rows, one_of, uses_of
+from silo_server.db.tables import (
+    bom_changes,
+    bom_last_syncs,
+    bom_lines,
+    items,
+    product_looks,
+    product_summaries,
+)
+from silo_server.db.tables import events as event_log
+from silo_server.services.bom.lines import newer_exists, select_lines, to_line
+from silo_server.services.bom.merge import NEVER, last_syncs
+from silo_server.services.bom.tree import MAX_DEPTH, Graph, Part, conflicts_in, currency_of, positive_number
+from silo_server.settings import TooLargeError, stamp
+from silo_server.values import Item, Line, dumps, names_of
+
+# So many items without a value are named; the others are counted.
+MOST_NAMED = 12
+# So many assemblies are made at once if all are made.
+BATCH = 500
+SAME_LOOK = timedelta(hours=1)
+# [s] Its waits and its statements.
+LONGEST_CHANGE = 300
+
+
+class OpenBom(NamedTuple):
+    """What is open in one BOM: lines that CAD has no more, conflicts, and what its last sync left out."""
+
+    part_number: str
+    unreferenced: int = 0
+    conflicts: int = 0
+    incomplete: str = ""
+
+    @property
+    def questions(self) -> str:
+        """What a person has to decide there, in words."""
+        told = ((self.unreferenced, "unreferenced line"), (self.conflicts, "conflict"))
+        return ", ".join(counted(count, word) for count, word in told if count)
+
+    @property
+    def words(self) -> str:
+        """All of it, in words."""
+        return ", ".join(filter(None, (self.questions, self.incomplete)))
+
+
+class Worth(NamedTuple):
+    """What one piece of an item weighs [kg] and costs, per currency; of an assembly, all that is in it.
+
+    ``whole``: nothing that belongs to it is without a value.
+    """
+
+    mass: Decimal | None
+    mass_whole: bool
+    costs: Mapping[str, Decimal]
+    cost_whole: bool
+
+
+class LastChange(NamedTuple):
+    """When something of the product changed last, who did it, and to which item."""
+
+    at: str
+    username: str
+    part_number: str
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """One product, or a part.
+
+    open
+        a BOM's internal id → what is open there; of the product's own BOM and of all below it.
+    worth, as_part
+        what is in it is worth; and what it counts for in another product.
+    levels
+        how many rows each level of its tree has, at most ``MAX_DEPTH`` levels.
+    parts, assemblies, lines
+        how many different leaf parts and sub-assemblies are in it, and lines in all their BOMs.
+    no_mass, no_cost
+        how many of the parts lack a value that nothing above them states.
+    mass_missing, cost_missing
+        the first of their part numbers.
+    outdated
+        lines, over all levels, that name an older revision than the newest.
+    """
+
+    open: Mapping[int, OpenBom]
+    worth: Worth
+    as_part: Worth
+    changed: LastChange
+    levels: Sequence[int] = ()
+    parts: int = 0
+    assemblies: int = 0
+    lines: int = 0
+    no_mass: int = 0
+    no_cost: int = 0
+    outdated: int = 0
+    mass_missing: Sequence[str] = ()
+    cost_missing: Sequence[str] = ()
+
+    def told(self, but: int | None = None) -> list[tuple[str, str]]:
+        """Return (part number, what is open there) of each BOM, ``but`` one, by part number."""
+        return sorted((one.part_number, one.words) for item_id, one in self.open.items() if item_id != but)
+
+    def inside(self, own: int, *, is_open: bool) -> list[str]:
+        """Return what its row in a tree says; ``own`` is its internal id, an open row shows its lines."""
+        here = self.open.get(own, OpenBom(""))
+        below = len(self.open) - (own in self.open)
+        words = [here.incomplete]
+        if not is_open:
+            words += [here.questions, f"open in {counted(below, 'BOM')} below" if below else ""]
+        return [*filter(None, words)]
+
+    @property
+    def stands_alone(self) -> bool:
+        """True if it states its mass for parts that state none."""
+        return self.as_part.mass_whole and not self.worth.mass_whole
+
+    @property
+    def questions(self) -> int:
+        """How many lines wait for a person."""
+        return sum(one.unreferenced + one.conflicts for one in self.open.values())
+
+    @property
+    def incomplete(self) -> int:
+        """How many BOMs do not hold all that they should."""
+        return sum(bool(one.incomplete) for one in self.open.values())
+
+
+class _Node(NamedTuple):
+    """A summary with what those above it need: the internal ids that count for them, each once.
+
+    parts
+        of the leaf parts, or its own if it is a leaf; ``no_mass`` and ``no_cost`` are those without a value.
+    assemblies
+        of what has a BOM, itself included → [its lines, those of them that name an older revision].
+    """
+
+    summary: Summary
+    parts: Set[int]
+    no_mass: Set[int]
+    no_cost: Set[int]
+    assemblies: Mapping[int, Sequence[int]]
+
+
+class Built(NamedTuple):
+    """What a read made, to be kept: the newest event of its snapshot, its time, and the rows."""
+
+    head: int
+    at: str
+    rows: Sequence[Mapping[str, Any]]
+
+
+def summary_of(tx: Tx, item: Item) -> Summary:
+    """The summary of one product. Raises CycleError, TooLargeError (more lines below than may be read)."""
+    return summaries(tx, [item.id])[item.id]
+
+
+def summaries(tx: Tx, item_ids: Collection[int]) -> dict[int, Summary]:
+    """The summaries of these items, by internal id: what is kept, and what is made for it."""
+    wanted = set(item_ids)
+    found = dict(_kept(tx, wanted))
+    return found | {one: node.summary for one, node in _make(tx, wanted - found.keys()).items()}
+
+
+class Below(NamedTuple):
+    """The summaries of the assemblies of a graph, and what each item in it is worth, by internal id."""
+
+    of: Mapping[int, Summary]
+    worths: Mapping[int, Worth]
+
+    @property
+    def standing_alone(self) -> set[int]:
+        """The assemblies that state a mass for parts without one."""
+        return {one for one, summary in self.of.items() if summary.stands_alone}
+
+
+def below(tx: Tx, graph: Graph, parts: Mapping[int, Part]) -> Below:
+    """Return what is known of all that is in a graph."""
+    found = summaries(tx, graph.lines.keys() - {graph.root.id})
+    own = {one: own_worth(part.properties) for one, part in parts.items() if one not in found}
+    return Below(found, own | {one: summary.as_part for one, summary in found.items()})
+
+
+def _kept(tx: Tx, item_ids: Collection[int]) -> Iterator[tuple[int, Summary]]:
+    row = product_summaries.c
+    query = select(row.item_id, row.summary).where(one_of(tx, row.item_id, item_ids))
+    for item_id, written in tx.conn.execute(query):
+        yield item_id, _summary(written)
+
+
+def _make(tx: Tx, wanted: Collection[int]) -> dict[int, _Node]:
+    """Make the nodes of these items, from the lines of what is not kept below them."""
+    if not wanted:
+        return {}
+    lines, nodes = _lines_below(tx, wanted)
+    children = {line.child_id for below in lines.values() for line in below}
+    own = _own(tx, {*wanted, *lines, *children} - nodes.keys())
+    maker = _Maker(lines, nodes, own, _open(tx, lines, own), _bom_changes(tx, lines))
+    edges = {one: [line.child_id for line in rows if _followed(line)] for one, rows in lines.items()}
+    for item_id in _children_first(edges, wanted, {one: known.part_number for one, known in own.items()}):
+        maker.node(item_id)
+    products = {one for one in own if one in lines or own[one].is_assembly}
+    if products and tx.built is not None:
+        head = events.bounds(tx)[1]
+        tx.built.append(
+            Built(head, tx.stamp, [_row(one, nodes[one]) for one in sorted(products) if one in nodes])
+        )
+    return {one: nodes[one] for one in wanted}
+
+
+def _followed(line: Line) -> bool:
+    return line.state.rel_type == "component"
+
+
+def _lines_below(tx: Tx, wanted: Collection[int]) -> tuple[dict[int, list[Line]], dict[int, _Node]]:
+    """The lines of these items and of all below them, down to what is kept; and the latter."""
+    lines: dict[int, list[Line]] = {}
+    nodes: dict[int, _Node] = {}
+    level, seen, most, count = set(wanted), set(wanted), tx.settings.max_expanded_rows, 0
+    while level:
+        query = select_lines().where(one_of(tx, bom_lines.c.parent_id, level))
+        ordered = query.order_by(bom_lines.c.parent_id, bom_lines.c.position).limit(most - count + 1)
+        below: set[int] = set()
+        with tx.conn.execute(ordered, execution_options={"yield_per": 2000}) as rows:
+            for row in rows:
+                count += 1
+                if count > most:
+                    raise TooLargeError(
+                        f"there are more than {most} different lines in this product that are not summed up "
+                        "yet; look at its sub-assemblies, or have silo-mod summaries sum all up"
+                    )
+                line = to_line(row)
+                lines.setdefault(line.parent_id, []).append(line)
+                if _followed(line):
+                    below.add(line.child_id)
+        level = below - seen
+        seen |= level
+        row_of = product_summaries.c
+        kept = select(product_summaries).where(one_of(tx, row_of.item_id, level))
+        for found in tx.conn.execute(kept):
+            nodes[found.item_id] = _node(found)
+        level -= nodes.keys()
+    return lines, nodes
+
+
+class _Own(NamedTuple):
+    """What an item says of itself."""
+
+    part_number: str
+    is_assembly: bool
+    worth: Worth
+    changed: LastChange
+
+
+def _own(tx: Tx, item_ids: Collection[int]) -> dict[int, _Own]:
+    row = items.c
+    query = select(
+        row.id,
+        row.part_number,
+        row.item_type,
+        row.properties,
+        row.updated_at,
+        row.updated_by,
+    )
+    return {
+        item_id: _Own(number, kind == "assembly", own_worth(json.loads(text)), LastChange(at, by, number))
+        for item_id, number, kind, text, at, by in tx.conn.execute(query.where(one_of(tx, row.id, item_ids)))
+    }
+
+
+def own_worth(properties: Mapping[str, Any]) -> Worth:
+    """What an item states of itself."""
+    mass, cost = (positive_number(properties, name) for name in ("mass_kg", "standard_cost"))
+    costs = {currency_of(properties): as_decimal(cost)} if cost is not None else {}
+    return Worth(None if mass is None else as_decimal(mass), mass is not None, costs, bool(costs))
+
+
+def _open(tx: Tx, lines: Mapping[int, Sequence[Line]], own: Mapping[int, _Own]) -> dict[int, OpenBom]:
+    """What is open in each of these BOMs itself."""
+    ids = {one for one in own if one in lines or own[one].is_assembly}
+    syncs, told = last_syncs(tx, ids), conflicts_in(tx, lines)
+    found: dict[int, OpenBom] = {}
+    for one in ids:
+        last, below = syncs.get(one, NEVER), lines.get(one, ())
+        incomplete = f"incomplete: {last.words}" if last.gaps else ""
+        if not incomplete and last.at is None and not below:
+            incomplete = "never synced"
+        gone = sum(line.state.unreferenced_since is not None for line in below)
+        made = OpenBom(own[one].part_number, gone, len(told.get(one, ())), incomplete)
+        if made.words:
+            found[one] = made
+    return found
+
+
+def _bom_changes(tx: Tx, parent_ids: Collection[int]) -> dict[int, tuple[str, str]]:
+    """When each of these BOMs came to what it is, and by whom."""
+    row = bom_changes.c
+    query = select(row.parent_id, row.at, row.username).join(
+        items, (items.c.id == row.parent_id) & (items.c.bom_version == row.version)
+    )
+    ordered = query.where(one_of(tx, row.parent_id, parent_ids)).order_by(row.id.desc())
+    return {parent_id: (at, who) for parent_id, at, who in tx.conn.execute(ordered)}
+
+
+def _children_first(
+    below: Mapping[int, Sequence[int]], wanted: Iterable[int], names: Mapping[int, str]
+) -> Iterator[int]:
+    """The wanted items, and what is below them and has something below, children first; else CycleError."""
+    done: set[int] = set()
+    for first in wanted:
+        way: dict[int, Iterator[int]] = {} if first in done else {first: iter(below.get(first, ()))}
+        while way:
+            item_id, rest = next(reversed(way.items()))
+            child = next(rest, None)
+            if child is None:
+                del way[item_id]
+                done.add(item_id)
+                yield item_id
+            elif child in way:
+                ring = list(way)
+                raise CycleError([names[one] for one in [*ring[ring.index(child) :], child]])
+            elif child in below and child not in done:
+                way[child] = iter(below[child])
+
+
+@dataclass(frozen=True, slots=True)
+class _Maker:
+    """Makes nodes from what was read; ``nodes`` has those of all that is kept, and each that is made."""
+
+    lines: Mapping[int, Sequence[Line]]
+    nodes: dict[int, _Node]
+    own: Mapping[int, _Own]
+    open: Mapping[int, OpenBom]
+    bom_changes: Mapping[int, tuple[str, str]]
+
+    def node(self, item_id: int) -> _Node:
+        """Return the node of an item whose sub-assemblies have theirs."""
+        if item_id not in self.nodes:
+            self.nodes[item_id] = self._made(item_id)
+        return self.nodes[item_id]
+
+    def _made(self, item_id: int) -> _Node:
+        own, lines = self.own[item_id], self.lines.get(item_id, ())
+        below = [(line, self.node(line.child_id)) for line in lines if _followed(line)]
+        nodes = list({line.child_id: node for line, node in below}.values())
+        worth = _sum_of(below) if below else own.worth
+        states_all = not worth.mass_whole and own.worth.mass is not None
+        as_part = worth._replace(mass=own.worth.mass, mass_whole=True) if states_all else worth
+        open_ones = {one: told for node in nodes for one, told in node.summary.open.items()}
+        changes = [own.changed, *(node.summary.changed for node in nodes)]
+        if item_id in self.open:
+            open_ones[item_id] = self.open[item_id]
+        if item_id in self.bom_changes:
+            changes.append(LastChange(*self.bom_changes[item_id], own.part_number))
+        me = set() if below else {item_id}
+        parts = me.union(*(node.parts for node in nodes))
+        unweighed = [node for node in nodes if not node.summary.as_part.mass_whole]
+        no_mass = (set() if worth.mass_whole else me).union(*(node.no_mass for node in unweighed))
+        no_cost = (set() if worth.cost_whole else me).union(*(node.no_cost for node in nodes))
+        assemblies = {one: counts for node in nodes for one, counts in node.assemblies.items()}
+        older = sum(newer_exists(line) for line in lines)
+        summary = Summary(
+            open=open_ones,
+            worth=worth,
+            as_part=as_part,
+            changed=max(changes),
+            levels=_levels(len(lines), [node.summary.levels for _, node in below]),
+            parts=len(parts - me),
+            assemblies=len(assemblies),
+            lines=len(lines) + sum(counts[0] for counts in assemblies.values()),
+            no_mass=len(no_mass),
+            no_cost=len(no_cost),
+            outdated=older + sum(counts[1] for counts in assemblies.values()),
+            mass_missing=_first(me & no_mass, own, (node.summary.mass_missing for node in unweighed)),
+            cost_missing=_first(me & no_cost, own, (node.summary.cost_missing for node in nodes)),
+        )
+        if lines or own.is_assembly:
+            assemblies[item_id] = (len(lines), older)
+        return _Node(summary, parts, no_mass, no_cost, assemblies)
+
+
+def _first(me: Collection[int], own: _Own, below: Iterable[Sequence[str]]) -> list[str]:
+    return sorted({*chain.from_iterable(below), *(own.part_number for _ in me)})[:MOST_NAMED]
+
+
+def _sum_of(below: Sequence[tuple[Line, _Node]]) -> Worth:
+    mass: Decimal | None = None
+    costs: dict[str, Decimal] = {}
+    parts = [node.summary.as_part for _, node in below]
+    for (line, _), worth in zip(below, parts, strict=True):
+        quantity = as_decimal(line.state.quantity)
+        if worth.mass is not None:
+            mass = exact_sum((mass or Decimal(0), exact_product((quantity, worth.mass))))
+        for currency, cost in worth.costs.items():
+            costs[currency] = exact_sum((costs.get(currency, Decimal(0)), exact_product((quantity, cost))))
+    whole = (all(worth.mass_whole for worth in parts), all(worth.cost_whole for worth in parts))
+    return Worth(mass, whole[0], costs, whole[1])
+
+
+def _levels(rows: int, below: Iterable[Sequence[int]]) -> list[int]:
+    deeper = [sum(level) for level in zip_longest(*below, fillvalue=0)]
+    return [rows, *deeper][:MAX_DEPTH] if rows else []
+
+
+def _row(item_id: int, node: _Node) -> dict[str, Any]:
+    summary = {name: getattr(node.summary, name) for name in names_of(Summary)}
+    sets = {name: sorted(getattr(node, name)) for name in ("parts", "no_mass", "no_cost")}
+    return {
+        "item_id": item_id,
+        "summary": json.dumps(summary, separators=(",", ":"), default=str),
+        "sets": dumps(sets | {"assemblies": node.assemblies}),
+    }
+
+
+def _summary(text: str) -> Summary:
+    told = json.loads(text)
+    for name in ("worth", "as_part"):
+        mass, mass_whole, costs, cost_whole = told[name]
+        exact = {currency: Decimal(cost) for currency, cost in costs.items()}
+        told[name] = Worth(None if mass is None else Decimal(mass), mass_whole, exact, cost_whole)
+    told["open"] = {int(one): OpenBom(*values) for one, values in told["open"].items()}
+    return Summary(**told | {"changed": LastChange(*told["changed"])})
+
+
+def _node(row: Any) -> _Node:
+    sets = json.loads(row.sets)
+    parts, no_mass, no_cost = (frozenset(sets[name]) for name in ("parts", "no_mass", "no_cost"))
+    assemblies = {int(one): counts for one, counts in sets["assemblies"].items()}
+    return _Node(_summary(row.summary), parts, no_mass, no_cost, assemblies)
+
+
+def keep_summaries(db: Database) -> None:
+    """Keep what reads have made, but for what an event since then concerns; nobody waits for it."""
+    while db.built:
+        built = db.built.popleft()
+        with db.write(even_when_read_only=True) as tx:
+            tx.lock(EVENT_LOCK)
+            _keep(tx, built)
+
+
+def _keep(tx: Tx, built: Built) -> None:
+    if built.head < events.horizon_of(tx):
+        return
+    since = select(event_log.c.item_uuid).where(event_log.c.id > built.head)
+    # A refused sync has no event, and a time that may be before the look by as long as a change may take.
+    begun = stamp(datetime.fromisoformat(built.at) - timedelta(seconds=LONGEST_CHANGE))
+    refused = select(bom_last_syncs.c.parent_id).where(bom_last_syncs.c.refused_at > begun)
+    touched = set(tx.conn.scalars(uses_of(items.c.uuid.in_(since) | items.c.id.in_(refused))))
+    rows = [row for row in built.rows if row["item_id"] not in touched]
+    if rows:
+        ids = [row["item_id"] for row in rows]
+        tx.conn.execute(delete(product_summaries).where(one_of(tx, product_summaries.c.item_id, ids)))
+        insert_rows(tx, product_summaries, rows)
+
+
+def keep_all(db: Database, report: Callable[[str], None] = lambda _: None) -> int:
+    """Make the summaries of all assemblies anew; return how many. The server may run meanwhile."""
+    with db.write(even_when_read_only=True) as tx:
+        tx.lock(EVENT_LOCK)
+        tx.conn.execute(delete(product_summaries))
+    with db.read() as tx:
+        row = items.c
+        names = dict(tx.conn.execute(select(row.id, row.part_number)).all())
+        products = set(tx.conn.scalars(select(row.id).where(row.item_type == "assembly")))
+        products |= set(tx.conn.scalars(select(bom_lines.c.parent_id).distinct()))
+        below: dict[int, list[int]] = {}
+        line = bom_lines.c
+        edges = select(line.parent_id, line.child_id).where(line.rel_type == "component")
+        with tx.conn.execute(edges, execution_options={"yield_per": 5000}) as rows:
+            for parent_id, child_id in rows:
+                if child_id in products:
+                    below.setdefault(parent_id, []).append(child_id)
+    order, done = _children_first(below, sorted(products), names), 0
+    while part := list(islice(order, BATCH)):
+        with db.read() as tx:
+            summaries(tx, part)
+        keep_summaries(db)
+        done += len(part)
+        report(f"{done} of {len(products)} assemblies")
+    return done
+
+
+def last_look(tx: Tx, user_id: int, item: Item) -> str | None:
+    """When this person looked at the product before; another look within the hour is the same one."""
+    row = tx.conn.execute(select(product_looks).where(_look_of([(user_id, item.id)]))).one_or_none()
+    if row is None:
+        return None
+    return str(row.at) if _is_another(row.at, tx.stamp) else row.since
+
+
+def keep_looks(db: Database) -> None:
+    """Note who looked at what; no page waits for this."""
+    looks = dict(db.looks)
+    if not looks:
+        return
+    with db.write(even_when_read_only=True) as tx:
+        ours = _look_of(looks)
+        before = {
+            (row.user_id, row.item_id): row for row in tx.conn.execute(select(product_looks).where(ours))
+        }
+        tx.conn.execute(delete(product_looks).where(ours))
+        rows = []
+        for who, at in looks.items():
+            known = before.get(who)
+            since = None if known is None else known.at if _is_another(known.at, at) else known.since
+            rows.append({"user_id": who[0], "item_id": who[1], "at": at, "since": since})
+        insert_rows(tx, product_looks, rows)
+    for who, at in looks.items():
+        if db.looks.get(who) == at:
+            del db.looks[who]
+
+
+def _look_of(whose: Iterable[tuple[int, int]]) -> ColumnElement[bool]:
+    row = product_looks.c
+    return or_(*((row.user_id == user) & (row.item_id == item) for user, item in whose))
+
+
+def _is_another(last: str, now: str) -> bool:
+    return datetime.fromisoformat(now) - datetime.fromisoformat(last) > SAME_LOOK

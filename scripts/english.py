@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Look for phrases that a reader who learnt English at school stumbles over; CONTRIBUTING.md has the rules.
+
+    python scripts/english.py
+
+Exit code 1 where one stands in the docs, in a page, or in a Python file of ``mods``.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+# What stands there, and what to write instead.
+BANNED = {
+    r"(is|are|was|were|be) told": "gets, hears, learns; or say who reports it",
+    r"told of|tells? of": "report",
+    r"go(es)? on (to|with|once|until)": "continue",
+    r"belongs? into": "belongs to, goes into",
+    r"in order to": "to",
+    r"prior to": "before",
+    r"in case (that|of)": "if",
+    r"due to the fact": "because",
+    r"utili[sz]e[sd]?": "use",
+    r"leverages?": "use",
+    r"facilitates?": "help, make easier",
+    r"functionality": "what it does",
+    r"simply|obviously|of course": "leave it out",
+    r"and/or": "or; or both",
+    r"e\.g\.|i\.e\.|etc\.": "for example; that is; and so on",
+    r"(has|have|had|having) to be done so": "do it",
+    r"in the event that": "if",
+    r"at this point in time": "now",
+}
+PHRASE = re.compile(
+    "|".join(rf"(?P<p{n}>\b(?:{text})(?!\w))" for n, text in enumerate(BANNED)), re.IGNORECASE
+)
+
+
+def problems() -> list[str]:
+    """Return a line for each phrase that is found."""
+    pages = [ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*/README.md")]
+    sources = [path for kind in ("py", "html") for path in ROOT.glob(f"mods/**/*.{kind}")]
+    found = []
+    for path in sorted((*pages, *sources)):
+        for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):
+            for match in PHRASE.finditer(line):
+                instead = list(BANNED.values())[int(str(match.lastgroup)[1:])]
+                found.append(f"{path.relative_to(ROOT)}:{number}: “{match[0]}”: {instead}")
+    return found
+
+
+if __name__ == "__main__":
+    print("\n".join(problems()))
+    sys.exit(1 if problems() else 0)

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The report of a night for a person: counts, what is new, causes; the exit code is the worst of the run."""
+
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from fault_proxy import Fault, fault_proxy
+from fcstd_writer import Doc, locals_, part
+from hypothesis import given
+from hypothesis import strategies as st
+
+from silo.batch import Html, Summary, TopResult
+from silo.bom.errors import DocumentError, Exit, SiloError, UnreachableError
+
+POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:{}\nsize 12345\n"
+TAGS = set("html head meta title style body h1 h2 h3 p ul li table tr th td".split())  # noqa: SIM905
+
+
+class Visible(HTMLParser):
+    """The text that a page shows."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.text: list[str] = []
+        self.tags: set[str] = set()
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:
+        self.tags.add(tag)
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+def pointer(path: Path) -> None:
+    path.write_text(POINTER.format("0" * 64))
+
+
+@pytest.fixture
+def night(run: Any, silo: Any, gearbox: Path, tmp_path: Path) -> Any:
+    """Run a night; return its exit code and its report in each form."""
+    assert run("register", gearbox, "--yes").code == 0
+
+    def _night(*words: str) -> tuple[int, dict[str, str]]:
+        paths = [tmp_path / f"night.{form}" for form in ("md", "html", "json", "xml")]
+        options = [word for path in paths for word in ("--report", path)]
+        code = run("sync", gearbox.parent, *options, *words).code
+        return code, {path.suffix[1:]: path.read_text("utf-8") for path in paths}
+
+    return _night
+
+
+def test_the_second_night_says_what_is_new(night: Any, gearbox: Path) -> None:
+    """What was there before stands below, and a hint about the model only in the first report."""
+    _, first = night()
+    assert "New since the last run" not in first["md"]
+    assert "8 individual links" in first["md"]
+    pointer(gearbox.parent / "new.FCStd")
+    _, second = night()
+    new = second["md"].split("## New since the last run\n")[1].split("##")[0]
+    assert "new.FCStd" in new
+    assert "individual links" not in second["md"].replace("Hints that were there before", "")
+    assert "Hints that were there before: 1" in second["md"]
+    assert [line for line in json.loads(second["json"])["summary"]["new"] if "new.FCStd" in line]
+    assert "new: " in second["xml"]
+    _, third = night("--dry-run")
+    assert "New since" not in third["md"] + third["html"]
+    assert "new.FCStd" in third["md"]
+
+
+def test_files_with_one_cause_are_one_line(night: Any, gearbox: Path) -> None:
+    """Fifteen pointers are one thing to do."""
+    for number in range(15):
+        pointer(gearbox.parent / f"p{number}.FCStd")
+    code, told = night()
+    assert code == Exit.UNDONE
+    assert re.search(r"^- 15 × it is a Git LFS pointer", told["md"], re.MULTILINE)
+    assert told["md"].count("git lfs pull") == 1
+    assert "15 × it is a Git LFS pointer" in told["html"]
+    causes = [one["cause"] for one in json.loads(told["json"])["summary"]["errors"]]
+    assert len(causes) == 15
+    assert len(set(causes)) == 1
+
+
+def test_all_forms_say_the_same(night: Any, gearbox: Path) -> None:
+    """The counts on top, every sentence, every change."""
+    pointer(gearbox.parent / "p.FCStd")
+    _, told = night()
+    summary = json.loads(told["json"])["summary"]
+    page = Visible(told["html"])
+    shown = " ".join(page.text)
+    assert told["md"].splitlines()[2].startswith(told["html"].split("<p>")[1].split(" files")[0])
+    for words in (one["message"] for one in (*summary["errors"], *summary["warnings"])):
+        assert words in shown
+    assert "M8x20 Bolt" in shown
+    assert page.tags <= {
+        *[
+            "html",
+            "head",
+            "meta",
+            "title",
+            "style",
+            "body",
+            "h1",
+            "h2",
+            "h3",
+            "p",
+            "ul",
+            "li",
+            "table",
+            "tr",
+            "th",
+            "td",
+        ]
+    }
+    suite = ElementTree.fromstring(told["xml"]).find("testsuite")  # noqa: S314
+    assert suite is not None
+    assert [suite.get("tests"), suite.get("errors")] == ["3", "1"]
+
+
+@given(st.text(st.sampled_from("ab<>&\"'\n\x00\x1b\u202e\ud800"), max_size=20))
+def test_text_of_others_does_nothing_in_html(text: str) -> None:
+    summary = Summary(warnings={text: []}, notes=[text])
+    page = Visible(Html().head(summary) + Html().end(summary))
+    assert page.tags <= {
+        *["html", "head", "meta", "title", "style", "body", "h1", "h2", "h3", "p", "ul", "li"]
+    }
+    assert not re.search("[\x00\x1b\u202e]", "".join(page.text))
+
+
+def test_a_file_with_two_assemblies_is_no_error(run: Any, silo: Any, tmp_path: Path) -> None:
+    """Of a folder both are meant, and both are synced."""
+    folder = tmp_path / "vault"
+    folder.mkdir()
+    part("part", "Box").save(folder / "part.FCStd")
+    both = Doc(label="both").link("L1", "part.FCStd", "Box").link("L2", "part.FCStd", "Box")
+    both.add("App::Part", "Left", Label="Left", Group=locals_("L1"), Type="Assembly")
+    both.add("App::Part", "Right", Label="Right", Group=locals_("L2"), Type="Assembly")
+    both.save(folder / "both.FCStd")
+    names = [one["assembly"]["object"] for one in run("bom", folder, "--json").json()["assemblies"]]
+    assert sorted(names) == ["Left", "Right"]
+    assert run("bom", folder).code == Exit.DONE
+    assert run("register", folder, "--yes").code == Exit.DONE
+    done = run("sync", folder, "--json")
+    assert done.code == Exit.DONE
+    (result,) = (one for one in done.json()["results"] if one["assemblies"])
+    assert [one["status"] for one in result["assemblies"]] == ["merged", "merged"]
+    both = folder / "both.FCStd"
+    assert run("bom", both).code == Exit.BAD_INPUT, "a person names the one that is meant"
+    assert run("sync", both).code == Exit.UNDONE
+    told = run("bom", both, "--assembly", "all", "--json").json()
+    assert [one["assembly"]["object"] for one in told["assemblies"]] == ["Left", "Right"]
+    assert run("bom", both, "--assembly", "all").out.count("1 × Box") == 2
+    assert run("bom", both, "--assembly", "all", "--flat").code == Exit.BAD_INPUT
+    (result,) = run("sync", both, "--assembly", "all", "--json").json()["results"]
+    assert [one["status"] for one in result["assemblies"]] == ["unchanged", "unchanged"]
+
+
+def test_own_parts_that_are_no_items_leave_a_file_undone(run: Any, silo: Any, tmp_path: Path) -> None:
+    """An assembly of bodies of its own file: bom, sync and a night say so, until a person has answered."""
+    folder = tmp_path / "vault"
+    folder.mkdir()
+    top = folder / "top.FCStd"
+    doc = Doc(label="top").add("Part::Box", "Skeleton", Visibility=True)
+    doc.add("Assembly::AssemblyObject", "Top", Group=locals_("Skeleton"), Type="Assembly").save(top)
+    assert run("bom", top).code == run("bom", folder).code == Exit.UNDONE
+    assert run("register", folder, "--yes").code == Exit.DONE
+    assert run("sync", top).code == Exit.UNDONE
+    night = run("sync", folder)
+    assert night.code == Exit.UNDONE
+    assert "1 own part is no item yet" in night.out
+
+
+def test_a_dead_server_wins_over_bad_files(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And the first line says how many assemblies were not sent, and why."""
+    run("register", gearbox, "--yes")
+    pointer(gearbox.parent / "p.FCStd")
+    report = tmp_path / "night.md"
+    with fault_proxy(silo.client.base_url) as proxy:
+        monkeypatch.setenv("SILO_API_URL", proxy.url)
+        proxy.item, proxy.fault = "/merge", Fault(502, b"<html>bad gateway</html>", "text/html")
+        ran = run("sync", gearbox.parent, "--report", report, "--json")
+    assert ran.code == Exit.REMOTE
+    assert ran.json()["summary"]["not_sent"] >= 1
+    monkeypatch.setenv("SILO_API_URL", "http://127.0.0.1:9")
+    ran = run("sync", gearbox.parent, "--report", report)
+    assert ran.code == Exit.REMOTE
+    first = report.read_text("utf-8").splitlines()[2]
+    assert re.match(r"2 assemblies not sent: .*127.* files in order", first)
+    assert "2 assemblies not sent" in ran.out
+
+
+CAUSES: list[SiloError | None] = [
+    None,
+    DocumentError("a.FCStd", "it is damaged"),
+    UnreachableError("no answer"),
+]
+
+
+@given(st.lists(st.tuples(st.sampled_from(CAUSES), st.integers(1, 5))))
+def test_the_exit_code_is_the_worst_of_the_run(files: list[tuple[SiloError | None, int]]) -> None:
+    summary = Summary()
+    for number, (error, left) in enumerate(files):
+        summary.add(TopResult(f"{number}.FCStd", error=error, left=left))
+    worst = {None: Exit.DONE, DocumentError: Exit.UNDONE, UnreachableError: Exit.REMOTE}
+    kinds = [None if error is None else type(error) for error, _ in files]
+    assert summary.exit_code == max((worst[kind] for kind in kinds), default=Exit.DONE)
+    assert summary.unsent.total() == sum(left for error, left in files if isinstance(error, UnreachableError))
+    assert ("not sent" in summary.sentence()) is bool(summary.unsent)

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What is kept of a product is what is counted anew, whatever two people do to what is in it."""
+
+from __future__ import annotations
+
+import random
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from server_testing import Databases, merge_body
+
+from silo.bom.errors import SiloError
+from silo.cli.main import main
+from silo_server.db.engine import Database, Tx
+from silo_server.db.tables import product_summaries
+from silo_server.run import prepare
+from silo_server.services.bom import history, review, tree
+from silo_server.services.bom.merge import merge_bom, read_merge_order, remember_refusal
+from silo_server.services.bom.summary import Summary, below, keep_all, keep_summaries, summaries, summary_of
+from silo_server.services.items import (
+    ItemChange,
+    NewItem,
+    archive_item,
+    change_item,
+    create_item,
+    get_by_uuids,
+    get_item,
+    patch_properties,
+    unarchive_item,
+)
+from silo_server.settings import Settings
+from silo_server.values import Actor, LineState, Role
+
+ASSEMBLIES, PARTS = 4, 4
+GAP = {"reason": "missing", "name": "Lid", "file": "Lid.FCStd", "object": "Body", "quantity": 1}
+
+
+@pytest.fixture(scope="module", params=["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)])
+def prepared(request: pytest.FixtureRequest, databases: Databases) -> Any:
+    """A database of each kind, for all examples."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = Database(Settings(database_url=databases.new(str(request.param)), files_dir=Path(folder)))
+        prepare(made, "silo_test")
+        yield made
+        made.close()
+
+
+def seed(db: Database) -> list[str]:
+    """Assemblies and parts, none in any other."""
+    with db.write() as tx:
+        made = [create_item(tx, NewItem(category="A01", name=f"Assembly {n}"))[0] for n in range(ASSEMBLIES)]
+        made += [create_item(tx, NewItem(category="F01", name=f"Part {n}"))[0] for n in range(PARTS)]
+    return [item.part_number for item in made]
+
+
+def merge(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    parent = dice.randrange(ASSEMBLIES)
+    inside = dice.sample(numbers[parent + 1 :], k=dice.randrange(4))
+    body = merge_body({number: dice.choice([1, 2, 0.5]) for number in inside})
+    gaps = [GAP] if dice.random() < 0.2 else []
+    merge_bom(tx, numbers[parent], read_merge_order({**body, "left_out": gaps}, 100), None)
+
+
+def refuse(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    remember_refusal(tx, get_item(tx, dice.choice(numbers[:ASSEMBLIES]), lock=True), "no such part")
+
+
+def add(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    kind = dice.choice(["component", "component", "reference"])
+    state = LineState(dice.choice([1.0, 3.0]), "manual", kind, child_revision=dice.choice([None, 0]))
+    review.add_line(tx, dice.choice(numbers[:ASSEMBLIES]), dice.choice(numbers), state)
+
+
+def edit(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    change = dice.choice([{"quantity": 9.0}, {"child_revision": 0}, {"rel_type": "alternate"}])
+    review.change_line(tx, dice.choice(numbers[:ASSEMBLIES]), dice.choice(numbers), change)
+
+
+def decide(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    action = dice.choice(list(review.Action))
+    decision = review.Decision(dice.choice(numbers), action)
+    review.resolve(tx, dice.choice(numbers[:ASSEMBLIES]), [decision])
+
+
+def state(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    values = {
+        dice.choice(["mass_kg", "standard_cost"]): dice.choice([None, 0.1, 2]),
+        "currency": dice.choice([None, "USD"]),
+    }
+    patch_properties(tx, dice.choice(numbers), values)
+
+
+def rename(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    place = dice.randrange(len(numbers))
+    change_item(tx, numbers[place], ItemChange(part_number=f"N-{dice.randrange(10**12)}"))
+    # The list is shared by the steps of an example.
+    numbers[place] = "changed"
+
+
+def archive(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    archive_item(tx, dice.choice(numbers))
+
+
+def bring_back(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    unarchive_item(tx, dice.choice(numbers))
+
+
+def undo(tx: Tx, numbers: list[str], dice: random.Random) -> None:
+    number = dice.choice(numbers[:ASSEMBLIES])
+    newest = history.list_changes(tx, get_item(tx, number), 1)
+    if newest:
+        history.undo(tx, number, newest[0].id, None)
+
+
+STEPS: list[Callable[[Tx, list[str], random.Random], None]] = [
+    *(merge, merge, merge, refuse, add, edit, decide, state, state, archive, bring_back, undo, rename)
+]
+
+
+def all_of(db: Database, uuids: list[str]) -> dict[str, Summary]:
+    """What a read says of all items, kept or not."""
+    with db.read() as tx:
+        found = {item.uuid: item for item in get_by_uuids(tx, uuids, include_archived=True)}
+        told = summaries(tx, [item.id for item in found.values()])
+        for uuid in uuids:
+            check_by_rows(tx, found[uuid], told[found[uuid].id])
+        return {uuid: told[found[uuid].id] for uuid in uuids}
+
+
+def check_by_rows(tx: Tx, item: Any, told: Summary) -> None:
+    """Totals, counts and levels are those of the lists of all parts."""
+    graph = tree.load_graph(tx, item)
+    parts = tree.parts_of(tx, graph)
+    cost = tree.roll_up_cost(graph, parts)
+    mass = tree.roll_up_mass(graph, parts, below(tx, graph, parts).standing_alone)
+    flat = {row.line.child_part_number for row in tree.flatten(graph)}
+    rows = list(tree.expand(graph, tree.MAX_DEPTH, 10**6))
+    assert told.parts == len(flat)
+    assert list(told.levels) == [
+        sum(row.depth == level for row in rows)
+        for level in range(1, max((row.depth for row in rows), default=0) + 1)
+    ]
+    if graph.components(item.id):
+        assert float(told.worth.mass or 0) == pytest.approx(mass.total)
+        assert (told.no_mass, told.no_cost) == (len(set(mass.missing)), len(set(cost.missing)))
+        assert (list(told.mass_missing), list(told.cost_missing)) == (
+            sorted(set(mass.missing)),
+            sorted(set(cost.missing)),
+        )
+        assert {c: float(v) for c, v in told.worth.costs.items()} == pytest.approx(dict(cost.totals))
+
+
+@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(seed_of=st.integers(0, 2**32))
+def test_what_is_kept_is_what_is_counted_anew(prepared: Database, seed_of: int) -> None:
+    """Random changes of two people, looks at random products between them, keeping at any moment."""
+    dice, db = random.Random(seed_of), prepared
+    with db.write() as tx:
+        tx.conn.execute(product_summaries.delete())
+    numbers = seed(db)
+    with db.read() as tx:
+        uuids = [get_item(tx, number).uuid for number in numbers]
+    for _ in range(25):
+        with suppress(SiloError), db.write(Actor(dice.choice(["ann", "bob"]), Role.EDITOR)) as tx:
+            dice.choice(STEPS)(tx, numbers, dice)
+        with db.read() as tx:
+            row = {str(r.uuid): str(r.part_number) for r in tx.conn.execute(tree.items.select())}
+        numbers = [row[uuid] for uuid in uuids]
+        if dice.random() < 0.5:
+            with suppress(SiloError), db.read() as tx:
+                summary_of(tx, get_item(tx, dice.choice(numbers)))
+        if dice.random() < 0.5:
+            keep_summaries(db)
+        if dice.random() < 0.3:
+            kept = all_of(db, uuids)
+            with db.write() as tx:
+                tx.conn.execute(product_summaries.delete())
+            db.built.clear()
+            assert kept == all_of(db, uuids)
+
+
+def test_a_look_changes_nothing_and_is_kept(db: Database) -> None:
+    """The second look finds what the first made; a change below ends it for all above, and no other."""
+    numbers = seed(db)
+    top, sub, other, _, part, *_ = numbers
+    with db.write() as tx:
+        for parent, child in ((sub, part), (top, sub), (other, numbers[-1])):
+            merge_bom(tx, parent, read_merge_order(merge_body({child: 2}), 100), None)
+    with db.read() as tx:
+        ids = {number: get_item(tx, number).id for number in numbers}
+        summaries(tx, [ids[top], ids[other]])
+    keep_summaries(db)
+    assert kept_ids(db) == {ids[top], ids[sub], ids[other]}
+    with db.write() as tx:
+        patch_properties(tx, part, {"mass_kg": 2})
+    assert kept_ids(db) == {ids[other]}
+    assert keep_all(db) == ASSEMBLIES
+    assert kept_ids(db) == {ids[number] for number in numbers[:ASSEMBLIES]}
+
+
+def kept_ids(db: Database) -> set[int]:
+    """The items whose summary is kept."""
+    with db.read() as tx:
+        return set(tx.conn.scalars(product_summaries.select()))
+
+
+def test_what_changed_meanwhile_is_not_kept(db: Database) -> None:
+    """A change between the look and the keeping, deep below something that was kept before, wins."""
+    numbers = seed(db)
+    top, sub, *_ = numbers
+    part = numbers[-1]
+    with db.write() as tx:
+        merge_bom(tx, sub, read_merge_order(merge_body({part: 2}), 100), None)
+        merge_bom(tx, top, read_merge_order(merge_body({sub: 2}), 100), None)
+    with db.read() as tx:
+        summary_of(tx, get_item(tx, sub))
+    keep_summaries(db)
+    with db.read() as tx:
+        assert summary_of(tx, get_item(tx, top)).worth.mass is None
+    with db.write() as tx:
+        patch_properties(tx, part, {"mass_kg": 2})
+    keep_summaries(db)
+    assert kept_ids(db) == set()
+    with db.read() as tx:
+        assert summary_of(tx, get_item(tx, top)).worth.mass == 8
+
+
+def test_an_assembly_that_states_its_mass_stands_for_parts_without(db: Database) -> None:
+    """Its number counts above it, and nothing below it is missing there; in itself the part is missing."""
+    numbers = seed(db)
+    top, sub, part = numbers[0], numbers[1], numbers[-1]
+    with db.write() as tx:
+        merge_bom(tx, sub, read_merge_order(merge_body({part: 2}), 100), None)
+        merge_bom(tx, top, read_merge_order(merge_body({sub: 3}), 100), None)
+        patch_properties(tx, sub, {"mass_kg": 1.5})
+    with db.read() as tx:
+        above, itself = (summary_of(tx, get_item(tx, number)) for number in (top, sub))
+    assert (above.worth.mass, above.no_mass, above.no_cost) == (Decimal("4.5"), 0, 1)
+    assert (itself.worth.mass, itself.no_mass, list(itself.mass_missing)) == (None, 1, [part])
+
+
+def test_the_command_sums_all_up(db: Database, capsys: pytest.CaptureFixture[str]) -> None:
+    """All assemblies, on the database of the server; how many is said."""
+    top, *_, part = seed(db)
+    with db.write() as tx:
+        merge_bom(tx, top, read_merge_order(merge_body({part: 2}), 100), None)
+    assert main(["summaries", "--database", db.settings.database_url, "--json"]) == 0
+    assert capsys.readouterr().out == f'{{"assemblies": {ASSEMBLIES}}}\n'
+    assert len(kept_ids(db)) == ASSEMBLIES
