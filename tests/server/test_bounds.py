@@ -296,7 +296,7 @@ def test_every_answer_is_written_before_the_commit() -> None:
 
 
 def test_every_cursor_of_the_database_is_closed_by_its_reader() -> None:
-    """Rows read in portions keep a cursor open on the server; a reader that stops early leaves no open cursor."""
+    """Rows read in portions hold a cursor of the database open, also when their reader stops early."""
 
     def in_portions(node: ast.AST) -> bool:
         return isinstance(node, ast.Call) and "yield_per" in {
