@@ -42,6 +42,11 @@ def test_a_moved_part_is_found_and_its_live_links_are_mended(said: dict[str, Any
     assert said["mended"] == "moved/Bolt.FCStd"
 
 
+def test_the_preview_says_why_a_line_counts_so_many(said: dict[str, Any]) -> None:
+    """In the words of the command line: the number, then each chain."""
+    assert (said["line"], said["why"]) == ("1", "1 × Bolt in Assembly:\nFirst")
+
+
 def test_what_no_line_explains_is_selected_in_the_view(said: dict[str, Any]) -> None:
     assert "the BOM explains" in said["agrees"]
     assert ("They differ" in said["agrees"], said["selected"]) == (False, [])

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -154,7 +154,7 @@ class PreviewWindow:
     flow: Any
     filled: list[Preview] = field(default_factory=list)
     failed: list[SiloError] = field(default_factory=list)
-    seen: list[tuple[str, bool]] = field(default_factory=list)
+    seen: list[tuple[str, bool | None]] = field(default_factory=list)
     raised: int = 0
 
     def busy(self) -> None:
@@ -166,7 +166,7 @@ class PreviewWindow:
     def fail(self, error: SiloError) -> None:
         self.failed.append(error)
 
-    def tell_view(self, text: str, *, agrees: bool) -> None:
+    def tell_view(self, text: str, *, agrees: bool | None) -> None:
         self.seen.append((text, agrees))
 
     def raise_(self) -> None:
@@ -237,7 +237,7 @@ class Desk:
     def snapshot(self, doc: Any) -> Snapshot:
         extraction = None
         if doc.parts:
-            head = BomEntry(doc.FileName, silo_uuid=doc.identity or None, label=doc.Label, is_assembly=True)
+            head = BomEntry(doc.FileName, doc.identity or None, level=0, label=doc.Label, is_assembly=True)
             entries = (
                 BomEntry(part.FileName, silo_uuid=part.identity or None, quantity=count, label=part.Label)
                 for part, count in doc.parts.items()
@@ -249,6 +249,11 @@ class Desk:
         if self.refusal is not None:
             raise self.refusal
         return self.witnessed
+
+    def why(self, doc: Any, assembly: str, parts: Collection[tuple[str, str]]) -> list[str]:
+        if self.refusal is not None:
+            raise self.refusal
+        return [f"{len(doc.parts)} in {assembly or doc.Label}", *(name for _, name in parts)]
 
     def relink(self, finding: Finding) -> list[str]:
         if self.refusal is not None:

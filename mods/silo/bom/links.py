@@ -15,14 +15,15 @@ together. It walks live FreeCAD objects, objects read from FCStd files and the t
 from __future__ import annotations
 
 import os.path
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from typing import Any
 
 from silo.bom.document import NAMELESS, label_of, object_name, own
-from silo.bom.errors import SeveralAssembliesError
+from silo.bom.errors import InputError, SeveralAssembliesError, did_you_mean
 from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.model import BomEntry, Extraction, identity_findings, identity_of, sole_identity, walk_entries
+from silo.bom.resolve import display_name
 from silo.bom.roots import Whole, as_it_is, beside, choose_assembly, fates, loose_hardware
 from silo.bom.walk.kinds import is_container, is_named_assembly
 from silo.bom.walk.notes import Notes
@@ -30,7 +31,7 @@ from silo.bom.walk.rings import Rings
 from silo.bom.walk.roles import Reader
 from silo.bom.walk.standard import same_articles, standard_uuid
 from silo.bom.walk.targets import Inspect, resolve_target
-from silo.bom.walk.tree import Count, Key, Lost
+from silo.bom.walk.tree import Count, Key, Lost, chains
 
 # Real assemblies are some ten levels deep; deeper is an attack or a loop that no other guard saw.
 MAX_LEVELS = 64
@@ -138,6 +139,43 @@ def extract(
     return Extraction(assembly=head, entries=entries, findings=findings)
 
 
+def why(
+    assembly_obj: Any,
+    parts: Collection[str | Key],
+    *,
+    inspect: Inspect | None = None,
+    canonical: Canonical | None = None,
+    whole: Whole = as_it_is,
+    hardware: bool = True,
+) -> list[str]:
+    """Say why the assembly itself has so many of a part: the number, then each chain of links.
+
+    parts
+        the keys of the lines, or a name, a label or a designation.
+
+    InputError if the assembly itself has none of them.
+    """
+    walker = _Walker(inspect, canonical, whole, hardware, below=False)
+    contents, key = walker.reader.contents(assembly_obj), walker.reader.key
+    total, known, lines = 0, set[str](), list[str]()
+    for count in (*contents.counts, *contents.own):
+        entry = walker.entry_for(count.target)
+        names = (entry.object_name, entry.label, entry.document_label, entry.standard or "")
+        known.update(names)
+        if not (meant := [one for one in (entry.key, *names) if one in parts]):
+            continue
+        part = meant[0] if isinstance(meant[0], str) else entry.standard or display_name(entry)
+        total += count.quantity
+        for way in chains(count, contents.tree, key):
+            steps = [f"{label_of(obj)} × {times}" if times > 1 else label_of(obj) for obj, times in way]
+            lines.append(" → ".join(["beside the assembly"] * count.beside + steps))
+    if not lines:
+        wanted = next((one for one in parts if isinstance(one, str)), "This line")
+        meant_by = did_you_mean(wanted, sorted(known - {""})) or "."
+        raise InputError(f"{wanted!r} is no part of {label_of(assembly_obj)} itself{meant_by}")
+    return [f"{total} × {part} in {label_of(assembly_obj)}:", *lines]
+
+
 def same_articles_of(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, BomEntry]]:
     """Standard parts that are one article under two standards."""
     known = {entry.standard: entry for entry in entries if entry.standard}
@@ -180,7 +218,7 @@ class _Walker:
         self.notes = Notes(files.path)
         # For a look at what is not counted, which is nobody's business twice.
         self.silent = silent = Reader(Notes(files.path), files.key, inspect, hardware=hardware)
-        self._reader = Reader(
+        self.reader = Reader(
             self.notes,
             files.key,
             inspect,
@@ -210,7 +248,7 @@ class _Walker:
         return key
 
     def _component(self, obj: Any) -> Key:
-        path, name = key = self._reader.component(obj)
+        path, name = key = self.reader.component(obj)
         if not path or not name.startswith(NAMELESS):
             return key
         shown = self._nameless.setdefault(id(obj.Document), [])
@@ -226,7 +264,7 @@ class _Walker:
             stem = os.path.splitext(os.path.basename(path.replace("\\", "/")))[0]
             return BomEntry(path, object_name=name, missing=True, label=obj.label, document_label=stem)
         if key not in self._heads:
-            standard, registered = self._reader.standard(obj)
+            standard, registered = self.reader.standard(obj)
             if standard and not registered:  # where it first occurs
                 path, name = self._files.key(obj)
             self._heads[key] = BomEntry(
@@ -256,9 +294,9 @@ class _Walker:
             below: dict[Key, Any] = {}
             for key, container in layer.items():
                 self.notes.newer(container.Document)
-                counts = self._reader.contents(container).counts
+                counts = self.reader.contents(container).counts
                 for count in counts:
-                    if not isinstance(count.target, Lost) and self._reader.standard(count.target)[0]:
+                    if not isinstance(count.target, Lost) and self.reader.standard(count.target)[0]:
                         self.entry_for(count.target)  # the top's own screws come first
                 targets = {self.component(count.target): count.target for count in counts}
                 held = {name: target for name, target in targets.items() if self._is_container(name, target)}
@@ -281,7 +319,7 @@ class _Walker:
         key = self.component(container)
         if (known := self._memo.get((key, level, entry))) is not None:
             return known
-        contents = self._reader.contents(container)
+        contents = self.reader.contents(container)
         lines: dict[Key, list[Count]] = {}
         for count in contents.counts:
             name = self.component(count.target)
@@ -310,7 +348,7 @@ class _Walker:
 
     def look_beside(self, top: Any, *, empty: bool) -> None:
         """Report what lies beside the top, and objects without a role: nobody knows what those are."""
-        roles = fates(top, self._reader.contents(top), self.silent)
+        roles = fates(top, self.reader.contents(top), self.silent)
         for name, role in roles.items():
             if role is None:
                 self.notes.without_role(top.Document.getObject(name))
@@ -318,7 +356,7 @@ class _Walker:
 
     def own_lines(self, container: Any, level: int) -> tuple[BomEntry, ...]:
         """What an assembly shows of its own file and is no item yet."""
-        contents = self._reader.contents(container)
+        contents = self.reader.contents(container)
         if not contents.is_assembly(container):
             return ()
         lines: dict[Key, list[Count]] = {}
@@ -351,11 +389,11 @@ class _Walker:
         key = self.component(target)
         if not self._is_container(key, target):
             return False
-        return not self._goes_below or self._reader.contents(target).holds_components
+        return not self._goes_below or self.reader.contents(target).holds_components
 
     def holds(self, top: Any) -> bool:
         """True where the top holds components, also such as do not count."""
-        return self._reader.contents(top).holds_components
+        return self.reader.contents(top).holds_components
 
 
 __all__ = ["Extraction", "Finding", "FindingCode", "Place", "extract", "extract_bom_links"]

@@ -105,9 +105,8 @@ def run_bom(args: argparse.Namespace) -> int:
 
 def _why(args: argparse.Namespace) -> int:
     """Print each way from the assembly to a part, with the arrays on it."""
-    from silo.bom.document import label_of, object_name
-    from silo.bom.roots import choose_assembly, silent_reader
-    from silo.bom.walk.tree import Lost, chains
+    from silo.bom.links import why
+    from silo.bom.roots import choose_assembly
     from silo.cli import show
     from silo.fcstd import Library
 
@@ -115,28 +114,9 @@ def _why(args: argparse.Namespace) -> int:
         raise InputError("--why is for one assembly; name its file.")
     with Library() as library:
         top = choose_assembly(library.open(args.top), args.assembly)
-        reader = silent_reader(hardware=not args.no_hardware, counts_beside=True)
-        contents = reader.contents(top)
-        total, known, lines = 0, set[str](), list[str]()
-        for count in (*contents.counts, *contents.own):
-            target = count.target
-            if isinstance(target, Lost):
-                names = {target.name, target.label}
-            else:
-                names = {object_name(target), label_of(target), target.Document.Label}
-                names.add(reader.standard(target)[0])
-            known |= names
-            if args.why not in names:
-                continue
-            total += count.quantity
-            for way in chains(count, contents.tree, reader.key):
-                steps = [f"{label_of(obj)} × {times}" if times > 1 else label_of(obj) for obj, times in way]
-                lines.append(" → ".join(["beside the assembly"] * count.beside + steps))
-    if not lines:
-        meant = did_you_mean(args.why, sorted(known - {""})) or "."
-        raise InputError(f"{args.why!r} is no part of {label_of(top)} itself{meant}")
+        first, *ways = why(top, [args.why], hardware=not args.no_hardware)
     out = show.console()
-    for line in (f"{total} × {args.why} in {label_of(top)}:", *(f"  {line}" for line in lines)):
+    for line in (first, *(f"  {way}" for way in ways)):
         out.print(show.plain(line), markup=False)
     return Exit.DONE
 

@@ -119,6 +119,10 @@ def moved_part(one: Any) -> None:
     wait(lambda: window._preview is not None and window._preview is not before)
     target = top.getObject("First").LinkedObject
     tell(mended=target is not None and os.path.relpath(target.Document.FileName, VAULT))
+    line = window.table.topLevelItem(0)
+    window.table.setCurrentItem(line)
+    window.why_button.click()
+    tell(line=line.text(2), why=window._view_text.text())
     window.verify_button.click()
     tell(agrees=window._view_text.text(), selected=[obj.Name for obj in Gui.Selection.getSelection()])
     # A Draft array whose original nobody hid: the view has one more than the BOM says.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
@@ -10,10 +11,10 @@ from pathlib import Path
 import pytest
 from desk import Document, Office
 
-from silo.bom.errors import DocumentError, UnreachableError
+from silo.bom.errors import DocumentError, InputError, UnreachableError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.preview.flow import PreviewFlow
+from silo.workbench.preview.flow import PreviewFlow, Row, rows
 
 
 @pytest.fixture(name="shown")
@@ -219,3 +220,29 @@ def test_broken_links_are_mended_where_one_file_fits(
     office.settle()
     assert "holds no object" in office.desk.warned[-1]
     assert len(window.filled) == 2
+
+
+def test_a_line_says_why_it_counts_so_many(office: Office, flow: PreviewFlow, top: Document) -> None:
+    """By the keys of the line, in the assembly that holds it; also of a line without a part number."""
+    top.parts[office.document("Loose", registered=False)] = 2
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.previews
+    lines = [row for row in _flat(rows(window.filled[0])) if row.parts]
+    assert [Path(row.parts[0][0]).stem for row in lines] == ["Plate", "Loose"]
+    flow.why(top.FileName, lines[0].document, lines[0].assembly, [("", str(n)) for n in range(20)])
+    text, agrees = window.seen[-1]
+    assert (text.split("\n")[0], text.count("\n"), agrees) == ("2 in Top", 12, None)
+    assert text.endswith("… and 9 more")
+    office.desk.refusal = InputError("gone")
+    flow.why(top.FileName, lines[0].document, "", lines[0].parts)
+    assert window.seen[-1] == ("gone", None)
+    office.desk.open.clear()
+    flow.why(top.FileName, lines[0].document, "", lines[0].parts)
+    assert "not open any more" in str(window.failed[-1])
+
+
+def _flat(table: Iterable[Row]) -> Iterator[Row]:
+    for row in table:
+        yield row
+        yield from _flat(row.children)

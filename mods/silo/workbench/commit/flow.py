@@ -29,7 +29,7 @@ import json
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.files import Standing
     from silo.api.transport import Cancel
+    from silo.bom.walk.tree import Key
     from silo.outbox.entry import Entry as QueueEntry
     from silo.outbox.store import Store
     from silo.registering.offer import Candidate, Seen
@@ -424,6 +425,9 @@ class Desk(Protocol):
 
     def accounts(self, extraction: Extraction, /) -> Sequence[Account]:
         """The solids that FreeCAD shows, for the assembly and each sub-assembly."""
+
+    def why(self, doc: Any, assembly: str, parts: Collection[Key], /) -> list[str]:
+        """Why an assembly of a document has so many of a part: the number, then each chain to it."""
 
     def relink(self, finding: Finding, /) -> list[str]:
         """Set the live links of a finding to the file that was meant; their labels."""

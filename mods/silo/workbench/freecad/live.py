@@ -13,17 +13,18 @@ import os
 import re
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 from xml.sax.saxutils import unescape
 
 from silo.bom.document import LinkProblem, object_name, saved_by
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.links import extract
+from silo.bom.links import extract, why
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
 from silo.bom.walk.targets import is_assembly_link, is_link
+from silo.bom.walk.tree import Key
 from silo.platform import Spelling, one_path
 from silo.workbench.freecad import host, saving
 from silo.workbench.freecad.cached import CachedDocument, FactCache
@@ -103,13 +104,20 @@ def cached_document(document: Any) -> CachedDocument:
 
 def extract_object(assembly_obj: Any, *, hardware: bool = True) -> Extraction:
     """The BOM of one assembly object, live or :func:`cached_document`."""
-    return extract(
-        assembly_obj,
-        inspect=LinkInspector(),
-        canonical=canonical_paths(),
-        whole=WholeDocuments(),
-        hardware=hardware,
-    )
+    return extract(assembly_obj, **_walking(), hardware=hardware)
+
+
+def why_object(document: Any, assembly: str, parts: Collection[Key], *, hardware: bool = True) -> list[str]:
+    """Say why an assembly of an open document has so many of a part; see :func:`silo.bom.links.why`."""
+    cached = cached_document(document)
+    top = cached.getObject(assembly) if assembly else choose_assembly(cached)
+    if top is None:
+        raise DocumentError(document.FileName, f"it no longer holds {assembly}")
+    return why(top, parts, **_walking(), hardware=hardware)
+
+
+def _walking() -> dict[str, Any]:
+    return {"inspect": LinkInspector(), "canonical": canonical_paths(), "whole": WholeDocuments()}
 
 
 class WholeDocuments:

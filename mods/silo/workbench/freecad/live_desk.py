@@ -16,7 +16,7 @@ Live links that lead nowhere, led to the file that was meant. GUI thread; the pe
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -38,6 +38,7 @@ from silo.workbench.words import translate
 
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry, Extraction
+    from silo.bom.walk.tree import Key
     from silo.workbench.commit.flow import Theirs
     from silo.workbench.freecad.witness import Account
     from silo.workbench.preview.flow import PreviewFlow
@@ -287,6 +288,10 @@ class LiveDesk:
 
         with qt.wait_cursor():
             return witness.accounts(extraction, hardware=self._count_hardware())
+
+    def why(self, doc: Any, assembly: str, parts: Collection[Key]) -> list[str]:
+        """Each chain from an assembly to a part of it."""
+        return live.why_object(doc, assembly, parts, hardware=self._count_hardware())
 
     def relink(self, finding: Finding) -> list[str]:
         """Set live links to the file that was meant; their labels."""

@@ -109,6 +109,12 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             lambda: self._show(self.table.currentItem()),
             translate("Silo", "Select the instances in the 3D view and the tree"),
         )
+        self.why_button = button(
+            translate("Silo", "Why so many?"),
+            "why",
+            lambda: self._why(self.table.currentItem()),
+            translate("Silo", "Show each chain of links and arrays from the assembly to the part"),
+        )
         self.refresh_button = button(
             translate("Silo", "Compare again"), "refresh", lambda: self._flow.again(self._path)
         )
@@ -128,7 +134,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         )
         self.sync_button = button(translate("Silo", "Sync"), "sync", self._sync, default=True)
         close = button(translate("Silo", "Close"), "close", self.close)
-        left = (self.show_button, self.refresh_button, self.verify_button, self.view_button)
+        left = (self.show_button, self.why_button, self.refresh_button, self.verify_button, self.view_button)
         right = (self.relink_button, self.register_button, self.sync_button, close)
         return widgets.line(*left, None, *right)
 
@@ -176,10 +182,10 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             told.append(counted(len(preview.broken), one, many))
         return "\n".join(told)
 
-    def tell_view(self, text: str, *, agrees: bool) -> None:
-        """What a comparison with the 3D view found."""
+    def tell_view(self, text: str, *, agrees: bool | None) -> None:
+        """What a comparison with the 3D view found, or why a line counts so many (``agrees`` None)."""
         self._view_text.setText(plain(text, 2000) if "\n" not in text else text)
-        widgets.paint(self._view_text, Tone.GOOD if agrees else Tone.ERROR)
+        widgets.paint(self._view_text, {True: Tone.GOOD, False: Tone.ERROR, None: Tone.PLAIN}[agrees])
         self._view_text.show()
 
     def _tell(self, text: str) -> None:
@@ -258,7 +264,9 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             widgets.embolden(item)
         if row.note:
             item.setToolTip(0 if row.kind in _WIDE else 4, tip(row.note))
+        counted_in = (row.document, row.assembly, list(map(list, row.parts)))
         item.setData(0, QtCore.Qt.ItemDataRole.UserRole, (row.document, list(row.objects)))
+        item.setData(3, QtCore.Qt.ItemDataRole.UserRole, counted_in)
         item.setData(1, QtCore.Qt.ItemDataRole.UserRole, row.kind.value)
         item.addChildren(children)
         return item
@@ -283,6 +291,12 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         data = item.data(0, QtCore.Qt.ItemDataRole.UserRole) if item is not None else None
         if data and data[1]:
             self._flow.show(data[0], tuple(data[1]))
+
+    def _why(self, item: Any) -> None:
+        data = item.data(3, QtCore.Qt.ItemDataRole.UserRole) if item is not None else None
+        if data and data[2]:
+            document, assembly, parts = data
+            self._flow.why(self._path, document, assembly, [(path, name) for path, name in parts])
 
     def _sync(self) -> None:
         if self._preview is not None:

@@ -9,7 +9,7 @@ Pure, but for :func:`ask`, which reads from the server and belongs in the worker
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Protocol
@@ -28,6 +28,7 @@ from silo.workbench.session.session import Session
 from silo.workbench.words import MOST_TIP, plain, quantity, translate
 
 if TYPE_CHECKING:
+    from silo.bom.walk.tree import Key
     from silo.bom_sync import Resolved
 
 
@@ -58,6 +59,8 @@ class Row:
         quantities per one parent, as text; "" where that side has none.
     document, objects
         the instances in the CAD model, to select them.
+    assembly, parts
+        the assembly in that document, and what the row counts in it, to say why so many.
     """
 
     kind: Kind
@@ -68,6 +71,8 @@ class Row:
     note: str = ""
     document: str = ""
     objects: tuple[str, ...] = ()
+    assembly: str = ""
+    parts: tuple[Key, ...] = ()
     children: tuple[Row, ...] = ()
 
     def __post_init__(self) -> None:
@@ -183,7 +188,7 @@ def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[Row, ...]:
     unresolved = preview.top.resolved.unresolved
     share = _share(room, unresolved)
     unregistered = tuple(
-        _unregistered_row(entry, base, tuple(_below(entry, by_key, preview.names, frozenset(), share)))
+        _unregistered_row(entry, preview, tuple(_below(entry, by_key, preview.names, frozenset(), share)))
         for entry in unresolved
     )
     if unregistered:
@@ -231,8 +236,7 @@ def _assembly_rows(
             cad=quantity(entry.quantity),
             silo=silo,
             note=note,
-            document=one.resolved.assembly.doc_path,
-            objects=entry.instances,
+            **_counted(entry, one.resolved.assembly),
             children=tuple(_below(entry, known, names, above, share)),
         )
     local = {entry.part_number for entry in one.resolved.entries}
@@ -294,14 +298,26 @@ def _missing_words(file: str, name: str) -> str:
     return text.replace("{file}", f"{file}#{name}" if name else file)
 
 
-def _unregistered_row(entry: BomEntry, base: str, children: tuple[Row, ...]) -> Row:
+def _unregistered_row(entry: BomEntry, preview: Preview, children: tuple[Row, ...]) -> Row:
+    head = preview.top.resolved.assembly
     return Row(
         Kind.UNREGISTERED,
         name=display_name(entry),
         cad=quantity(entry.quantity),
-        note=relative(entry.doc_path, base),
+        note=relative(entry.doc_path, os.path.dirname(preview.snapshot.path)),
         children=children,
+        **(_counted(entry, head) if entry.level == head.level + 1 else {}),
     )
+
+
+def _counted(entry: BomEntry, head: BomEntry) -> dict[str, Any]:
+    """The fields of a row for what stands in the model, directly below an assembly."""
+    return {
+        "document": head.doc_path,
+        "objects": entry.instances,
+        "assembly": head.object_name,
+        "parts": (entry.key, *entry.also),
+    }
 
 
 # Told as rows of their own.
@@ -380,6 +396,8 @@ def _find(extraction: Extraction | None, key: tuple[str, str]) -> BomEntry | Non
 
 # Of many sub-assemblies that differ, the first ones.
 _MOST_ACCOUNTS = 4
+# Of many ways to a part, the first ones; `silo-mod bom --why` prints all.
+_MOST_WAYS = 12
 
 
 class Window(Protocol):
@@ -391,7 +409,7 @@ class Window(Protocol):
 
     def fail(self, error: SiloError, /) -> None: ...
 
-    def tell_view(self, text: str, /, *, agrees: bool) -> None: ...
+    def tell_view(self, text: str, /, *, agrees: bool | None) -> None: ...
 
     def raise_(self) -> None: ...
 
@@ -437,13 +455,16 @@ class PreviewFlow:
 
     def _taken_again(self, path: str) -> Snapshot | None:
         """The document of an open window as it is now; the window says where it was closed."""
+        doc = self._found(path, path)
+        return None if doc is None else self._take(doc)
+
+    def _found(self, path: str, window: str) -> Any:
         doc = self._desk.find(path)
         if doc is None:
             text = translate("Silo", "{name} is not open any more. Open it, then compare again.")
             error = SiloError(text.replace("{name}", plain(os.path.basename(path), 80)))
-            self._with_dialog(path, lambda dialog: dialog.fail(error))
-            return None
-        return self._take(doc)
+            self._with_dialog(window, lambda dialog: dialog.fail(error))
+        return doc
 
     def _take(self, doc: Any) -> Snapshot | None:
         try:
@@ -500,6 +521,19 @@ class PreviewFlow:
         unexplained = next((account for account in differing if account.unexplained), None)
         if unexplained is not None:
             self.show(unexplained.doc_path, unexplained.unexplained)
+
+    def why(self, window: str, document: str, assembly: str, parts: Collection[Key]) -> None:
+        """Show in a window each chain from an assembly to a part of it."""
+        if (doc := self._found(document, window)) is None:
+            return
+        try:
+            lines = self._desk.why(doc, assembly, parts)
+        except SiloError as error:
+            lines = [str(error)]
+        if (more := len(lines) - _MOST_WAYS) > 0:
+            lines[_MOST_WAYS:] = [translate("Silo", "… and {n} more").replace("{n}", str(more))]
+        text = "\n".join(plain(line, MOST_CELL) for line in lines)
+        self._with_dialog(window, lambda dialog: dialog.tell_view(text, agrees=None))
 
     def relink(self, preview: Preview) -> None:
         """Lead broken links to the files that were meant, where one fits; then compare again."""

@@ -621,6 +621,7 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../pane/boxes.py" />
             <location filename="../../pane/waiting.py" />
+            <location filename="../../preview/flow.py" />
             <source>… and {n} more</source>
             <translation type="unfinished" />
         </message>
@@ -926,6 +927,16 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../preview/dialog.py" />
             <source>Select the instances in the 3D view and the tree</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Why so many?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Show each chain of links and arrays from the assembly to the part</source>
             <translation type="unfinished" />
         </message>
         <message>
