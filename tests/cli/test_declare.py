@@ -70,6 +70,20 @@ def test_what_is_no_part_is_answered_once(run: Any, silo: Any, machine: Path) ->
     assert not any("SiloItemId" in obj.PropertiesList for obj in answered)
 
 
+def test_what_is_no_part_can_be_taken_back(run: Any, silo: Any, machine: Path) -> None:
+    """It is undecided again, as before; it cannot be declared while it is no part."""
+    before = run("bom", machine, "--json").json()
+    assert run("register", machine, "--not-a-part", "Motor").code == 0
+    refused = run("register", machine, "--yes", "--declare", "Motor")
+    assert refused.code == 2
+    assert "no part, as somebody said; --undeclare takes that back" in refused.err
+    assert run("register", machine, "--not-a-part", "Motor").code == 2
+    assert "Undecided again: Motor, Motor001" in run("register", machine, "--undeclare", "Motor").out
+    assert not any("SiloBomExclude" in obj.PropertiesList for obj in open_document(machine).Objects)
+    assert run("bom", machine, "--json").json() == before
+    assert run("register", machine, "--undeclare", "Motor").code == 2
+
+
 def test_copies_that_are_different_parts_are_taken_apart(run: Any, silo: Any, machine: Path) -> None:
     """The person decides, not the shape."""
     done = run("register", machine, "--yes", "--declare", "Motor", "--apart", "--json").json()

@@ -37,6 +37,16 @@ def test_what_is_modelled_in_the_file_is_declared_and_taken_back(said: dict[str,
     assert not [key for key in said["meta"] if "Motor" in key]
 
 
+def test_what_is_no_part_is_one_press_and_another_takes_it_back(said: dict[str, Any]) -> None:
+    """The file keeps the answer; the dialog lists it in a section of its own, without a question."""
+    assert (said["excluded"], said["remark"]) == (True, "no part: nothing asks for it again")
+    assert said["third"] == [
+        *("Modelled in this file, not counted", "Motor (2 copies)"),
+        *("Modelled in this file, and no part", "Jig"),
+    ]
+    assert said["asked_again"]
+
+
 def test_a_moved_part_is_found_and_its_live_links_are_mended(said: dict[str, Any]) -> None:
     assert said["can_mend"]
     assert said["mended"] == "moved/Bolt.FCStd"

@@ -202,8 +202,8 @@ class RegisterWindow:
     def register(self, orders: Iterable[Order]) -> None:
         self.flow.register(self.path, orders)
 
-    def undeclared(self, row: Any) -> None:
-        self.undone.append(row)
+    def undeclared(self, row: Any, *, no_part: bool) -> None:
+        self.undone.append((row, no_part))
 
     def stopped(self) -> None:
         self.stops += 1
@@ -275,7 +275,7 @@ class Desk:
     def look_at(self, paths: Iterable[str]) -> dict[str, Seen]:
         return {path: Seen(State.READY) for path in paths}
 
-    def remove_identity(self, candidate: Candidate) -> None:
+    def remove_identity(self, candidate: Candidate, *, no_part: bool) -> None:
         if self.refusal is not None:
             raise self.refusal
         self.taken_back.append(candidate.article.objects if candidate.article is not None else ())

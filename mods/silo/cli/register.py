@@ -228,7 +228,8 @@ def add_register(parser: argparse.ArgumentParser) -> None:
         metavar="OBJECT",
         action="append",
         default=[],
-        help="take the identity from an object in the assembly's own file; its item stays",
+        help="take back what was said of an object in the assembly's own file: its identity, whose item "
+        "stays, or that it is no part",
     )
     parser.add_argument(
         "--not-a-part",
@@ -391,7 +392,7 @@ class _Run:
             return Exit.DONE
         with replacing(Path(self.args.plan)) as file:
             file.write(table)
-        count = sum(not one.declared for one in self.found.candidates)
+        count = sum(not one.decided for one in self.found.candidates)
         print(
             f"{self.args.plan}: {counted(count, 'row')}. Edit it, then: "
             f"silo-mod register {shlex.quote(self.args.top)} --apply {shlex.quote(self.args.plan)}",
@@ -438,7 +439,7 @@ class _Run:
 
     def _report(self, left: Sequence[Candidate], already: int) -> None:
         articles = [
-            one.article for one in self.found.candidates if one.article is not None and not one.declared
+            one.article for one in self.found.candidates if one.article is not None and not one.decided
         ]
         declared = {one.proposal.entry.key for one in self.done}
         from silo.cli import show
@@ -462,8 +463,9 @@ def _declare(args: argparse.Namespace) -> int:
     articles = modelled(args.top, args.assembly)
     wanted = chosen(articles, args.declare, apart=args.apart)
     for one in wanted:
-        if one.declared:
-            raise InputError(f"{one.entry.label} is a component already; --undeclare takes that back")
+        if one.decided:
+            what = "no part, as somebody said" if one.no_part else "a component already"
+            raise InputError(f"{one.entry.label} is {what}; --undeclare takes that back")
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)
         categories = client.categories(schema)
@@ -483,11 +485,13 @@ def _declare(args: argparse.Namespace) -> int:
 
 
 def _undeclare(args: argparse.Namespace) -> int:
-    """Take identities out of the file; what is no part is marked there as well."""
+    """Take identities and marks out of the file; what is no part gets its mark."""
     from silo.fcstd import unstamp
 
     no_part = bool(args.not_a_part)
-    articles = [one for one in modelled(args.top, args.assembly) if no_part or one.declared]
+    articles = [
+        one for one in modelled(args.top, args.assembly) if (not one.no_part if no_part else one.decided)
+    ]
     path = articles[0].entry.doc_path if articles else os.path.realpath(args.top)
     wanted = chosen(articles, args.not_a_part or args.undeclare)
     if not args.even_if_open and open_in_any().has_file(path):
@@ -499,7 +503,7 @@ def _undeclare(args: argparse.Namespace) -> int:
     elif no_part:
         print(f"No part of any BOM: {', '.join(taken)} (SiloBomExclude).")
     else:
-        print(f"No component any more: {', '.join(taken)}. The next sync flags the line as unreferenced.")
+        print(f"Undecided again: {', '.join(taken)}. The next sync flags a line of it as unreferenced.")
     return Exit.DONE
 
 

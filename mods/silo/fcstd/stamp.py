@@ -297,7 +297,7 @@ def unstamp(
     """Take the identity of one object out of the file; False where there was nothing to do.
 
     no_part
-        the object also gets ``SiloBomExclude``: a person says that it is no part.
+        the object gets ``SiloBomExclude``: a person says that it is no part. Otherwise it has none then.
 
     The document's own identity stays. Raises DocumentError as :func:`stamp` does.
     """
@@ -309,14 +309,13 @@ def unstamp(
             obj = library.open(real).getObject(object_name)
             if obj is None:
                 raise DocumentError(real, f"it holds no object named {object_name!r}")
-            if own_identity(obj) is None and (not no_part or own(obj, "SiloBomExclude") is True):
+            if own_identity(obj) is None and (own(obj, "SiloBomExclude") is True) == no_part:
                 return False
         check_writable(real)
 
         def edit(text: bytes) -> bytes:
             changes: dict[str, bytes | None] = dict.fromkeys(("SiloItemId", "SiloUUID"))
-            if no_part:
-                changes["SiloBomExclude"] = _NO_PART
+            changes["SiloBomExclude"] = _NO_PART if no_part else None
             return _edited(text, {meta_key(object_name): None}, object_name, changes, limits.depth)
 
         content = replaced_entry(container, *edited_xml(container, edit, limits))
@@ -326,8 +325,8 @@ def unstamp(
             read = library.open(copy).getObject(object_name)
             if read is None or own_identity(read) is not None:
                 raise DocumentError(real, "the copy still holds the identity; the file is unchanged")
-            if no_part and own(read, "SiloBomExclude") is not True:
-                raise DocumentError(real, "the copy does not hold the mark; the file is unchanged")
+            if (own(read, "SiloBomExclude") is True) != no_part:
+                raise DocumentError(real, "the copy does not have the mark as wanted; the file is unchanged")
 
     replace_file(real, state, content, check)
     return True

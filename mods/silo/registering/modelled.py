@@ -20,6 +20,8 @@ from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.bom.model import BomEntry, document_identity, own_identity
 from silo.bom.resolve import is_generic
 from silo.bom.roots import choose_assembly, silent_reader
+from silo.bom.walk.kinds import survey_of
+from silo.bom.walk.roles import DECLARABLE
 from silo.fcstd import Library
 from silo.fcstd.document import FcstdObject
 
@@ -39,12 +41,20 @@ class Modelled:
         why they are taken for equal: "shape" or "label"; "" for a single one.
     source
         the file that A2plus imported it from.
+    no_part
+        a person said that it is no part, and the file keeps that (``SiloBomExclude``).
     """
 
     entry: BomEntry
     objects: tuple[str, ...]
     alike: str = ""
     source: str = ""
+    no_part: bool = False
+
+    @property
+    def decided(self) -> bool:
+        """True where a person has said what it is: a component, or no part."""
+        return self.declared or self.no_part
 
     @property
     def declared(self) -> bool:
@@ -102,7 +112,7 @@ def source_identity(article: Modelled) -> str | None:
 
 
 def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
-    """The articles modelled in the file of an assembly (or of a single part), those declared already last.
+    """The articles modelled in the file of an assembly (or of a single part); what is decided comes last.
 
     shape_of
         something equal for equal shapes wherever they are placed; "" where that is not known.
@@ -127,7 +137,11 @@ def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
     for identity, (objects, quantity) in declared.items():
         article = _article(objects, "", quantity)
         articles.append(replace(article, entry=replace(article.entry, silo_uuid=identity)))
-    return articles
+    of_file = survey_of(top.Document).of(DECLARABLE)
+    no_parts = _alike([obj for obj, _ in of_file if own(obj, "SiloBomExclude") is True], shape_of)
+    return articles + [
+        replace(_article(objects, alike, len(objects)), no_part=True) for objects, alike in no_parts
+    ]
 
 
 def label_stem(label: str, labels: Set[str]) -> str:

@@ -101,9 +101,9 @@ class Candidate:
     article: Modelled | None = None
 
     @property
-    def declared(self) -> bool:
-        """True for what is modelled in the assembly's file and a component already."""
-        return self.article is not None and self.article.declared
+    def decided(self) -> bool:
+        """True for what is modelled in the assembly's file and a component already, or said to be no part."""
+        return self.article is not None and self.article.decided
 
     @property
     def entry(self) -> BomEntry:
@@ -324,7 +324,7 @@ def _with_look_alikes(
 ) -> tuple[list[Candidate], str]:
     """The candidates with what they may be already; why nobody knows, where the server did not say."""
     # An item of a standard part's designation is joined, whoever made it.
-    asked = [one for one in candidates[:most] if not one.entry.is_standard and not one.declared]
+    asked = [one for one in candidates[:most] if not one.entry.is_standard and not one.decided]
     found: dict[tuple[str, str], list[Any]] = {}
     try:
         for start in range(0, len(asked), _IN_ONE):

@@ -92,7 +92,7 @@ def write_table(offer: Offer, wanted: Callable[[Candidate], bool], base: str) ->
     earlier = Contents()
     for candidate in offer.candidates:
         earlier.add(candidate)
-        if candidate.declared:
+        if candidate.decided:
             continue
         proposal, entry = candidate.proposal, candidate.entry
         row = {
@@ -202,7 +202,7 @@ class Planned:
 
 def orders_of(rows: Sequence[Row], offer: Offer, base: str, api: Any, name: str) -> Planned:
     """The orders of a table. InputError lists all problems with their lines; then nothing is registered."""
-    candidates = {key_of(one, base): one for one in offer.candidates if not one.declared}
+    candidates = {key_of(one, base): one for one in offer.candidates if not one.decided}
     registered = {(relative(path, base), obj): number for (path, obj), number in offer.registered.items()}
     counts = Counter(row.key for row in rows)
     problems: list[str] = []

@@ -26,7 +26,7 @@ from inside import (
     wait,
 )
 
-BUTTON = 6
+BUTTON, NO_PART = 6, 7
 
 
 def story() -> None:
@@ -98,8 +98,20 @@ def declare(one: Any, doc: Any) -> None:
     tell(again=texts(again.table))
     photograph(again, "declared")
     taken = press(again, "declared")
-    wait(lambda: not taken.candidate.declared and settled())
+    wait(lambda: not taken.candidate.decided and settled())
+    jig = next(row for row in again.rows if row.component() == "Jig")
+    again.table.cellWidget(again._places[again.rows.index(jig)], NO_PART).click()
+    wait(lambda: jig.section == "no part" and settled())
+    tell(excluded=doc.getObject("Jig").SiloBomExclude, remark=jig.note()[0])
     again.close()
+    wait(lambda: not one.registrations._open)
+    third = dialog_of(one, doc)
+    tell(third=texts(third.table))
+    photograph(third, "no-part")
+    back = press(third, "no part")
+    wait(lambda: back.section == "modelled" and settled())
+    tell(asked_again="SiloBomExclude" not in doc.getObject("Jig").PropertiesList)
+    third.close()
     wait(lambda: not one.registrations._open)
     motor = doc.getObject("Motor")
     tell(left="SiloItemId" in motor.PropertiesList and bool(motor.SiloItemId), meta=sorted(doc.Meta))

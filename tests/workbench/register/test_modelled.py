@@ -105,3 +105,21 @@ def test_different_parts_get_a_number_each(path: Path) -> None:
 def test_a_file_that_cannot_be_written_offers_nothing_of_it(path: Path) -> None:
     rows = offered(path, FakeSilo(), State.READ_ONLY)
     assert [row.section for row in rows] == ["", "standard"]
+
+
+def test_no_part_is_a_section_of_its_own_and_can_be_taken_back(path: Path) -> None:
+    """Without a question and without a number; the whole article, all copies."""
+    silo = FakeSilo()
+    for name in ("Motor", "Motor001"):
+        assert unstamp(path, name, no_part=True)
+        assert not unstamp(path, name, no_part=True)
+    (row,) = [row for row in offered(path, silo) if row.section == "no part"]
+    assert (row.component(), row.can_undeclare, row.can_register, row.can_be_no_part, row.checked) == (
+        *("Motor (2 copies)", True),
+        *(False, False, False),
+    )
+    assert (row.number_text({}, 0), row.note()[0]) == ("", "no part: nothing asks for it again")
+    for name in ("Motor", "Motor001"):
+        assert unstamp(path, name)
+    (row,) = [row for row in offered(path, silo) if row.component() == "Motor (2 copies)"]
+    assert (row.section, row.can_be_no_part) == ("modelled", True)

@@ -443,8 +443,9 @@ class Desk(Protocol):
     def write_identity(self, candidate: Candidate, identity: str, /) -> None:
         """Write an identity into a component's document and save it."""
 
-    def remove_identity(self, candidate: Candidate, /) -> None:
-        """Take the identity from what is modelled in an assembly's own file, and save it."""
+    def remove_identity(self, candidate: Candidate, /, *, no_part: bool) -> None:
+        """Take the identity from what is modelled in an assembly's own file, and save it; with or without the
+        mark that it is no part."""
 
     def unedited(self) -> list[Any]:
         """The documents without unsaved edits, each after those that it links to."""

@@ -167,13 +167,17 @@ def write_identity(candidate: Candidate, identity: str) -> None:
     saving.save(doc, mark_parents=True)
 
 
-def remove_identity(candidate: Candidate) -> None:
-    """Take the identity from what is modelled in an assembly's own file, and save it. GUI thread."""
+def remove_identity(candidate: Candidate, *, no_part: bool) -> None:
+    """Take the identity from what is modelled in an assembly's own file, and save it. GUI thread.
+
+    no_part
+        mark it as no part as well; otherwise such a mark goes too.
+    """
     doc = saving.open_fully(candidate.entry.doc_path)
     if live.lost_assemblies(doc):
         raise DocumentError(doc.FileName, "made by a newer FreeCAD; saving it here would destroy it")
     for name in candidate.article.objects if candidate.article is not None else ():
-        saving.remove_identity(doc, name)
+        saving.remove_identity(doc, name, no_part=no_part)
     saving.save(doc, mark_parents=True)
 
 

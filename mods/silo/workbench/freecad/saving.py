@@ -250,24 +250,30 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
         raise DocumentError(doc.FileName, f"it has no object {name} any more")
     with others_unmarked(doc):
         if obj is not None:
-            _set_text(obj, "SiloItemId", identity)
+            _set(obj, "SiloItemId", identity)
             if "SiloUUID" in obj.PropertiesList:
-                _set_text(obj, "SiloUUID", identity)
+                _set(obj, "SiloUUID", identity)
         # Meta gives a copy: only assigning a whole dictionary changes it.
         doc.Meta = {**doc.Meta, meta_key("" if whole_document else name): identity}
         if whole_document and hasattr(doc, "addProperty"):
-            _set_text(doc, "SiloUUID", identity)
+            _set(doc, "SiloUUID", identity)
 
 
-def remove_identity(doc: Any, name: str) -> None:
-    """Take the identity of one object out of every place; the document's own stays. The caller saves."""
+def remove_identity(doc: Any, name: str, *, no_part: bool) -> None:
+    """Take the identity of one object out of every place; the document's own stays. The caller saves.
+
+    no_part
+        the object gets ``SiloBomExclude``: a person says that it is no part. Otherwise it has none then.
+    """
     from silo.bom.model import meta_key
 
     obj = doc.getObject(name)
     with others_unmarked(doc):
-        for place in ("SiloItemId", "SiloUUID") if obj is not None else ():
+        for place in ("SiloItemId", "SiloUUID", "SiloBomExclude") if obj is not None else ():
             if place in obj.PropertiesList and not obj.removeProperty(place):
-                _set_text(obj, place, "")
+                _set(obj, place, type(obj.getPropertyByName(place))())
+        if obj is not None and no_part:
+            _set(obj, "SiloBomExclude", True, "App::PropertyBool", "True: no part of any BOM", locked=False)
         doc.Meta = {key: value for key, value in doc.Meta.items() if key != meta_key(name)}
 
 
@@ -275,13 +281,21 @@ def remove_identity(doc: Any, name: str) -> None:
 _OUTPUT = 8
 
 
-def _set_text(owner: Any, name: str, value: str) -> None:
+def _set(
+    owner: Any,
+    name: str,
+    value: Any,
+    kind: str = "App::PropertyString",
+    tip: str = "Identity of the item in Silo",
+    *,
+    locked: bool = True,
+) -> None:
     """Set a property without touching its object.
 
     A touched object touches all links to it, and the next recompute marks their documents as edited.
     """
     if name not in owner.PropertiesList:
-        owner.addProperty("App::PropertyString", name, "Silo", "Identity of the item in Silo", _OUTPUT, True)
+        owner.addProperty(kind, name, "Silo", tip, _OUTPUT, locked)
     if hasattr(owner, "State") and "Output" not in owner.getPropertyStatus(name):
         owner.setPropertyStatus(name, "Output")
     setattr(owner, name, value)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
 MOST_ROWS = 400
 
-COMPONENT, NAME, TYPE, CATEGORY, NUMBER, NOTE, BUTTON = range(7)
+COMPONENT, NAME, TYPE, CATEGORY, NUMBER, NOTE, BUTTON, NO_PART = range(8)
 
 
 class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
@@ -71,7 +71,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     # -- made once --------------------------------------------------------------------------------------
 
     def _make_table(self) -> Any:
-        table = QtWidgets.QTableWidget(0, 7)
+        table = QtWidgets.QTableWidget(0, 8)
         table.setObjectName("components")
         table.setHorizontalHeaderLabels(
             [
@@ -81,6 +81,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
                 translate("Silo", "Category"),
                 translate("Silo", "Part number"),
                 translate("Silo", "Remarks"),
+                "",
                 "",
             ]
         )
@@ -138,7 +139,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             self.table.setColumnWidth(column, min(self.table.columnWidth(column) + 14, most))
         mode = QtWidgets.QHeaderView.ResizeMode
         self.table.horizontalHeader().setSectionResizeMode(NOTE, mode.Stretch)
-        self.table.horizontalHeader().setSectionResizeMode(BUTTON, mode.ResizeToContents)
+        for column in (BUTTON, NO_PART):
+            self.table.horizontalHeader().setSectionResizeMode(column, mode.ResizeToContents)
+        self.table.setColumnHidden(NO_PART, all(row.candidate.article is None for row in self._rows))
         self.table.resizeRowsToContents()
 
     def _lay_out(self) -> None:
@@ -169,6 +172,17 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.item(number, COMPONENT).setToolTip(tip(f"{entry.doc_path} · {entry.object_name}"))
         button = widgets.button(translate("Silo", "Register"), "", lambda: self._press(row))
         self.table.setCellWidget(number, BUTTON, button)
+        if row.candidate.article is not None:
+            text = translate(
+                "Silo", "It is not listed again, here or by the command line; the file keeps that"
+            )
+            no_part = widgets.button(
+                translate("Silo", "Not a Part"),
+                "",
+                lambda: self._flow.undeclare(self._path, row, no_part=True),
+                text,
+            )
+            self.table.setCellWidget(number, NO_PART, no_part)
 
     def fail(self, error: SiloError) -> None:
         """The components could not be looked up."""
@@ -188,13 +202,13 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
                 row.checked = row.checked and result.error is not None
         self._refresh()
 
-    def undeclared(self, row: EditedRow) -> None:
-        """It is no component any more."""
+    def undeclared(self, row: EditedRow, *, no_part: bool) -> None:
+        """It is no component any more: no part, or undecided."""
         if row in self._rows:
             article = row.candidate.article
             if article is not None:
-                entry = replace(article.entry, silo_uuid=None)
-                row.candidate = replace(row.candidate, article=replace(article, entry=entry))
+                article = replace(article, entry=replace(article.entry, silo_uuid=None), no_part=no_part)
+                row.candidate, row.checked = replace(row.candidate, article=article), False
             self._refresh()
 
     def stopped(self) -> None:
@@ -226,7 +240,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         kind = self._types.get(row.item_type, row.item_type)
         texts = (row.component(), row.name, kind, category, number_text, note)
         keys = {TYPE: row.item_type, CATEGORY: row.category, NUMBER: row.number}
-        can = (row.editable, row.can_choose, row.can_register, row.can_keep, row.can_undeclare)
+        can = (row.editable, row.can_choose, row.can_register, row.can_keep, row.can_undeclare, row.section)
         look = (texts, keys, tone, can, row.checked)
         if self._drawn.get(number) == look:
             return
@@ -245,6 +259,8 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         button = self.table.cellWidget(place, BUTTON)
         button.setText(_button_text(row))
         button.setEnabled(row.can_register or row.can_keep or row.can_undeclare)
+        if (no_part := self.table.cellWidget(place, NO_PART)) is not None:
+            no_part.setVisible(row.can_be_no_part)
 
     def _enable(self) -> None:
         chosen = any(row.checked and (row.can_register or row.can_keep) for row in self._rows)
@@ -316,7 +332,8 @@ def _button_text(row: EditedRow) -> str:
     if row.can_keep:
         return translate("Silo", "Keep")
     if row.can_undeclare:
-        return translate("Silo", "Undeclare")
+        no_part = row.section == "no part"
+        return translate("Silo", "Take Back") if no_part else translate("Silo", "Undeclare")
     is_modelled = row.section == "modelled"
     return translate("Silo", "Declare") if is_modelled else translate("Silo", "Register")
 

@@ -48,6 +48,7 @@ def section_words() -> dict[str, str]:
         "standard": translate("Silo", "Standard parts"),
         "modelled": translate("Silo", "Modelled in this file, not counted"),
         "declared": translate("Silo", "Modelled in this file, and counted"),
+        "no part": translate("Silo", "Modelled in this file, and no part"),
     }
 
 
@@ -118,8 +119,8 @@ class EditedRow:
     @property
     def section(self) -> str:
         """The section that the row stands in, a key of :func:`section_words`."""
-        if self.candidate.article is not None:
-            return "declared" if self.candidate.declared else "modelled"
+        if (article := self.candidate.article) is not None:
+            return "no part" if article.no_part else "declared" if article.declared else "modelled"
         return "standard" if self.candidate.entry.is_standard else ""
 
     @property
@@ -130,13 +131,18 @@ class EditedRow:
     @property
     def editable(self) -> bool:
         """True while something can still be chosen."""
-        usable = self.candidate.state.usable and not self.candidate.declared
+        usable = self.candidate.state.usable and not self.candidate.decided
         return usable and not self.finished and not self.running
 
     @property
     def can_undeclare(self) -> bool:
-        """True where it is modelled in the file and its identity can be taken back."""
-        return self.candidate.declared and self.candidate.state.usable and not self.running
+        """True where it is modelled in the file and what was said of it can be taken back."""
+        return self.candidate.decided and self.candidate.state.usable and not self.running
+
+    @property
+    def can_be_no_part(self) -> bool:
+        """True where a person can say that it is no part."""
+        return self.section == "modelled" and self.editable
 
     @property
     def can_choose(self) -> bool:
@@ -198,7 +204,7 @@ class EditedRow:
             return translate("Silo", "same or new part?")
         if self.number == APART:
             return translate("Silo", "one for each")
-        if self.candidate.declared:
+        if self.candidate.decided:
             return ""
         if self.number != NEW:
             return self.number
@@ -246,6 +252,8 @@ class EditedRow:
         article = self.candidate.article
         if article is None:
             return []
+        if article.no_part:
+            return [translate("Silo", "no part: nothing asks for it again")]
         if article.declared:
             one, many = translate("Silo", "counts once"), translate("Silo", "counts {n} times")
         else:
@@ -378,7 +386,7 @@ class Window(Protocol):
 
     def registered(self, order: Order, result: Registration, /) -> None: ...
 
-    def undeclared(self, row: EditedRow, /) -> None: ...
+    def undeclared(self, row: EditedRow, /, *, no_part: bool) -> None: ...
 
     def stopped(self) -> None: ...
 
@@ -453,16 +461,20 @@ class RegisterFlow:
             failed=lambda _error: None,
         )
 
-    def undeclare(self, path: str, row: EditedRow) -> None:
-        """Take the identity back from what is modelled in the assembly's file; its item stays."""
+    def undeclare(self, path: str, row: EditedRow, *, no_part: bool = False) -> None:
+        """Take back what was said of what is modelled in the assembly's file; an item stays.
+
+        no_part
+            a person says that it is no part, and the file keeps that.
+        """
         clean = self._desk.unedited()
         try:
-            self._desk.remove_identity(row.candidate)
+            self._desk.remove_identity(row.candidate, no_part=no_part)
         except SiloError as error:
             message = str(error)
             self._with_dialog(path, lambda dialog: dialog.tell(message))
             return
-        self._with_dialog(path, lambda dialog: dialog.undeclared(row))
+        self._with_dialog(path, lambda dialog: dialog.undeclared(row, no_part=no_part))
         self._save_parents(clean, lambda: self._send(path, [row.candidate]))
 
     def same(self, rows: Sequence[EditedRow]) -> None:

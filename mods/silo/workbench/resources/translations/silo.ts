@@ -1153,12 +1153,27 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/dialog.py" />
+            <source>It is not listed again, here or by the command line; the file keeps that</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Not a Part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
             <source>guess: {category}</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../register/dialog.py" />
             <source>Keep</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Take Back</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1189,6 +1204,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../register/flow.py" />
             <source>Modelled in this file, and counted</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Modelled in this file, and no part</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1314,6 +1334,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../register/flow.py" />
             <source>registering…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>no part: nothing asks for it again</source>
             <translation type="unfinished" />
         </message>
         <message>
