@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -88,3 +89,24 @@ def test_the_command_names_what_differs(
     told = capsys.readouterr()
     assert "the view has 1 solid" in told.out
     assert f"Compared in FreeCAD 1.1 ({freecad.command})" in told.err
+
+
+def test_a_fault_of_the_witness_is_not_freecads(tmp_path: Path) -> None:
+    """It costs its file only, has a place, and asks for a report; FreeCAD has not died."""
+    freecad = machines.need("1.1")
+    corpus = corpora.unpack(corpora.ARCHIVES / "corpus-1.1.zip", tmp_path / "corpus")
+    tops = [str(corpus.top(f"asm4/{name}")) for name in ("plain_link", "draft_link_array")]
+    out, job = tmp_path / "lines.jsonl", tmp_path / "job.json"
+    job.write_text(json.dumps({"tops": tops, "lines": str(out), "verify": True}))
+    script = Path(__file__).parent / "freecad_cases" / "own_fault.py"
+    env = {**freecad.profile(tmp_path / "profile"), "SILO_ARGS_FILE": str(job)}
+    done = freecad.run(script, env, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout[-3000:]
+    lines = [json.loads(line) for line in out.read_text().splitlines()]
+    failed, fine = (line for line in lines if "begun" not in line)
+    assert failed["top"] == tops[0]
+    told = (
+        r"a fault of silo-mod, no fault of the file: KeyError: 'no such role' \(own_fault\.py:\d+\); please"
+    )
+    assert re.match(told, failed["error"]["reason"])
+    assert (fine["top"], fine["witness"]) == (tops[1], [])

@@ -10,10 +10,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from fcstd_writer import Doc, locals_
 
 from silo.bom.errors import ConfigError, DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import to_plain
+from silo.cli.main import main
 from silo.freecads import ask_inside, find_freecadcmd, freecad_for, run_freecad
 
 # A stand-in for freecadcmd: it gets the same arguments and answers in the same file. What it does with a file
@@ -185,6 +187,25 @@ def test_a_freecad_that_can_open_the_file_is_taken(
         path.chmod(0o755)
     command, version = freecad_for(saved)
     assert (version, answers[Path(command).name]) == (taken, taken)
+
+
+@pytest.mark.usefixtures("needs_modes")
+def test_a_freecad_that_can_open_the_linked_files_too_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An old assembly of a part that a newer FreeCAD saved; numbers of realthunder's branch say nothing."""
+    monkeypatch.delenv("SILO_FREECADCMD", raising=False)
+    monkeypatch.setenv("PATH", os.pathsep.join((str(tmp_path), "/usr/bin", "/bin")))
+    for name, version in {"freecadcmd": "0, 20", "freecadcmd-daily": "1, 1"}.items():
+        path = tmp_path / name
+        path.write_text(f'#!/bin/sh\n[ -n "$SILO_OUT" ] || exit 3\nprintf "[{version}]" > "$SILO_OUT"\n')
+        path.chmod(0o755)
+    for program, taken in (("1.1", "1.1"), ("2022.1129", "0.20")):
+        Doc(program=program).add("PartDesign::Body", "Body").save(tmp_path / "part.FCStd")
+        top = Doc(program="0.20").link("Link", "part.FCStd", "Body")
+        path = top.add("App::Part", "Top", Group=locals_("Link")).save(tmp_path / "top.FCStd")
+        assert main(["bom", str(path), "--verify"]) == 2  # the stand-in only says its version
+        assert f"Compared in FreeCAD {taken} (" in capsys.readouterr().err
 
 
 def test_the_freecad_of_the_environment_is_taken(freecadcmd: str) -> None:

@@ -197,15 +197,22 @@ def _write_xlsx(path: str, rows: list[list[str | int]]) -> None:
 
 
 def _verify(args: argparse.Namespace) -> int:
-    """The geometry as witness: the BOM as live FreeCAD has it, against the solids shown."""
+    """The geometry as witness: the BOM as live FreeCAD has it, against the solids shown.
+
+    Asked is a FreeCAD that can open all files of the assembly, each with the version that saved it.
+    """
     from silo.bom.document import saved_by
-    from silo.fcstd import Library
+    from silo.bom.links import extract
+    from silo.bom.roots import choose_assembly
+    from silo.fcstd import FcstdDocument, Library
     from silo.freecads import freecad_for, run_freecad
 
     if os.path.isdir(args.top):
         raise InputError("--verify is for one file; name the file.")
     with Library() as library:
-        command, version = freecad_for(saved_by(library.open(args.top).ProgramVersion))
+        extract(choose_assembly(library.open(args.top), args.assembly))
+        read = [one for one in library.documents.values() if isinstance(one, FcstdDocument)]
+        command, version = freecad_for(max(saved_by(one.ProgramVersion) for one in read))
     print(f"Compared in FreeCAD {version} ({command}).", file=sys.stderr)
     witness: dict[str, list[dict[str, Any]]] = {}
     ((top, found),) = run_freecad(

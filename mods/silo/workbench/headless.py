@@ -19,6 +19,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -33,7 +34,7 @@ if __name__ == "__main__":
         del sys.modules[_name]
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from silo.bom.errors import ConfigError, Exit, InputError, SiloError, exit_of
+from silo.bom.errors import ConfigError, DocumentError, Exit, InputError, SiloError, exit_of
 from silo.files import check_writable, documents_in, job_text
 
 if TYPE_CHECKING:
@@ -117,6 +118,13 @@ def _extractions(
             look(found)
         except SiloError as error:
             found = error
+        except Exception as error:  # noqa: BLE001  # a fault of ours costs this file only, and is not FreeCAD's
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            place = f"{os.path.basename(where.filename)}:{where.lineno}"
+            told = f"{type(error).__name__}: {error} ({place})"
+            found = DocumentError(
+                top, f"a fault of silo-mod, no fault of the file: {told}; please report this"
+            )
         # The next file starts from nothing: no half loaded parts of this one, and no memory held. Before the
         # result is reported, so that what FreeCAD may die of in closing is this file's fault, not the
         # next one's.
