@@ -33,7 +33,7 @@ from silo.bom.errors import DocumentError, Exit, InputError, RemoteError, SiloEr
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, diff_json, diff_rows, entry_json, finding_json, project_folder, shorten
-from silo.bom.resolve import display_name
+from silo.bom.resolve import display_name, one_hint_each
 from silo.bom_sync import (
     Outcome,
     Resolved,
@@ -361,7 +361,7 @@ class Summary:
 
     def add_findings(self, findings: Iterable[Finding], top: str = "") -> None:
         """Count what was noticed; parts without a number have a list of their own."""
-        for finding in findings:
+        for finding in one_hint_each(findings):
             if finding.severity is Severity.INFO or finding.code is FindingCode.UNREGISTERED:
                 continue
             self.findings.setdefault(finding)

@@ -271,3 +271,15 @@ def test_severities_are_ordered_words() -> None:
 def test_every_code_has_a_meaning_and_a_remedy() -> None:
     """Reports group by the meaning, and the reference lists both."""
     assert all(code.meaning and code.remedy for code in FindingCode)
+
+
+@pytest.mark.parametrize(
+    ("program", "noted"),
+    [("1.1R1 (Git)", False), ("1.2.0", True), ("0.21R33694", False), ("2022.1129.28613 +5 (Git)", False)],
+)
+def test_the_numbers_of_realthunders_branch_are_no_newer_freecad(program: str, noted: bool) -> None:
+    """They are dates: 2022.1129 is not after 1.1."""
+    scene = Scene()
+    edit(scene.top, ProgramVersion=program)
+    found = scene.walked(scene.top.link("L", scene.bolt))
+    assert any(one.code is FindingCode.NEWER_FREECAD for one in found) is noted

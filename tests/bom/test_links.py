@@ -177,6 +177,38 @@ def test_two_individual_links_are_worth_consolidating() -> None:
     assert (entry.consolidation_warning, entry.individual_links, entry.link_objects) == (True, 2, 2)
 
 
+def test_links_that_joints_hold_are_not_worth_consolidating() -> None:
+    """FreeCAD's joints by a path or by the part itself, Assembly4's, Assembly3's: no array would do."""
+    top, bolt = Doc("/v/top.FCStd"), bolt_in()
+    links = [top.link(f"L{n}", bolt) for n in range(4)]
+    group = top.add("Assembly::JointGroup", "Joints", Group=[])
+    asm = top.assembly(*links, group)
+    joints = [
+        top.add("App::FeaturePython", "J1", Reference1=(asm, ["L0.Face1", "L0.Vertex1"]), Reference2=None),
+        top.add("App::FeaturePython", "J2", Reference1=(links[1], ["Body.Edge1", "Body.Edge1"])),
+    ]
+    edit(group, Group=joints)
+    (entry,) = extract_bom_links(asm)
+    assert (entry.consolidation_warning, entry.individual_links) == (True, 4)  # two are free
+    edit(group, Group=[*joints, top.add("App::FeaturePython", "Ground", ObjectToGround=links[2])])
+    assert not extract_bom_links(asm)[0].consolidation_warning
+    fourth = Doc("/v/fourth.FCStd")
+    attached = [fourth.link(f"L{n}", bolt, AttachedTo="Plate#LCS") for n in range(2)]
+    assert not extract_bom_links(fourth.assembly(*attached))[0].consolidation_warning
+    assert extract_bom_links(fourth.assembly(*attached, fourth.array("A", bolt, 2), fourth.link("F", bolt)))[
+        0
+    ].consolidation_warning
+    third = Doc("/v/third.FCStd")
+    for constraints, worth in (([], True), ([third.add("Part::FeaturePython", "C")], False)):
+        parts = [third.link(f"L{n}{worth}", bolt) for n in range(2)]
+        groups = [
+            third.add("Part::FeaturePython", f"G{n}{worth}", Group=found)
+            for n, found in enumerate((constraints, [], parts))
+        ]
+        whole = third.add("Part::FeaturePython", f"A{worth}", Group=groups, BuildShape="None", Freeze=False)
+        assert extract_bom_links(whole)[0].consolidation_warning is worth
+
+
 def test_links_beside_an_array_are_worth_consolidating() -> None:
     """Both patterns for one part: the quantities add up, only the individual links are counted as such."""
     top, bolt = Doc("/v/top.FCStd"), bolt_in()

@@ -17,6 +17,7 @@ from silo.bom.resolve import (
     consolidation_message,
     merge_lines,
     numbered_findings,
+    one_hint_each,
     resolve_with,
     unregistered_findings,
 )
@@ -259,3 +260,19 @@ def test_missing_components_stay_in_place_without_a_number() -> None:
     assert resolved[0].children == (lost[0],)
     assert unresolved == []
     assert unregistered_findings(unresolved) == ()
+
+
+def test_a_list_for_people_has_one_hint_for_each_bom() -> None:
+    """The parts of one assembly are one sentence; another assembly and other findings stay as they are."""
+    parts = [
+        entry(name, consolidation_warning=True, individual_links=2, link_objects=2)
+        for name in ("bolt", "nut")
+    ]
+    sub = entry("sub", *parts[:1])
+    other = Finding(FindingCode.UNREGISTERED, Severity.WARNING, "w", ())
+    found = one_hint_each((*consolidation_findings([*parts, sub]), other, replace(other)))
+    assert [one.message.partition(". ")[0] for one in found] == [
+        *("[Silo BOM] bolt has 2 individual links, nut has 2 individual links",),
+        *("[Silo BOM] bolt has 2 individual links", "w", "w"),
+    ]
+    assert found[0].message.count("Consider using a link array") == 1

@@ -25,7 +25,7 @@ from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.model import BomEntry, Extraction, identity_findings, identity_of, sole_identity, walk_entries
 from silo.bom.resolve import display_name
 from silo.bom.roots import Whole, as_it_is, beside, choose_assembly, fates, loose_hardware
-from silo.bom.walk.kinds import is_container, is_named_assembly
+from silo.bom.walk.kinds import Kind, held_by_joints, is_attached, is_container, is_named_assembly
 from silo.bom.walk.notes import Notes
 from silo.bom.walk.rings import Rings
 from silo.bom.walk.roles import Reader
@@ -232,6 +232,7 @@ class _Walker:
         self._components: dict[int, tuple[Any, Key]] = {}
         self._containers: dict[Key, bool] = {}
         self._nameless: dict[int, list[Any]] = {}
+        self._held: dict[Key, set[str]] = {}
 
     def component(self, obj: Any) -> Key:
         """What a component is; the same as its key where it has a name.
@@ -334,7 +335,7 @@ class _Walker:
             children = self._below(target, level + 1, depth + 1, inner)
             goes_on = self._goes_below and self._is_container(name, target)
             mine = self.own_lines(target, level + 1) if goes_on else ()
-            entries.append(self._entry(counts, level, children, own=mine))
+            entries.append(self._entry(container, counts, level, children, own=mine))
         self._memo[(key, level, entry)] = tuple(entries)
         return self._memo[(key, level, entry)]
 
@@ -362,22 +363,32 @@ class _Walker:
         lines: dict[Key, list[Count]] = {}
         for count in contents.own:
             lines.setdefault(count.key, []).append(count)
-        found = [self._entry(counts, level, (), silo_uuid=None) for counts in lines.values()]
+        found = [self._entry(container, counts, level, (), silo_uuid=None) for counts in lines.values()]
         self.notes.own_parts(container, found)
         return tuple(found)
 
+    def _is_free(self, link: Any, container: Any) -> bool:
+        """True for a link that no joint holds, so that an array would do."""
+        if (key := self.reader.key(container)) not in self._held:
+            tree = self.reader.contents(container).tree
+            inner = tree.members.values() if tree is not None else ()
+            inline = (obj for obj, kind in inner if kind in (Kind.NOTHING, Kind.CONTAINER))
+            self._held[key] = held_by_joints([container, *inline])
+        return object_name(link) not in self._held[key] and not is_attached(link)
+
     def _entry(
-        self, counts: list[Count], level: int, children: tuple[BomEntry, ...], **more: Any
+        self, container: Any, counts: list[Count], level: int, children: tuple[BomEntry, ...], **more: Any
     ) -> BomEntry:
         target = counts[0].target
         entry = self.entry_for(target)
         links = [count for count in counts if count.link]
+        free = [one for one in links if len(links) > 1 and self._is_free(one.shown.obj, container)]
         found = {
             "level": level,
             "quantity": sum([count.quantity for count in counts]),
             "children": children,
             "is_assembly": entry.is_assembly or self._is_assembly(target),
-            "consolidation_warning": len(links) > 1,
+            "consolidation_warning": len(free) > 1,
             "individual_links": sum([not link.array for link in links]),
             "link_objects": len(links),
             "instances": tuple([object_name(count.shown.obj) for count in counts]),

@@ -20,7 +20,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from silo.bom.errors import InputError
+from silo.bom.errors import InputError, listed
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, walk_entries
 
@@ -561,12 +561,28 @@ def consolidation_message(entry: BomEntry) -> str:
         what = "1 individual link beside a link array"
     else:
         what = f"{entry.link_objects} link arrays" if entry.link_objects > 1 else "several links"
-    advice = "Consider using a link array (ElementCount) for cleaner assembly management."
-    return f"[Silo BOM] {who} has {what}. {advice}"
+    return f"{_HINT}{who} has {what}{_ADVICE}"
+
+
+_HINT = "[Silo BOM] "
+_ADVICE = ". Consider using a link array (ElementCount) for cleaner assembly management."
+
+
+def one_hint_each(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The findings with one consolidation warning for each BOM, in the place of one for each of its parts."""
+    found: dict[object, list[Finding]] = {}
+    for one in findings:
+        found.setdefault(one.where[1:] if one.code is FindingCode.CONSOLIDATION else id(one), []).append(one)
+    return tuple(of[0] if len(of) == 1 else _several_hints(of) for of in found.values())
+
+
+def _several_hints(hints: Sequence[Finding]) -> Finding:
+    told = listed([one.message.removeprefix(_HINT).removesuffix(_ADVICE) for one in hints])
+    return replace(hints[0], message=f"{_HINT}{told}{_ADVICE}")
 
 
 def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
-    """The consolidation warnings of a tree: for each assembly once, those of the top first.
+    """The consolidation warnings of a tree: of each assembly once, those of the top first.
 
     ``where`` names the component and, below the top, the assembly that links it several times.
     """

@@ -23,7 +23,7 @@ from silo.bom.findings import FindingCode
 from silo.bom.headers import safe_cell
 from silo.bom.model import BomDiff, BomEntry, Extraction, walk_entries
 from silo.bom.report import PIECES, base_of, bom_json, diff_json, finding_json, flat_json, shorten
-from silo.bom.resolve import consolidation_findings, display_name, with_allowed_characters
+from silo.bom.resolve import consolidation_findings, display_name, one_hint_each, with_allowed_characters
 from silo.cli import common
 from silo.files import check_writable, documents_in
 from silo.platform import replacing, scratch_folder
@@ -96,7 +96,8 @@ def run_bom(args: argparse.Namespace) -> int:
 
     out = show.console()
     out.print(show.flat_table(flat_json(extraction)) if args.flat else show.bom_tree(extraction))
-    told = [one for one in extraction.findings if args.verbose or one.code is not FindingCode.CONSOLIDATION]
+    told = one_hint_each(extraction.findings)
+    told = tuple(one for one in told if args.verbose or one.code is not FindingCode.CONSOLIDATION)
     if told:
         out.print()
         out.print(show.findings_text(told, base_of(extraction)))

@@ -216,6 +216,32 @@ def members(container: object) -> Iterable[Any]:
     return group
 
 
+_JOINED = ("Reference1", "Reference2", "ObjectToGround", "Part1", "Part2")
+
+
+def held_by_joints(holders: Iterable[Any]) -> set[str]:
+    """Names of what the joints or constraints in some containers hold, each at a place of its own.
+
+    FreeCAD's joints name a part, or the assembly and a path to a part. Assembly3's constraints lead through
+    elements; if there are any, all parts are held. Assembly4's links say so (:func:`is_attached`).
+    """
+    found = set[str]()
+    for holder in holders:
+        if is_assembly3(holder) and any(own(one, "Group") for one in list(holder.Group)[:1]):
+            found.update(map(object_name, members(holder)))
+        for joint in own(holder, "Group") or () if derived(holder, "Assembly::JointGroup") else ():
+            for value in (own(joint, name) for name in _JOINED):
+                target, subs = value if isinstance(value, tuple) else (value, ())
+                found.update(() if target is None else (object_name(target),))
+                found.update(step for sub in subs for step in str(sub).split(".")[:-1])
+    return found
+
+
+def is_attached(link: object) -> bool:
+    """True for a link that Assembly4 holds at a place of its own."""
+    return bool(own(link, "AttachedTo"))
+
+
 # --- how many an array shows ---
 
 
