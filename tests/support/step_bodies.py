@@ -172,6 +172,18 @@ KINDS: dict[str, Callable[[Bodies, float], object]] = {
     "TESSELLATED_SOLID": _tessellated,
     "TESSELLATED_SOLID without faces": lambda m, x: m.item("TESSELLATED_SOLID('n',(),$)", None),
     "MANIFOLD_SOLID_BREP with a hole": _holed,
+    "MANIFOLD_SOLID_BREP without a shell": lambda m, x: m.item("MANIFOLD_SOLID_BREP('m',$)", None),
+    "BREP of two kinds": lambda m, x: m.item(
+        "( BREP_WITH_VOIDS(()) FACETED_BREP() GEOMETRIC_REPRESENTATION_ITEM() MANIFOLD_SOLID_BREP($) "
+        "REPRESENTATION_ITEM('x') SOLID_MODEL() )",
+        None,
+    ),
+    "BLOCK without height": lambda m, x: m.item(f"BLOCK('b',#{m.axes(x)},1.,2.,0.)", None),
+    "TORUS of a negative radius": lambda m, x: m.item(f"TORUS('t',#{m.axis(x)},3.,-1.)", None),
+    "SHELLED_SOLID": lambda m, x: m.item(f"SHELLED_SOLID('s',#{m.brep},(),1.)", None),
+    "SOLID_WITH_CIRCULAR_POCKET": lambda m, x: m.item(f"SOLID_WITH_CIRCULAR_POCKET('s',$,#{m.brep})", None),
+    "BLOCK_VOLUME": lambda m, x: m.item(f"BLOCK_VOLUME('v',#{m.axes(x)},1.,2.,3.)", None),
+    "HALF_SPACE_SOLID": lambda m, x: m.item(f"HALF_SPACE_SOLID('h',#{m.brep},.T.)", None),
 }
 """Each adds one body of some 5 units around x."""
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Nothing of the kernel is read while only a temporary owns it: the rule, and a run with poisoned memory."""
+"""Nothing of the kernel is read while only a temporary owns it: the rule, and a run with poisoned memory.
+
+Also which errors of the kernel are suppressed.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,10 @@ from pathlib import Path
 
 import pytest
 import same_bits
+from OCP.Standard import Standard_ConstructionError
+from OCP.StdFail import StdFail_NotDone
+
+from silo.inertia.geometry.kernel import occt
 
 SAME = os.environ.get("SILO_SAME", "30 2").split()
 """Products and rounds; the long run is ``SILO_SAME="2000 20"``."""
@@ -72,6 +79,25 @@ def test_the_rule_finds_them(line: str) -> None:
     """Each way of reading a temporary that was ever written here, and its brothers."""
     head = "from OCP.TopExp import TopExp_Explorer\nfrom OCP.TopoDS import TopoDS_Iterator\n"
     assert list(temporaries(f"{head}from OCP.BRepAdaptor import BRepAdaptor_Curve\n{line}\n"))
+
+
+@pytest.mark.parametrize("error", [StdFail_NotDone, Standard_ConstructionError, ZeroDivisionError])
+def test_errors_of_the_kernel_are_suppressed_whatever_their_class(error: type[Exception]) -> None:
+    """None of them is a Standard_Failure in Python."""
+    with occt.Attempt():
+        raise error("of the kernel")
+
+
+@pytest.mark.parametrize("error", [TypeError, MemoryError, KeyboardInterrupt])
+def test_other_errors_are_not_suppressed(error: type[BaseException]) -> None:
+    """A mistake of ours, a limit, a person."""
+    with pytest.raises(error), occt.Attempt():
+        raise error("not of the kernel")
+
+
+def test_no_module_trusts_a_base_class_of_the_kernels_errors() -> None:
+    """``except Standard_Failure`` suppresses that class alone."""
+    assert not [path for path in MODS.rglob("*.py") if "import Standard_Failure" in path.read_text("utf-8")]
 
 
 def test_one_process_and_many_give_the_same_bits() -> None:

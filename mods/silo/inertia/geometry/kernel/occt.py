@@ -41,6 +41,20 @@ from silo.inertia.geometry.together import Floats, Mesh, joined, mesh_volume
 _ELEMENTARY = (GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus)
 
 
+class Attempt:
+    """Suppresses an error of the kernel, or of numbers that it gave.
+
+    In Python the kernel's classes of errors have no base in common, not even ``Standard_Failure``.
+    """
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> bool:
+        ours = isinstance(error, ArithmeticError | RuntimeError | ValueError)
+        return ours or type(error).__module__.startswith("OCP.")
+
+
 def quiet() -> None:
     """Take the kernel's printers away: it reports to standard output otherwise."""
     messenger = Message.DefaultMessenger_s()

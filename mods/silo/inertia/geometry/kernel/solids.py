@@ -64,7 +64,6 @@ from OCP.GeomAbs import (
 from OCP.gp import gp_Pnt, gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
 from OCP.ShapeAnalysis import ShapeAnalysis_Shell
-from OCP.Standard import Standard_Failure
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_WIRE
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
@@ -158,9 +157,10 @@ def solid_moments(solid: Any, eps: float, notes: list[Note]) -> Moments:
         return kernel
     if kernel.error <= CONVERGED and _difference(plain, kernel) <= SUSPICIOUS:
         return kernel
-    try:
+    ours = None
+    with occt.Attempt():
         ours = moments(solid, abs(kernel.volume), eps)
-    except (Standard_Failure, ValueError, RuntimeError, ArithmeticError):
+    if ours is None:
         return kernel
     # An open or torn shell has no volume that both could agree on; then the doubt stays the kernel's.
     # Where faces close, it is the kernel that may be that far off: closed splines drawn along a line.
@@ -396,21 +396,18 @@ def _within(mesh: Mesh, low: Floats, high: Floats) -> np.ndarray:
 
 
 def _common(one: Body, other: Body) -> SolidProps | None:
-    try:
+    with occt.Attempt():
         operation = BRepAlgoAPI_Common(one.shape, other.shape)
         if not operation.IsDone():
             return None
-        solids = occt.solids_of(operation.Shape())
-    except (Standard_Failure, RuntimeError):
-        return None
-    if not solids:
-        return NOTHING
-    found = by_kernel(operation.Shape(), EPS)
-    least = min(one.props.volume_m3, other.props.volume_m3)
-    volume = found.volume * MM**3
-    if not np.isfinite(volume) or not 0 <= volume <= (1 + 1e-5) * least:
-        return None
-    return SolidProps(volume, found.com * MM, found.inertia * MM**5)
+        if not occt.solids_of(operation.Shape()):
+            return NOTHING
+        found = by_kernel(operation.Shape(), EPS)
+        least = min(one.props.volume_m3, other.props.volume_m3)
+        volume = found.volume * MM**3
+        if 0 <= volume <= (1 + 1e-5) * least:  # NaN is not
+            return SolidProps(volume, found.com * MM, found.inertia * MM**5)
+    return None
 
 
 MEETING = 1e-4
@@ -464,10 +461,11 @@ def _gap_and_length(edge: Any, face: Any) -> tuple[float, float]:
     """
     if BRep_Tool.Degenerated_s(edge):
         return 0.0, 0.0
-    try:
-        surface, flat = BRepAdaptor_Surface(face, False), BRepAdaptor_Curve2d(edge, face)
-        curve = BRepAdaptor_Curve(edge)
-    except (Standard_Failure, RuntimeError):  # a curve of it is missing, and the kernel's check says so
+    flat = None
+    with occt.Attempt():
+        surface, curve = BRepAdaptor_Surface(face, False), BRepAdaptor_Curve(edge)
+        flat = BRepAdaptor_Curve2d(edge, face)
+    if flat is None:  # a curve of it is missing, and the kernel's check says so
         return 0.0, 0.0
     rows = []
     for t in np.linspace(curve.FirstParameter(), curve.LastParameter(), 9).tolist():
@@ -529,11 +527,10 @@ def _sewn(faces: list[Any], tolerance: float) -> Any:
     sewing = BRepBuilderAPI_Sewing(max(tolerance, 1e-6))
     for face in faces:
         sewing.Add(face)
-    try:
+    with occt.Attempt():
         sewing.Perform()
-    except (Standard_Failure, RuntimeError):
-        return None
-    return sewing
+        return sewing
+    return None
 
 
 def _solid(shell: Any) -> Any:

@@ -25,7 +25,6 @@ from OCP.BRepPrimAPI import (
     BRepPrimAPI_MakeWedge,
 )
 from OCP.gp import gp_Ax2, gp_Trsf, gp_Vec
-from OCP.Standard import Standard_Failure
 from OCP.StepData import StepData_Factors
 from OCP.StepToGeom import StepToGeom
 from OCP.StepToTopoDS import StepToTopoDS_Builder, StepToTopoDS_TranslateCurveBoundedSurface
@@ -84,7 +83,7 @@ class Bodies:
         # A body of faces that the reader could not close would be none here either.
         if number in facts.mapped or self._products.solids[number][0].endswith(("BREP", "VOIDS")):
             return None
-        with suppress(Standard_Failure, RuntimeError, TypeError, ValueError, AttributeError, LookupError):
+        with occt.Attempt(), suppress(AttributeError, LookupError, TypeError):
             shape = self._made(number, factors)
             if any(map(occt.faces_of, occt.solids_of(shape))):
                 return shape

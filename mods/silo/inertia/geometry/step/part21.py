@@ -122,7 +122,7 @@ class Part21:
 
 
 def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
-    """Find the entities whose keyword is in ``wanted`` or ends in SHAPE_REPRESENTATION.
+    """Find bodies, and entities whose keyword is in ``wanted`` or ends in SHAPE_REPRESENTATION.
 
     Of complex entities: units, bodies, and relationships that place a part.
     """
@@ -136,7 +136,7 @@ def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
         digits, keyword = match.groups()
         if keyword not in names:
             word = keyword.decode("ascii")
-            known = not word or word in wanted or word.endswith("SHAPE_REPRESENTATION")
+            known = word in wanted or _SOLID.fullmatch(word) or word.endswith("SHAPE_REPRESENTATION")
             names[keyword] = word if known else None
         number = int(digits)
         if number > result.highest:
@@ -276,15 +276,13 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-SOLIDS = _words(
-    """MANIFOLD_SOLID_BREP BREP_WITH_VOIDS FACETED_BREP TESSELLATED_SOLID EXTRUDED_AREA_SOLID
-    EXTRUDED_FACE_SOLID REVOLVED_AREA_SOLID REVOLVED_FACE_SOLID SURFACE_CURVE_SWEPT_AREA_SOLID
-    SURFACE_CURVE_SWEPT_FACE_SOLID SWEPT_DISK_SOLID BLOCK SPHERE TORUS ELLIPSOID ECCENTRIC_CONE
-    RIGHT_CIRCULAR_CONE RIGHT_CIRCULAR_CYLINDER RIGHT_ANGULAR_WEDGE RECTANGULAR_PYRAMID FACETED_PRIMITIVE
-    TETRAHEDRON CONVEX_HEXAHEDRON CYCLIDE_SEGMENT_SOLID"""
-).union(TREES, ("",))
-"""Entities that are a body wherever they stand among the items of a product's shape; "" is a complex one
-with a SOLID_MODEL in it."""
+_SOLID = re.compile(
+    r"\w*SOLID|SOLID_(?!ANGLE)\w+|\w+_BREP|BREP_WITH_VOIDS|\w+_VOLUME|BOXED_HALF_SPACE|BOOLEAN_RESULT|BLOCK"
+    r"|SPHERE|TORUS|ELLIPSOID|ECCENTRIC_CONE|RIGHT_\w+|RECTANGULAR_PYRAMID|TETRAHEDRON|CONVEX_HEXAHEDRON"
+    r"|FACETED_PRIMITIVE|"
+)
+"""Entities that are a body wherever they stand among the items of a product's shape: whatever is called a
+solid, a B-rep or a volume, and the primitives; "" is a complex one with a SOLID_MODEL in it."""
 
 _SURFACES = _words(
     """SHELL_BASED_SURFACE_MODEL FACE_BASED_SURFACE_MODEL GEOMETRIC_CURVE_SET GEOMETRIC_SET
@@ -302,7 +300,7 @@ WANTED = _words(
     APPLIED_DOCUMENT_REFERENCE DOCUMENT_PRODUCT_EQUIVALENCE DOCUMENT_FILE
     APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT NEXT_ASSEMBLY_USAGE_OCCURRENCE
     CONTEXT_DEPENDENT_SHAPE_REPRESENTATION ITEM_DEFINED_TRANSFORMATION"""
-).union(_DEFINITIONS, SOLIDS, _SURFACES)
+).union(_DEFINITIONS, TREES, _SURFACES)
 
 
 @dataclass(frozen=True)
@@ -404,7 +402,9 @@ def read_products(source: Part21) -> Products:
         count=source.count,
         uses=tuple(_uses(source, facts)),
         shaped=frozenset(owner for owner, item in items if _is_shape(source, item)),
-        solids={n: (source.keywords[n], source.ordinals[n]) for n in source.listed(*SOLIDS)},
+        solids={
+            n: (word, source.ordinals[n]) for n, word in source.keywords.items() if _SOLID.fullmatch(word)
+        },
         trees={
             n: (next((v for v in a if isinstance(v, str) and v[:1] == "."), ""), tuple(_within(a)))
             for n, a in source.of(*TREES)
@@ -421,7 +421,7 @@ def _is_body(source: Part21, item: int) -> bool:
     keyword = source.keywords.get(item)
     if keyword == "":
         return b"SOLID_MODEL" in source.body(item)
-    return keyword in SOLIDS
+    return keyword is not None and _SOLID.fullmatch(keyword) is not None
 
 
 def _within(values: tuple[Value, ...]) -> Iterator[int]:
