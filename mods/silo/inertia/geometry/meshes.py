@@ -18,7 +18,7 @@ import zipfile
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any, NoReturn
 from xml.parsers import expat
 
@@ -108,6 +108,8 @@ def _scene(path: Path, kind: Kind) -> MeshScene:
         raise ConfigError(
             'mesh files need trimesh, which is not installed: pip install "silo-mod[inertia]"'
         ) from error
+    if kind is Kind.PLY and _is_cut_off(path.read_bytes()):
+        raise DocumentError(str(path), "the file ends in the middle; export or copy it again")
     try:
         # Infinite coordinates are refused below, in words; numpy's own would be about trimesh.
         with path.open("rb") as stream, np.errstate(all="ignore"):
@@ -118,6 +120,13 @@ def _scene(path: Path, kind: Kind) -> MeshScene:
     except Exception as error:
         raise DocumentError(str(path), f"cannot be read as {kind.value}: {error}") from error
     return _from_trimesh(path, kind, loaded)
+
+
+def _is_cut_off(data: bytes) -> bool:
+    """Report a PLY file of text with fewer lines than its header lists; trimesh counts binary ones."""
+    head, _, body = data.partition(b"end_header")
+    listed = sum(map(int, re.findall(rb"^element\s+\S+\s+(\d+)", head, re.MULTILINE)))
+    return b"format ascii" in head and listed > sum(bool(line.strip()) for line in body.splitlines())
 
 
 def _from_trimesh(path: Path, kind: Kind, loaded: Any) -> MeshScene:
@@ -252,6 +261,7 @@ class _Object:
     vertices: list[Corner] = field(default_factory=list)
     faces: list[tuple[int, int, int]] = field(default_factory=list)
     components: list[tuple[str, str, Floats]] = field(default_factory=list)
+    lattice: bool = False
 
 
 @dataclass(eq=False)
@@ -304,7 +314,7 @@ class _Package:
             self._fail(f"states the unit '{model.unit}', which 3MF does not know")
         unit_m = MESH_UNITS[model.unit]
         for number, found in model.objects.items():
-            if f"{PurePosixPath(root).name}#{number}" not in self._reached and found.kind in _PART:
+            if _key(root, number) not in self._reached and found.kind in _PART:
                 why = "is marked as not printed" if number in model.unprinted else "is built by nothing"
                 self._say("", f"object {number} “{found.name}” {why}: left out")
         return MeshScene(self._meshes, self._nodes, tuple(roots), model.unit, unit_m, self._said)
@@ -313,13 +323,17 @@ class _Package:
         self._said[key].append(Note(code, words))
 
     def _is_left_out(self, role: str, part: str, number: str) -> bool:
-        """Report an object that is not the part, by the slicer's word or by its own type."""
-        self._reached.add(f"{PurePosixPath(part).name}#{number}")
+        """Report an object that is not the part, by the slicer's word, else by its own type.
+
+        Bambu Studio and Orca Slicer give all that is not the part one type, negative volumes as well.
+        """
+        self._reached.add(_key(part, number))
         found = self._model(part).objects.get(number)
-        words = [word for word in (role, found.kind if found else "") if word not in (*_PART, *_NEGATIVE)]
-        if words and found:
-            self._say("", f"object {number} “{found.name}” is not the part ({words[0]}): left out")
-        return bool(words)
+        word = role or (found.kind if found else "")
+        if found is None or word in (*_PART, *_NEGATIVE):
+            return False
+        self._say("", f"object {number} “{found.name}” is not the part ({word}): left out")
+        return True
 
     def _root(self) -> str:
         names = self._archive.namelist()
@@ -344,7 +358,7 @@ class _Package:
         return self._models[name]
 
     def _add(self, part: str, number: str, inside: tuple[str, ...]) -> str:
-        key = f"{PurePosixPath(part).name}#{number}"
+        key = _key(part, number)
         if key in inside:
             self._fail(f"its object {number} contains itself")
         if key in self._nodes:
@@ -355,7 +369,8 @@ class _Package:
         children: list[Child] = []
         cuts: list[Mesh] = []
         for other, child, transform in found.components:
-            role = self._slicer.roles.get((number, child), "")
+            roles = self._slicer.roles.get((number, child), [""])
+            role = roles.pop(0) if roles[1:] else roles[0]  # a shared mesh is listed once for each use
             if self._is_left_out(role, other or part, child):
                 continue
             child_key = self._add(other or part, child, (*inside, key))
@@ -378,8 +393,9 @@ class _Package:
         if faces:
             self._meshes[key] = self._mesh(number, found.vertices, list(faces.values()))
             self._carve(key, cuts)
-        elif not found.components:
-            words = f"object {number} “{found.name}” has no triangles: its volume is missing"
+        if found.lattice or not (faces or found.components):
+            what = "beams, which are not measured" if found.lattice else "no triangles"
+            words = f"object {number} “{found.name}” has {what}: its volume is missing"
             self._say("", words, GeometryCode.BODY_MISSING)
         name = found.name or (self._path.stem if not inside else f"object {number}")
         whole = tuple(self._carved(key, child, cuts) for child in children)
@@ -456,7 +472,7 @@ class _Slicer:
     """What a slicer says of the parts of an object (Bambu, Orca), or of ranges of its triangles (Prusa)."""
 
     def __init__(self) -> None:
-        self.roles: dict[tuple[str, str], str] = {}
+        self.roles: dict[tuple[str, str], list[str]] = defaultdict(list)
         self.volumes: dict[str, list[tuple[str, int, int]]] = defaultdict(list)
         self._object = ""
 
@@ -465,7 +481,7 @@ class _Slicer:
         if kind == "object":
             self._object = attributes.get("id", "")
         elif kind == "part":
-            self.roles[self._object, attributes.get("id", "")] = attributes.get("subtype", "")
+            self.roles[self._object, attributes.get("id", "")].append(attributes.get("subtype", ""))
         elif kind == "volume":
             first, last = int(attributes["firstid"]), int(attributes["lastid"])
             self.volumes[self._object].append(("", first, last))
@@ -496,6 +512,8 @@ class _ModelReader:
         elif kind == "object":
             self._object = _Object(attributes.get("name", "").strip(), attributes.get("type", ""))
             self.model.objects[attributes.get("id", "")] = self._object
+        elif kind == "beam":
+            self._object.lattice = True
         elif kind == "component":
             self._object.components.append(_use(attributes))
         elif kind == "item" and attributes.get("printable") == "0":
@@ -520,6 +538,10 @@ def _matrix(text: str) -> Floats:
             raise ValueError(f"a transform needs 12 numbers, got '{text[:60]}'")
         matrix[:3, :] = numbers.reshape(4, 3).T
     return matrix
+
+
+def _key(part: str, number: str) -> str:
+    return f"{part.lstrip('/')}#{number}"
 
 
 def _local(tag: str) -> str:

@@ -252,6 +252,22 @@ def test_an_obj_does_not_reach_for_other_files(tmp_path: Path, read_in: Any) -> 
 QUAD = "f 4 3 2 1\n"
 
 
+@pytest.mark.parametrize("lost", [0, 1, 12])
+def test_a_ply_file_that_is_cut_off_is_refused(lost: int, tmp_path: Path, read_in: Any) -> None:
+    """Its header says how many lines there are; a whole body may be missing at the end."""
+    text = trimesh.util.concatenate([brick(), brick((2, 2, 2), (50, 0, 0))]).export(
+        file_type="ply", encoding="ascii"
+    )
+    lines = (text if isinstance(text, str) else text.decode()).splitlines()
+    path = tmp_path / "part.ply"
+    path.write_text("\n".join(lines[: len(lines) - lost]) + "\n\n")
+    if not lost:
+        assert only(read_in(path)).volume_m3 == pytest.approx(6.008e-6)
+        return
+    with pytest.raises(DocumentError, match="ends in the middle"):
+        read_in(path)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

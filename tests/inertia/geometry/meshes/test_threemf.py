@@ -204,11 +204,17 @@ SLICED = {
 
 @pytest.mark.parametrize("case", SLICED)
 @pytest.mark.parametrize("scattered", [False, True])
-def test_parts_of_bambu_and_orca(case: str, scattered: bool, write: Any, read_in: Any, codes_of: Any) -> None:
+@pytest.mark.parametrize("typed", [False, True])
+def test_parts_of_bambu_and_orca(
+    case: str, scattered: bool, typed: bool, write: Any, read_in: Any, codes_of: Any
+) -> None:
     """A box of 10 mm, and one of 2 mm in it: subtracted or left out by the slicer's word; parts may lie in
-    files of their own."""
+    files of their own. Both programs give whatever is not the part the type "other", holes as well."""
     config, code, volume = SLICED[case]
-    boxes = box(1, (10, 10, 10)) + box(2, (2, 2, 2))
+    other = box(2, (2, 2, 2))
+    if typed and case != "two parts":
+        other = other.replace('type="model"', 'type="other"')
+    boxes = box(1, (10, 10, 10)) + other
     if scattered:
         path = ' p:path="/3D/Objects/o.model"'
         used = f'<component{path} objectid="1"/>' + MOVED.replace(" transform", f"{path} transform")
@@ -222,6 +228,38 @@ def test_parts_of_bambu_and_orca(case: str, scattered: bool, write: Any, read_in
     assert total == pytest.approx(volume * 1e-9)
     codes = codes_of(assembly) + [c for p in assembly.prototypes.values() for c in codes_of(p)]
     assert codes == ([code] if code else [])
+
+
+@pytest.mark.parametrize("kinds", [("normal_part", "negative_part"), ("normal_part", "modifier_part")])
+def test_one_mesh_that_is_a_part_and_something_else(kinds: tuple[str, str], write: Any, read_in: Any) -> None:
+    """Programs that share meshes name one object twice: the first use is the first part."""
+    used = '<component objectid="1"/><component objectid="1" transform="1 0 0 0 1 0 0 0 1 5 0 0"/>'
+    config = orca(*kinds).replace('id="2"', 'id="1"')
+    parts = model(box(1, (10, 10, 10)) + ASSEMBLED.format(used), '<item objectid="9"/>')
+    assembly = read_in(write({ROOT: parts, SETTINGS: config}))
+    (instance,) = assembly.instances
+    volume = assembly.prototypes[instance.prototype].volume_m3
+    assert volume == pytest.approx(5e-7 if "negative_part" in kinds else 1e-6)
+
+
+def test_objects_of_one_number_in_files_of_one_name(write: Any, read_in: Any) -> None:
+    """Their folders differ, and so do they."""
+    use = "".join(f'<component p:path="/3D/{folder}/o.model" objectid="7"/>' for folder in "ab")
+    parts = {ROOT: model(f'<object id="1"><components>{use}</components></object>', ITEM)}
+    parts |= {f"3D/{folder}/o.model": model(box(7, (n, n, n)), "") for n, folder in ((1, "a"), (2, "b"))}
+    volumes = sorted(part.volume_m3 for part in read_in(write(parts)).prototypes.values())
+    assert volumes == pytest.approx([1e-9, 8e-9])
+
+
+def test_beams_beside_triangles_are_named(write: Any, read_in: Any, codes_of: Any) -> None:
+    """The beam lattice extension: rods along edges, whose volume is not measured."""
+    beams = (
+        '<b:beamlattice xmlns:b="urn:b" radius="1"><b:beams><b:beam v1="0" v2="7"/></b:beams></b:beamlattice>'
+    )
+    boxed = box(1, (10, 10, 10), "strut").replace("</mesh>", f"{beams}</mesh>")
+    assembly = read_in(write({ROOT: model(boxed, ITEM)}))
+    assert codes_of(assembly) == ["body_missing"]
+    assert "strut" in assembly.problems[0].message
 
 
 def test_a_negative_volume_cuts_where_it_stands(write: Any, read_in: Any) -> None:
