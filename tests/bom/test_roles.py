@@ -19,8 +19,7 @@ from silo.bom.findings import FindingCode
 from silo.bom.roots import fates, silent_reader
 from silo.bom.walk.kinds import draft_count
 from silo.bom.walk.tree import Role, chains
-from silo.inertia.geometry.freecad.stated_materials import NOTHING, Material
-from silo.inertia.geometry.freecad.walk import Walk
+from silo.inertia.geometry.freecad.walk import NOTHING, Material, Walk
 
 M4 = "ISO 4762 M4×16"
 Counts = dict[str, int]

@@ -13,7 +13,8 @@ from freecad_cases import machines
 from freecad_cases.machines import REPOSITORY, WANTED, FreeCAD
 
 from silo.bom.errors import InputError
-from silo.inertia.geometry import ReadOptions, cache, read
+from silo.inertia.geometry import ReadOptions, read
+from silo.inertia.geometry.read import load
 from silo.inertia.model import Assembly, GeometryCode
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
@@ -47,7 +48,7 @@ def _in_freecad(freecad: FreeCAD, tmp_path: Path) -> Callable[[Path], Assembly]:
         done = freecad.run(MEASURE, {**env, **job}, cwd=tmp_path, timeout_s=900)
         if not out.exists():
             raise InputError(done.stdout)
-        return cache.load(out)[0]
+        return load(out)[0]
 
     return reading
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from bodies import box
 
-from silo.inertia.codes import Rule
+from silo.inertia.report import Rule
 
 HEAD = "Item,Quantity,Part number,Material,Mass,Name\n"
 V = 1e-6  # of a cube of 1 cm

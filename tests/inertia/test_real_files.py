@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 from silo.inertia.calculator import read_geometry
-from silo.inertia.codes import Source
 from silo.inertia.geometry import ReadOptions
 from silo.inertia.model import Assembly, GeometryCode, leaf_products
 from silo.inertia.output.text import snippets, writable
+from silo.inertia.report import Source
 
 Fixture = Callable[..., Any]
 FILES = (

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bodies import box, shape_only
 
-from silo.inertia.codes import Source
+from silo.inertia.report import Source
 
 HEAD = "Item,Quantity,Part number,Material,Mass,Name\n"
 V = 1e-6  # of a cube of 1 cm

@@ -10,9 +10,9 @@ import pytest
 
 from silo.bom.errors import InputError
 from silo.inertia.calculator import Task, calculate
-from silo.inertia.codes import Source
 from silo.inertia.geometry.together import Mesh, mesh_solid
 from silo.inertia.model import Assembly, Instance, Prototype
+from silo.inertia.report import Source
 
 LINKS = {"arm": ["arm"], "base": ["base"]}
 

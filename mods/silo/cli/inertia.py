@@ -292,11 +292,11 @@ def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Asse
     from silo.inertia.output.text import write_whole
 
     for name in args.preview:
-        from silo.inertia.preview.page import views_of, write_glb
+        from silo.inertia.preview import views_of, write_glb
 
         write_whole(name, write_glb(assembly, views_of(report, assembly)))
     if args.html:
-        from silo.inertia.preview.page import report_html
+        from silo.inertia.preview import report_html
 
         write_whole(args.html, report_html(report, assembly).encode("utf-8"))
     for name in args.report:
@@ -559,7 +559,7 @@ def run_links(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     for name in args.preview:
-        from silo.inertia.preview.page import LinkView, write_glb
+        from silo.inertia.preview import LinkView, write_glb
 
         views = [
             LinkView(link, tuple(assembly.instances[index] for index in ids))

@@ -10,7 +10,7 @@ Rules of this module:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -64,6 +64,22 @@ class TensorProblem(StrEnum):
     ZERO_INERTIA = "zero_inertia"  # a point mass: refused by MuJoCo on a moving link
     NOT_POSITIVE_DEFINITE = "not_positive_definite"
     TRIANGLE_INEQUALITY = "triangle_inequality"  # a principal moment exceeds the sum of the two others
+
+
+_TENSOR_WORDS = {
+    TensorProblem.NOT_FINITE: "has a value that is not finite",
+    TensorProblem.NOT_SYMMETRIC: "is not symmetric",
+    TensorProblem.ZERO_MASS: "has no mass",
+    TensorProblem.NEGATIVE_MASS: "has a negative mass",
+    TensorProblem.ZERO_INERTIA: "has no inertia (a point mass); MuJoCo refuses it on a moving link",
+    TensorProblem.NOT_POSITIVE_DEFINITE: "has a principal moment that is not above zero",
+    TensorProblem.TRIANGLE_INEQUALITY: "has a principal moment above the sum of the two others",
+}
+
+
+def tensor_words(problems: Iterable[TensorProblem]) -> str:
+    """Return why a tensor is no rigid body's, in words that end a sentence."""
+    return ", ".join(_TENSOR_WORDS[problem] for problem in problems)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -28,8 +28,8 @@ from itertools import count
 
 from silo.bom.errors import counted, listed
 from silo.inertia.bom.table import BOMEntry, BomTable
-from silo.inertia.codes import Decided, Rule
 from silo.inertia.model import Product
+from silo.inertia.report import Decided, Rule
 
 SUGGEST_FROM = 0.84
 """difflib's ratio from which a name is proposed to the person; docs/decisions has what it was chosen by."""

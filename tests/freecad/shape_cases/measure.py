@@ -10,10 +10,10 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.environ["SILO_MODS"])
 
-from silo.inertia.geometry import cache  # noqa: E402
 from silo.inertia.geometry.graph import ReadOptions  # noqa: E402
+from silo.inertia.geometry.read import save  # noqa: E402
 from silo.workbench.freecad import saving  # noqa: E402
 from silo.workbench.mass import shapes  # noqa: E402
 
 document = saving.open_fully(os.environ["SILO_TOP"])
-cache.save(shapes.read_live(document, ReadOptions(), lambda *_: None), Path(os.environ["SILO_OUT"]))
+save(shapes.read_live(document, ReadOptions(), lambda *_: None), Path(os.environ["SILO_OUT"]))

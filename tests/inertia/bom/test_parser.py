@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
 from silo.inertia.bom import BomCode, BOMParser, BomTable
-from silo.inertia.bom.masses import unit_factor
 from silo.inertia.bom.sheet import find_columns
+from silo.inertia.bom.table import unit_factor
 
 PLAIN = (
     "Item,Quantity,Part number,Description,Material,Mass,Name\n"

@@ -16,9 +16,9 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from step_writer import emptied, trsf_of
 
-from silo.inertia.codes import Source
 from silo.inertia.core import TensorProblem
 from silo.inertia.model import GeometryCode
+from silo.inertia.report import Source
 
 Fixture = Callable[..., Any]
 SIZES = {"upper arm": (10, 10, 100), "hand": (20, 20, 5), "finger": (4, 4, 30)}

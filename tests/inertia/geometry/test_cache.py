@@ -12,8 +12,18 @@ import pytest
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 
 from silo.bom.errors import DocumentError, InputError
-from silo.inertia.geometry import Mesh, ReadOptions, cache, read
-from silo.inertia.geometry.cache import Cache, default_folder, fingerprint, key_of, key_parts, measured_by
+from silo.inertia.geometry import Mesh, ReadOptions, read
+from silo.inertia.geometry.read import (
+    FORMAT,
+    Cache,
+    default_folder,
+    fingerprint,
+    key_of,
+    key_parts,
+    load,
+    measured_by,
+    save,
+)
 from silo.inertia.model import Assembly, Instance, Note, Prototype
 from silo.platform import cache_folder
 
@@ -172,7 +182,7 @@ def test_the_cache_is_bounded(box: Any, step_part: Any, kept: Any, tmp_path: Pat
     assert read(paths[0], options=kept(memory_mb=IMPOSSIBLE)).instances  # used again
     small = Cache(tmp_path / "cache", max_bytes=2 * max(entries) + 10)
     result = tmp_path / "result.npz"
-    cache.save(read(paths[3], options=ReadOptions(cache=False)), result)
+    save(read(paths[3], options=ReadOptions(cache=False)), result)
     small.put("ff" + "0" * 62, result)
     assert len(files(tmp_path / "cache")) == 2
     assert read(paths[0], options=kept(memory_mb=IMPOSSIBLE)).instances
@@ -226,7 +236,7 @@ def test_another_kernel_is_another_key(tmp_path: Path, monkeypatch: pytest.Monke
     path.write_bytes(b"content")
     options = ReadOptions().content_options()
     before = key_of(path, options)
-    monkeypatch.setattr("silo.inertia.geometry.cache.KERNELS", ("numpy",))
+    monkeypatch.setattr("silo.inertia.geometry.read.KERNELS", ("numpy",))
     assert key_of(path, options) != before
 
 
@@ -267,8 +277,8 @@ def assembly() -> Assembly:
 def test_a_stored_assembly_comes_back_as_it_was(tmp_path: Path) -> None:
     """All fields, of all kinds; what is kept beside comes along."""
     before = assembly()
-    cache.save(before, tmp_path / "x.npz", {"others": {"a": "b"}})
-    after, extra = cache.load(tmp_path / "x.npz")
+    save(before, tmp_path / "x.npz", {"others": {"a": "b"}})
+    after, extra = load(tmp_path / "x.npz")
     assert extra == {"others": {"a": "b"}}
     assert (after.name, after.source, after.unit) == (before.name, before.source, before.unit)
     assert after.problems == before.problems
@@ -290,14 +300,14 @@ def test_a_stored_assembly_comes_back_as_it_was(tmp_path: Path) -> None:
 
 def test_an_assembly_without_anything_can_be_stored(tmp_path: Path) -> None:
     """No prototypes, no instances: no error."""
-    cache.save(Assembly("empty", {}, ()), tmp_path / "x.npz")
-    assert cache.load(tmp_path / "x.npz")[0].instances == ()
+    save(Assembly("empty", {}, ()), tmp_path / "x.npz")
+    assert load(tmp_path / "x.npz")[0].instances == ()
 
 
 def test_a_pickle_in_a_stored_file_is_never_loaded(tmp_path: Path) -> None:
     """An array of objects would run code when it is read: refused."""
     path = tmp_path / "evil.npz"
-    np.savez(path, header=np.array([{"format": cache.FORMAT}], dtype=object))
+    np.savez(path, header=np.array([{"format": FORMAT}], dtype=object))
     with pytest.raises(InputError, match="no stored geometry"):
-        cache.load(path)
+        load(path)
     assert Cache(tmp_path).get("evil", path) is None

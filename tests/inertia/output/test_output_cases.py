@@ -300,8 +300,8 @@ def test_case_43_json_fits_its_schema(report: Any) -> None:
 
 def test_schema_knows_every_code_of_the_program() -> None:
     """Enumerations of schema and program are the same."""
-    from silo.inertia.codes import Decided, Rule, Source
     from silo.inertia.core import TensorProblem
+    from silo.inertia.report import Decided, Rule, Source
 
     schema = json.loads(SCHEMA.read_text("utf-8"))["$defs"]
     part = schema["part"]["properties"]

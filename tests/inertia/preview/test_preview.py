@@ -19,8 +19,7 @@ from silo.inertia.core import MassProps
 from silo.inertia.geometry import Mesh
 from silo.inertia.geometry.together import mesh_volume
 from silo.inertia.model import Assembly, Instance, Prototype
-from silo.inertia.preview.page import LinkView, inertia_ellipsoid, views_of, write_glb
-from silo.inertia.preview.shading import ellipsoid, shaded
+from silo.inertia.preview import LinkView, ellipsoid, inertia_ellipsoid, shaded, views_of, write_glb
 
 
 def cube_mesh(size: float = 0.1) -> Mesh:

@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 
 from silo.inertia.bom import BOMEntry, BomTable
 from silo.inertia.bom.parser import with_structure
-from silo.inertia.codes import Source
 from silo.inertia.matching import bare, plain
 from silo.inertia.model import Assembly, Instance
 from silo.inertia.output.text import report_json
+from silo.inertia.report import Source
 
 Compute = Callable[..., Any]
 NAMES = (

@@ -13,8 +13,13 @@ from pathlib import Path
 from silo.bom.errors import InputError, counted
 from silo.bom.headers import Role, find_clashes
 from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
-from silo.inertia.bom.masses import (
+from silo.inertia.bom.sheet import MASS_COLUMNS, Sheet, read_sheet
+from silo.inertia.bom.table import (
     FORCE_UNITS,
+    BomCode,
+    BOMEntry,
+    BomTable,
+    BomWarning,
     MassCell,
     column_mark,
     is_empty,
@@ -22,8 +27,6 @@ from silo.inertia.bom.masses import (
     read_mass_header,
     unit_factor,
 )
-from silo.inertia.bom.sheet import MASS_COLUMNS, Sheet, read_sheet
-from silo.inertia.bom.table import BomCode, BOMEntry, BomTable, BomWarning
 from silo.inertia.bom.workbook import Row
 
 _TOTAL_TOLERANCE = 1e-3

@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any
 from silo.api.policy import ends_run
 from silo.bom.errors import NotFoundError, SiloError
 from silo.inertia.bom.table import BomCode
-from silo.inertia.codes import MassCode, Source
 from silo.inertia.model import GeometryCode
 from silo.inertia.output.text import number
-from silo.inertia.report import InertiaReport, PartResult, SubAssemblyResult
+from silo.inertia.report import InertiaReport, MassCode, PartResult, Source, SubAssemblyResult
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

@@ -31,10 +31,8 @@ from rich.text import Text
 
 from silo.bom.errors import InputError, counted, listed
 from silo.bom.headers import safe_cell
-from silo.inertia.aggregate import tensor_words
-from silo.inertia.codes import Decided, Source
-from silo.inertia.core import CHECK_TOLERANCE, Floats, MassProps, TensorProblem
-from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning
+from silo.inertia.core import CHECK_TOLERANCE, Floats, MassProps, TensorProblem, tensor_words
+from silo.inertia.report import Decided, InertiaReport, LinkResult, PartResult, PartWarning, Source
 from silo.platform import replacing
 
 _MARGIN = 1e-14

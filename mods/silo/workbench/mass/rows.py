@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from silo.inertia.codes import MassCode, Source
-from silo.inertia.report import InertiaReport, PartResult
+from silo.inertia.report import InertiaReport, MassCode, PartResult, Source
 from silo.workbench.words import counted, translate
 
 

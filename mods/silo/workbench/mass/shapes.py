@@ -37,14 +37,17 @@ from silo.inertia.geometry.exact import (
     Turned,
     integrate,
 )
-from silo.inertia.geometry.freecad.stated_materials import (
+from silo.inertia.geometry.freecad.walk import (
     NO_MATERIAL,
     NOTHING,
+    Leaf,
     Material,
+    Walk,
+    assembled,
     linked_material,
+    one_by_one,
     told_material,
 )
-from silo.inertia.geometry.freecad.walk import Leaf, Walk, assembled, one_by_one
 from silo.inertia.geometry.graph import ReadOptions, Report, in_metres
 from silo.inertia.geometry.measured import (
     INVALID,

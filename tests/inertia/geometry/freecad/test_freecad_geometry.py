@@ -23,7 +23,7 @@ from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.inertia.core import place
 from silo.inertia.geometry import ReadOptions, read
-from silo.inertia.geometry.freecad.places import placed
+from silo.inertia.geometry.freecad.files import placed
 from silo.inertia.model import Assembly, GeometryCode
 
 SCRIPT = Path(__file__).with_name("freecad_shapes.py")

@@ -33,8 +33,7 @@ from silo.inertia.core import place
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.solids import beside_edges, solid_moments
-from silo.inertia.geometry.step.read import against_stated, stated_totals
-from silo.inertia.geometry.step.xcaf import Stated, StepFile
+from silo.inertia.geometry.step.read import Stated, StepFile, against_stated, stated_totals
 from silo.inertia.model import GeometryCode, Note, Prototype
 
 

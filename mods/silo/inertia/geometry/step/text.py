@@ -6,7 +6,7 @@ Nothing here needs the kernel, so another process can do it while the kernel loa
 Flat assemblies of thousands are cut into groups. The kernel's reader goes through all uses of a product for
 each of its uses: 10 000 parts on one level (a populated circuit board, a flat export) cost it 8 s, in a
 hundred groups of a hundred 1 s. So the text of such a file gets groups, sub-assemblies at the origin that
-:mod:`xcaf` takes out again. Nothing else is touched; a file whose structure is not plain is left as it is.
+:mod:`read` takes out again. Nothing else is touched; a file whose structure is not plain is left as it is.
 """
 
 from __future__ import annotations
