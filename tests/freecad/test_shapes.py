@@ -95,7 +95,9 @@ def test_every_way_of_placing(built: Callable[[Path], Path], in_freecad: Callabl
 
 
 def test_shapes_and_materials(built: Callable[[Path], Path], in_freecad: Callable[[Path], Assembly]) -> None:
-    """Every kind of surface, a void, an inside-out solid, surfaces, curves; every way to state a material."""
+    """Every kind of surface, a void, an inside-out solid, surfaces, curves, bodies that are none; every way
+    to state a material.
+    """
     out = built(MATERIALS)
     told = json.loads((out / "told.json").read_text())
     by_name = {p.name: p for p in in_freecad(out / "parts.FCStd").prototypes.values()}
@@ -118,6 +120,9 @@ def test_shapes_and_materials(built: Callable[[Path], Path], in_freecad: Callabl
     assert GeometryCode.NEGATIVE_VOLUME in {p.code for p in by_name["InsideOut"].problems}
     assert by_name["InsideOut"].volume_m3 == pytest.approx(60e-9)
     assert [p.code for p in by_name["Sheet"].problems] == [GeometryCode.NO_SOLID]
+    missing = {n for n, p in by_name.items() if GeometryCode.BODY_MISSING in {w.code for w in p.problems}}
+    assert missing == {"Lidless", "LooseFaces", "Emptied"}
+    assert by_name["ClosedFaces"].volume_m3 == pytest.approx((729 + 512) * 1e-9)
 
 
 # Tops whose parts are measured in seconds; FreeCAD 0.20 loses the assemblies of the last one.

@@ -92,6 +92,13 @@ def main() -> None:
     part(doc, whole, "InsideOut", Part.makeBox(3, 4, 5).reversed())
     part(doc, whole, "Sheet", Part.makePlane(5, 5))
     part(doc, whole, "Curve", Part.makeCircle(5))
+    faces = Part.makeBox(8, 8, 8, Vector(50, 0, 0)).Faces
+    part(doc, whole, "Lidless", Part.makeCompound([Part.makeBox(9, 9, 9), Part.Shell(faces[1:])]))
+    part(doc, whole, "LooseFaces", Part.makeCompound([Part.makeBox(9, 9, 9), *faces[1:]]))
+    part(doc, whole, "ClosedFaces", Part.makeCompound([Part.makeBox(9, 9, 9), *faces]))
+    part(doc, whole, "Labelled", Part.makeCompound([Part.makeBox(9, 9, 9), faces[0]]))
+    part(doc, whole, "Emptied", Part.makeBox(7, 7, 7))
+    doc.Emptied.addObject(doc.addObject("Part::Feature", "Nothing"))
     own = part(doc, whole, "OnShape", Part.makeBox(5, 5, 5))
     density = None
     if hasattr(own, "ShapeMaterial"):

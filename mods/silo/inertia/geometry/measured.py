@@ -15,7 +15,7 @@ import numpy as np
 from silo.bom.errors import counted, listed
 from silo.inertia.core import rigid_mask
 from silo.inertia.geometry.graph import Unfolded, lost_characters
-from silo.inertia.geometry.together import Mesh, Together, combined
+from silo.inertia.geometry.together import Body, Mesh, Together, about_enclosed, combined
 from silo.inertia.model import Assembly, GeometryCode, Instance, Note, Prototype, SolidProps
 
 STATED = 5e-5
@@ -140,10 +140,37 @@ def shell_note(shells: int, solids: int) -> Note:
     return Note(GeometryCode.SHELL_VOLUME, words)
 
 
-def loose_note(surfaces: int, volume: float) -> Note:
-    """Say that open surfaces beside solids may be a body that is not counted."""
-    what = counted(surfaces, "surface that does not close", "surfaces that do not close")
-    words = f"beside its solids there are {what}: if they are a body, some {volume * 1e6:.3g} cm³ are missing"
+COSMETIC = 0.01
+"""Of a product's volume, up to which open surfaces beside its solids say nothing: they would enclose less."""
+
+SLACK = 0.02
+"""Of an open surface's size, by which it may reach out of a solid that it decorates."""
+
+
+def loose_notes(surfaces: Sequence[Mesh], bodies: Sequence[Body], solids: Sequence[SolidProps]) -> list[Note]:
+    """Report open surfaces beside solids that may be a body.
+
+    Those in the box of a body are a thread, a label, a symbol.
+    """
+
+    def is_beside(mesh: Mesh, body: Body) -> bool:
+        slack = SLACK * float(mesh.extents.max())
+        low, high = mesh.vertices.min(axis=0) + slack, mesh.vertices.max(axis=0) - slack
+        return bool((low >= body.low).all() and (high <= body.high).all())
+
+    left = [one for one in surfaces if len(one) and not any(is_beside(one, body) for body in bodies)]
+    lost = sum(map(about_enclosed, left))
+    if not solids or lost <= COSMETIC * sum(solid.volume_m3 for solid in solids):
+        return []
+    what = counted(len(left), "surface that does not close", "surfaces that do not close")
+    words = f"beside its solids there are {what}: if they are a body, some {lost * 1e6:.3g} cm³ are missing"
+    return [Note(GeometryCode.BODY_MISSING, words)]
+
+
+def lost_note(names: Sequence[str]) -> Note:
+    """Report bodies of a FreeCAD part that have no shape."""
+    what = "has no shape: its" if len(names) == 1 else "have no shape: their"
+    words = f"{listed(names, 4)} {what} volume is missing; recompute the file, or make a solid of a mesh"
     return Note(GeometryCode.BODY_MISSING, words)
 
 

@@ -91,6 +91,20 @@ def mesh_volume(mesh: Mesh) -> float:
     return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
 
 
+def about_enclosed(mesh: Mesh) -> float:
+    """Return roughly the volume [m^3] that an open surface would have if it closed: cones from its middle.
+
+    A flat one has none, wherever it lies.
+    """
+    corners = mesh.vertices[mesh.faces]
+    a, b, c = np.moveaxis(corners, 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    if not area.any():
+        return 0.0
+    a, b, c = np.moveaxis(corners - np.average(corners.mean(axis=1), axis=0, weights=area), 1, 0)
+    return float(np.abs(np.einsum("ni,ni->n", a, np.cross(b, c))).sum() / 6)
+
+
 def mesh_solid(mesh: Mesh) -> SolidProps:
     """Return the volume, centre and tensor of a closed mesh (exact for its polyhedron), the sign turned if
     need be.

@@ -57,6 +57,7 @@ from silo.inertia.geometry.measured import (
     cavity_note,
     drift_note,
     integration_notes,
+    loose_notes,
     shell_note,
 )
 from silo.inertia.geometry.together import Body, Mesh, mesh_volume, together
@@ -287,8 +288,8 @@ class LiveFacts:
         return [matrix_of(one) for one in own(obj, "PlacementList") or ()]
 
     def shape(self, obj: Any) -> Any:
-        """FreeCAD's shape of the object; None where it has no such property."""
-        return obj.Shape if "Shape" in obj.PropertiesList else None
+        """FreeCAD's shape of the object; None where it has none, or an empty one."""
+        return obj.Shape if "Shape" in obj.PropertiesList and not obj.Shape.isNull() else None
 
     def material(self, obj: Any) -> Material:
         """The material object linked to it, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
@@ -349,11 +350,16 @@ class _Product:
 
     def measured(self, leaf: Leaf) -> Measured:
         """All solids of a leaf, in its axes."""
-        shapes = [(ref.handle, ref.transform) for ref in leaf.shapes if not ref.handle.isNull()]
+        shapes = [(ref.handle, ref.transform) for ref in leaf.shapes]
         # FreeCAD keeps an object's placement as the location of its shape; the walk's own takes its place.
         placed = [(shape, t @ np.linalg.inv(matrix_of(shape.Placement))) for shape, t in shapes]
         solids = [(solid, matrix) for shape, matrix in placed for solid in shape.Solids]
-        shells = [(solid, matrix) for shape, matrix in placed for solid in _closed_shells(shape)]
+        shells: list[tuple[Any, Floats]] = []
+        left: list[Mesh] = []
+        for shape, matrix in placed:
+            closed, others = _surfaces(shape)
+            shells += [(solid, matrix) for solid in closed]
+            left += [_meshed(surface).moved(matrix).moved(np.diag([MM, MM, MM, 1.0])) for surface in others]
         if shells:
             self.problems.append(shell_note(len(shells), len(solids)))
         solids += shells
@@ -367,6 +373,7 @@ class _Product:
         settled = together(bodies, _common, self.problems)
         if settled.mixed:
             self.problems.append(cavity_note(settled))
+        self.problems += loose_notes(left, bodies, settled.solids)
         wires = any(shape.Edges for shape, _ in shapes)
         return Measured(settled.solids, tuple(self.problems), None, faces, wires)
 
@@ -444,10 +451,14 @@ def _weighed(solid: Any, ours: Moments, notes: list[Note]) -> Moments:
 
 def _nearer_to_mesh(solid: Any, ours: float, theirs: float) -> bool:
     """Return True if our volume [mm^3] is nearer to the one that FreeCAD's tessellation encloses."""
-    points, facets = solid.tessellate(max(0.005 * float(solid.BoundBox.DiagonalLength), 1e-6))
-    vertices = np.array([(p.x, p.y, p.z) for p in points]).reshape(-1, 3)
-    enclosed = abs(mesh_volume(Mesh(vertices, np.array(facets, dtype=np.int64).reshape(-1, 3))))
+    enclosed = abs(mesh_volume(_meshed(solid)))
     return abs(abs(ours) - enclosed) < abs(abs(theirs) - enclosed)
+
+
+def _meshed(shape: Any) -> Mesh:
+    """Return FreeCAD's triangles of a shape, in mm."""
+    points, facets = shape.tessellate(max(0.005 * float(shape.BoundBox.DiagonalLength), 1e-6))
+    return Mesh(np.array([(p.x, p.y, p.z) for p in points]), np.array(facets, dtype=np.int64))
 
 
 def _placed(found: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
@@ -463,15 +474,25 @@ def _placed(found: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
     return Body(there, corners.min(axis=0), corners.max(axis=0), None, (solid, matrix))
 
 
-def _closed_shells(shape: Any) -> list[Any]:
-    """The shells of a shape that stand in no solid and close, as solids."""
-    if len(shape.Shells) == sum(len(solid.Shells) for solid in shape.Solids):
-        return []
+def _surfaces(shape: Any) -> tuple[list[Any], list[Any]]:
+    """The surfaces of a shape that stand in no solid: those that close, as solids, and the others."""
+    inside = {shell.hashCode() for solid in shape.Solids for shell in solid.Shells}
+    loose = [shell for shell in shape.Shells if shell.hashCode() not in inside]
+    known = {face.hashCode() for shell in shape.Shells for face in shell.Faces}
+    faces = [face for face in shape.Faces if face.hashCode() not in known]
+    if not loose and not faces:
+        return [], []
     import Part
 
-    inside = [shell for solid in shape.Solids for shell in solid.Shells]
-    loose = [shell for shell in shape.Shells if not any(shell.isSame(other) for other in inside)]
-    return [Part.Solid(shell) for shell in loose if shell.isClosed()]
+    if faces:
+        sewn = Part.makeCompound(faces)
+        sewn.sewShape()
+        loose += sewn.Shells or sewn.Faces
+    closed = [surface.ShapeType == "Shell" and surface.isClosed() for surface in loose]
+    return (
+        [Part.Solid(surface) for surface, is_closed in zip(loose, closed, strict=True) if is_closed],
+        [surface for surface, is_closed in zip(loose, closed, strict=True) if not is_closed],
+    )
 
 
 def _common(one: Body, other: Body) -> SolidProps | None:

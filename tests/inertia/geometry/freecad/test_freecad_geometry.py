@@ -261,6 +261,25 @@ def test_a_file_that_appears_is_read_and_not_taken_from_the_cache(body: Any, tmp
     assert volume() == pytest.approx(1)
 
 
+@pytest.mark.parametrize("how", ["an empty entry", "no entry", "a mesh"])
+def test_a_body_without_a_shape_is_named(
+    how: str, body: Any, tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """Beside a body of the same part: a feature that FreeCAD could not compute, or no solid at all."""
+    doc = body(Doc("part"), "Kept")
+    if how == "a mesh":
+        doc.add("Mesh::Feature", "Lost")
+    else:
+        entry = "Lost.brp" if how == "an empty entry" else ""
+        doc.entries |= {entry: b""} if entry else {}
+        doc.add("Part::Feature", "Lost", Shape=Raw("Part::PropertyPartShape", f'<Part file="{entry}"/>'))
+    doc.add("App::Part", "Part", Group=locals_("Kept", "Lost"))
+    (part,) = read_in(doc.save(tmp_path / "part.FCStd")).prototypes.values()
+    assert part.volume_m3 == pytest.approx(6e-6)
+    assert codes_of(part) == [GeometryCode.BODY_MISSING]
+    assert "“Lost”" in part.problems[0].message
+
+
 def test_suppressed_excluded_and_meshes_are_reported(body: Any, tmp_path: Path, read_in: Any) -> None:
     """None of them has a mass here; each is named."""
     doc = body(Doc("top"), "Kept")

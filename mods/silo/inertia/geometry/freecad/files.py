@@ -93,14 +93,12 @@ class _Unpacked:
         return sum(self._entries.size(ref.handle.path, ref.handle.entry) for e in leaves for ref in e.shapes)
 
     def files(self, leaf: Leaf) -> list[_File]:
-        """Yield a value for each shape that is not empty. Raises DocumentError."""
+        """Unpack each shape. Raises DocumentError."""
         found = []
         for ref in leaf.shapes:
-            data = self._entries.read(ref.handle.path, ref.handle.entry)
-            if data:
-                path = self._folder / f"shape{next(self._numbers)}.brp"
-                path.write_bytes(data)
-                found.append(_File(path, f"{ref.handle.path}: {ref.handle.entry}", ref.transform))
+            path = self._folder / f"shape{next(self._numbers)}.brp"
+            path.write_bytes(self._entries.read(ref.handle.path, ref.handle.entry))
+            found.append(_File(path, f"{ref.handle.path}: {ref.handle.entry}", ref.transform))
         return found
 
 
@@ -222,9 +220,11 @@ class StoredFacts:
         )
 
     def shape(self, obj: Any) -> StoredShape | None:
-        """Return the entry that holds the object's shape, None if it has none."""
+        """Return the entry that holds the object's shape, None if it has none, or an empty one."""
         found = _FILE.search(_piece(obj, "Shape"))
-        return StoredShape(file_of(obj), _name(found)) if found is not None else None
+        if found is None or self._entries.size(file_of(obj), _name(found)) == 0:
+            return None
+        return StoredShape(file_of(obj), _name(found))
 
     def material(self, obj: Any) -> Material:
         """Return the material that is linked to the object, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
@@ -263,11 +263,11 @@ class Entries:
             raise DocumentError(path, f"its {name} cannot be unpacked: {error}") from error
 
     def size(self, path: str, name: str) -> int:
-        """Return how many bytes :meth:`read` would return; 0 if it would raise."""
+        """Return how many bytes :meth:`read` would return; 1 if it would raise."""
         try:
             return self._info(path, name)[1].file_size
         except (KeyError, OSError, zipfile.BadZipFile):
-            return 0
+            return 1
 
     def close(self) -> None:
         """Close all files."""

@@ -138,7 +138,7 @@ class Facts(Protocol):
         ...
 
     def shape(self, obj: Any) -> Any:
-        """A handle on the object's shape for whoever measures it; None where it has no such property."""
+        """A handle on the object's shape for whoever measures it; None where it has none, or an empty one."""
         ...
 
     def material(self, obj: Any) -> Material:
@@ -160,11 +160,13 @@ class ShapeRef:
 
 @dataclass(frozen=True, eq=False)
 class Leaf:
-    """What a prototype is made from. ``broken`` says why there is nothing."""
+    """What a prototype is made from. ``broken`` says why there is nothing, ``lost`` which bodies have no
+    shape."""
 
     shapes: tuple[ShapeRef, ...] = ()
     material: Material = NOTHING
     broken: str = ""
+    lost: tuple[str, ...] = ()
 
 
 # An object, the flexible AssemblyLink that it is shown by, and (4, 4) from its axes to those around.
@@ -278,16 +280,16 @@ class Walk:
         return places
 
     def _leaf(self, key: str, obj: Any, shapes: Sequence[tuple[Any, Floats]]) -> None:
-        refs = [
-            ShapeRef(handle, transform)
-            for member, transform in shapes
-            if (handle := self.facts.shape(member)) is not None
+        found = [(self.facts.shape(member), transform) for member, transform in shapes]
+        refs = [ShapeRef(handle, transform) for handle, transform in found if handle is not None]
+        lost = [
+            f"“{label_of(one[0])}”" for one, (handle, _) in zip(shapes, found, strict=True) if handle is None
         ]
         material = self.facts.material(obj)
         if material == NOTHING and shapes:
             material = self.facts.material(shapes[0][0])
         self.nodes[key] = Node(key, self._name(obj), has_geometry=True)
-        self.leaves[key] = Leaf(tuple(refs), material)
+        self.leaves[key] = Leaf(tuple(refs), material, lost=tuple(lost if refs else ()))
 
     def _nothing(self, obj: Any, reason: str, name: str = "") -> str:
         key = f"nothing: {name or self._key(obj)} {reason}"
@@ -550,6 +552,7 @@ def _prototype(walk: Walk, key: str, found: Measured | str) -> Prototype:
         key,
         walk.nodes[key].name,
         *([Note("material", stated.problem)] if stated.problem else []),
+        *([checks.lost_note(leaf.lost)] if leaf.lost else []),
         empty=Note(GeometryCode.NO_GEOMETRY, broken) if broken else None,
         step_density=stated.density,
         step_material=stated.name,

@@ -107,7 +107,7 @@ from silo.inertia.geometry.measured import (
     differing_note,
     drift_note,
     integration_notes,
-    loose_note,
+    loose_notes,
     mesh_notes,
     open_note,
     shell_note,
@@ -499,17 +499,6 @@ def closed_shells(shapes: list[Any]) -> tuple[list[Any], list[Any]]:
     return [_solid(shell) for shell in closed], left
 
 
-def about_enclosed(surface: Any) -> float:
-    """Return roughly the volume [mm^3] that an open surface would have if it closed: cones from its middle.
-
-    A flat one has none, wherever it lies.
-    """
-    system = GProp_GProps()
-    BRepGProp.SurfaceProperties_s(surface, system)
-    middle = np.array(xyz(system.CentreOfMass()))
-    return sum(abs(_flux(face, middle)) for face in occt.faces_of(surface))
-
-
 def _is_closed(shape: Any) -> bool:
     """Judge by the edges that its faces share; a sphere's pole and a cylinder's seam are no open edges.
 
@@ -553,12 +542,6 @@ SMALL = 0.1
 MANY_FACES = 60
 """A solid with more is full of small faces, whose picture may be coarse; meshing it is the most work."""
 
-COSMETIC = 0.01
-"""Of a product's volume, up to which open surfaces beside its solids say nothing: they would enclose less."""
-
-SLACK = 0.02
-"""Of an open surface's size, by which it may reach out of a solid that it decorates."""
-
 NEAR = 50.0
 """Distance from the origin, in sizes of the solid, up to where integrating from there costs no digits."""
 
@@ -589,10 +572,8 @@ def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
     settled = together(bodies, KernelCommon(), problems)
     if settled.mixed:
         problems.append(cavity_note(settled))
-    if settled.solids:
-        lost = MM**3 * sum(about_enclosed(surface) for surface in left if not _beside(surface, bodies))
-        if lost > COSMETIC * sum(solid.volume_m3 for solid in settled.solids):
-            problems.append(loose_note(len(left), lost))
+    if settled.solids and left:
+        problems += loose_notes([tessellated(surface)[0] for surface in left], bodies, settled.solids)
     meshes = [body.mesh for body in bodies if body.mesh is not None]
     bare = [] if found else [shape for shape in shapes if occt.faces_of(shape)]
     if mesh_check and bare:
@@ -646,13 +627,6 @@ def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _B
         notes += [note] if note is not None else []
     flat = mesh is not None and props is not None and occt.is_flat(solid)
     return _Bare(body, props, mesh, notes, flat)
-
-
-def _beside(surface: Any, bodies: list[Body]) -> bool:
-    """Report what lies in the box of a solid: a thread, a label, a symbol."""
-    low, high = (corner * MM for corner in bounds(surface))
-    slack = SLACK * (high - low).max()
-    return any((low >= b.low - slack).all() and (high <= b.high + slack).all() for b in bodies)
 
 
 def _placed(bare: _Bare, solid: Any) -> list[Body]:
