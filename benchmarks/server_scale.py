@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
-from sqlalchemy import event, text
+from sqlalchemy import event, select, text
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 
@@ -152,7 +152,7 @@ def make_vault(settings: Settings, size: int) -> None:
                 ],
             )
         for page in pages(range(2, assemblies + 1), 500):
-            changes, lines, told = [], [], []
+            changes, lines, told, syncs, conflicts = [], [], [], [], []
             for parent in page:
                 # 50 lines each; TOP and its sub-assemblies make five levels, the bolt is in every fourth.
                 children = {chance.randrange(assemblies + 1, size + 1): None for _ in range(52)}
@@ -184,7 +184,9 @@ def make_vault(settings: Settings, size: int) -> None:
                             "quantity": float(position % 7 + 1),
                             "reference_designators": "[]",
                             "source": "assembly",
+                            "unreferenced_since": None,
                             "override": False,
+                            "cad_quantity": None,
                             "metadata": "{}",
                         }
                     )
@@ -193,6 +195,12 @@ def make_vault(settings: Settings, size: int) -> None:
                         "source": "assembly",
                         "rel_type": "component",
                     }
+                    if position == 1 and parent % 5 == 1:  # waits: CAD has it no more
+                        lines[-1]["unreferenced_since"] = at
+                    if position == 1 and parent % 5 == 2:  # waits: a person's, and CAD has another quantity
+                        lines[-1] |= {"source": "manual", "override": True, "cad_quantity": 9.0}
+                        told_of = {"parent_id": parent, "child_id": child, "since": at, "accepted": False}
+                        conflicts.append({**told_of, "cad_quantity": 9.0})
                     told.append(
                         {
                             "change_id": parent,
@@ -203,9 +211,35 @@ def make_vault(settings: Settings, size: int) -> None:
                             "after": json.dumps(state),
                         }
                     )
+                parts = {str(n): [{"file": f"{n}.FCStd", "object": "Body"}] for n in children}
+                gaps = [{"reason": "missing", "name": "Lid", "file": "Lid.FCStd", "quantity": 1}]
+                syncs.append(
+                    {
+                        "parent_id": parent,
+                        "at": at,
+                        "username": "admin",
+                        "document_file": f"A-{parent:06}.FCStd",
+                        "folder": f"project {parent % 40}/part {parent % 7}",
+                        "left_out": json.dumps(gaps if parent % 5 == 3 else []),
+                        "components": json.dumps(parts),
+                    }
+                )
             insert_rows(tx, tables.bom_changes, changes)
+            insert_rows(tx, tables.bom_last_syncs, syncs)
+            insert_rows(tx, tables.bom_conflicts, conflicts)
             insert_rows(tx, tables.bom_lines, lines)
             insert_rows(tx, tables.bom_change_lines, told)
+        about = dict(tx.conn.execute(select(tables.items.c.id, tables.items.c.uuid)).all())
+
+        def merged(number: int) -> dict[str, Any]:
+            place = 2 + number % (assemblies - 1)
+            lines = [{"part_number": f"P-{n:06}", "quantity": 1} for n in range(20)]
+            told = {"type": "bom_merge", "item": number_of(place), "diff": {"unchanged": lines}}
+            who = {"username": f"user{number % 50}", "part_number_key": number_of(place).casefold()}
+            return {"name": "bom_merge", "item_uuid": about[place], "data": json.dumps(told), "at": at, **who}
+
+        for page in pages(range(settings.event_log_size), 5000):
+            insert_rows(tx, tables.events, [merged(number) for number in page])
         from silo_server.services.search import rebuild_index
 
         rebuild_index(tx)

@@ -57,7 +57,7 @@ class Later:
             ending = self._stopping.wait(LATER_SECONDS)
             try:
                 note_token_uses(self._db)
-                keep_summaries(self._db)
+                keep_summaries(self._db, self._stopping.is_set)
                 keep_looks(self._db)
             except (SQLAlchemyError, SiloError) as error:
                 logger.debug("the uses of tokens and the summaries are kept later: %s", cause_of(error))

@@ -138,6 +138,18 @@ def test_the_boms_of_many_items_cost_one_request_or_one_each(
     assert len(server.paths("POST")) == 2, "the missing route is asked for once only"
 
 
+def test_boms_that_are_too_many_for_one_answer_are_asked_for_in_halves(
+    server: Any, client: SiloClient, answer: Any
+) -> None:
+    """Not one by one: a server bounds the lines of an answer, and a thousand BOMs may be just above it."""
+    line = {"child_part_number": "C", "quantity": 2}
+    many = answer(413, {"error": "too_large", "message": "these BOMs have 12000 lines; ask for fewer"})
+    halves = ({"boms": {name: [line] for name in some}} for some in ("AB", "CD"))
+    server.on("POST /api/items/boms", many, *halves)
+    assert list(client.get_boms("ABCD")) == list("ABCD")
+    assert [seen.json()["part_numbers"] for seen in server.seen] == [list("ABCD"), list("AB"), list("CD")]
+
+
 def test_the_bom_of_another_item_is_no_answer(server: Any, client: SiloClient) -> None:
     """From a proxy's cache, say: it would be compared with the wrong assembly."""
     line = {"child_part_number": "C", "quantity": 2, "parent_part_number": "a01-0001"}

@@ -11,20 +11,23 @@ import uuid
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from server_testing import Api, bom
+from server_testing import Api, bom, merge_body
+from sqlalchemy import event
 
 import silo_server
 from silo.bom.errors import BusyError, RejectedError
 from silo.bom.headers import Role
-from silo_server.db.engine import Database, Turnstile, insert_rows
+from silo_server.db.engine import Database, Turnstile, Tx, insert_rows
 from silo_server.db.tables import bom_lines, items
 from silo_server.run import running_server
-from silo_server.services.bom import transfer, tree
+from silo_server.services.bom import review, transfer, tree
 from silo_server.services.bom.lines import state_columns
-from silo_server.services.items import NewItem, create_item, get_item
+from silo_server.services.bom.merge import merge_bom, read_merge_order, remember_refusal
+from silo_server.services.items import NewItem, archive_item, create_item, get_item
 from silo_server.settings import Settings, TooLargeError
 from silo_server.values import LineState
 
@@ -108,7 +111,7 @@ def test_a_structure_that_would_fill_the_memory_is_not_read(url: str, tmp_path: 
         running_server(url, token="silo_bound", settings=bounded) as server,
         Api(server.base_url, "silo_bound") as api,
     ):
-        top, sub, *leaves = api.items(5)
+        top, sub, extra, *leaves = api.items(6)
         api.merge(sub, dict.fromkeys(leaves, 1))
         assert len(api.get(bom(sub, "flat"))["flat_bom"]) == 3
         api.merge(top, {sub: 1})
@@ -116,7 +119,14 @@ def test_a_structure_that_would_fill_the_memory_is_not_read(url: str, tmp_path: 
             assert "sub-assemblies" in api.bad(413, "GET", bom(top, what))["message"]
         assert len(api.get(bom(top, "expanded?depth=1"))) == 1
         assert len(api.good("POST", "/api/items/boms", {"part_numbers": [sub]})["boms"][sub]) == 3
-        assert "fewer" in api.bad(413, "POST", "/api/items/boms", {"part_numbers": [top, sub]})["message"]
+        api.merge(sub, dict.fromkeys([*leaves, extra], 1))
+        assert len(api.good("POST", "/api/items/boms", {"part_numbers": [sub]})["boms"][sub]) == 4
+        api.merge(sub, dict.fromkeys(leaves, 1))
+        api.good("DELETE", bom(sub) + f"/{extra}")
+        for several, lines in (([top, sub], 4), ([sub, sub.lower()], 6)):
+            refused = api.bad(413, "POST", "/api/items/boms", {"part_numbers": several})
+            assert f"these BOMs have {lines} lines" in refused["message"]
+            assert "fewer" in refused["message"]
         api.good("POST", "/api/users", {"username": "ann", "role": "viewer", "password": "a pass phrase"})
         session = api.as_(None).call(
             "POST", "/api/auth/login", {"username": "ann", "password": "a pass phrase"}
@@ -263,6 +273,51 @@ def test_half_a_request_is_not_waited_for_for_ever(
         assert got.startswith(answered)
         with Api(server.base_url, "silo_half") as api:
             assert api.item()
+
+
+def test_what_waits_is_listed_and_counted_without_reading_all_lines(db: Database) -> None:
+    """Each kind once, archived ones never; every page counts them, so only what waits is looked at."""
+    asked: list[tuple[str, Any]] = []
+    with db.write() as tx:
+        tops = [create_item(tx, NewItem(part_number=f"T{n}", name="Top"))[0].part_number for n in range(5)]
+        parts = [create_item(tx, NewItem(part_number=f"C{n}", name="Part"))[0].part_number for n in range(2)]
+        for top in tops:
+            body = merge_body(dict.fromkeys(parts, 2))
+            merge_bom(
+                tx,
+                top,
+                read_merge_order({**body, "document": {"file": "T.FCStd", "folder": "robot/arm"}}, 9),
+                None,
+            )
+        merge_bom(tx, "T0", read_merge_order(merge_body({"C1": 2}), 9), None)
+        review.change_line(tx, "T1", "C0", {"quantity": 3})
+        merge_bom(tx, "T1", read_merge_order(merge_body({"C0": 5, "C1": 2}), 9), None)
+        gaps = [{"reason": reason, "name": reason} for reason in ("missing", "unregistered", "unregistered")]
+        body = {**merge_body(dict.fromkeys(parts, 2)), "left_out": gaps}
+        for top in ("T2", "T3"):
+            merge_bom(tx, top, read_merge_order(body, 9), None)
+        remember_refusal(tx, get_item(tx, "T2"), "no such part")
+        archive_item(tx, "T3")
+    with db.read() as tx:
+
+        def note(_conn: Any, _cursor: Any, sql: str, values: Any, *_: Any) -> None:
+            asked.append((sql, values))
+
+        event.listen(tx.conn, "before_cursor_execute", note)
+        found = review.waiting(tx)
+        assert review.waiting_count(tx) == len(found) == 3
+        event.remove(tx.conn, "before_cursor_execute", note)
+        plans = [str(row) for sql, p in asked for row in tx.conn.exec_driver_sql(_plan(tx) + sql, p)]
+    counts = [(one.unreferenced, one.conflicts, one.left_out, one.unregistered) for one in found]
+    assert counts == [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 2, 2)]
+    assert {(one.name, one.folder) for one in found} == {("Top", "robot/arm")}
+    assert all(one.synced_at for one in found)
+    if db.settings.is_sqlite:
+        assert not [plan for plan in plans if "SCAN bom_lines" in plan and "INDEX" not in plan]
+
+
+def _plan(tx: Tx) -> str:
+    return "EXPLAIN " if tx.postgres else "EXPLAIN QUERY PLAN "
 
 
 def returned_late(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:

@@ -7,6 +7,7 @@ import random
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -16,14 +17,22 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from server_testing import Databases, merge_body
 
-from silo.bom.errors import SiloError
+from silo.bom.errors import BusyError, SiloError
 from silo.cli.main import main
 from silo_server.db.engine import Database, Tx
 from silo_server.db.tables import product_summaries
 from silo_server.run import prepare
 from silo_server.services.bom import history, review, tree
 from silo_server.services.bom.merge import merge_bom, read_merge_order, remember_refusal
-from silo_server.services.bom.summary import Summary, below, keep_all, keep_summaries, summaries, summary_of
+from silo_server.services.bom.summary import (
+    Summary,
+    below,
+    keep_all,
+    keep_summaries,
+    marks_of,
+    summaries,
+    summary_of,
+)
 from silo_server.services.items import (
     ItemChange,
     NewItem,
@@ -254,3 +263,58 @@ def test_the_command_sums_all_up(db: Database, capsys: pytest.CaptureFixture[str
     assert main(["summaries", "--database", db.settings.database_url, "--json"]) == 0
     assert capsys.readouterr().out == f'{{"assemblies": {ASSEMBLIES}}}\n'
     assert len(kept_ids(db)) == ASSEMBLIES
+
+
+def test_a_product_that_no_read_can_sum_up_is_made_in_parts(db: Database) -> None:
+    """The read that finds it says that it is made, and how to go on; then it is there, as if read at once."""
+    numbers = seed(db)
+    top, sub, other, *_, part = numbers
+    with db.write() as tx:
+        for parent, children in ((sub, numbers[5:]), (other, numbers[5:]), (top, [sub, other, part])):
+            merge_bom(tx, parent, read_merge_order(merge_body(dict.fromkeys(children, 2)), 100), None)
+    small = Database(replace(db.settings, max_expanded_rows=4))
+    with pytest.raises(BusyError, match=r"more than 4 .* ask again in a minute"), small.read() as tx:
+        summary_of(tx, get_item(tx, top))
+    assert kept_ids(db) == set()
+    keep_summaries(small, lambda: True)
+    assert kept_ids(db) == set()
+    with suppress(BusyError), small.read() as tx:
+        summary_of(tx, get_item(tx, top))
+    keep_summaries(small)
+    with db.read() as tx:
+        ids = {get_item(tx, number).id for number in (top, sub, other)}
+    assert kept_ids(db) == ids
+    with small.read() as tx:
+        told = summary_of(tx, get_item(tx, top))
+    small.close()
+    with db.write() as tx:
+        tx.conn.execute(product_summaries.delete())
+    with db.read() as tx:
+        assert told == summary_of(tx, get_item(tx, top))
+
+
+def test_a_list_marks_what_is_open_in_products(db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the summary, so all levels; what is too large for a list has its mark once it is summed up."""
+    numbers = seed(db)
+    top, sub, _, _, *parts = numbers
+    with db.write() as tx:
+        body = {**merge_body(dict.fromkeys(parts, 2)), "left_out": [GAP]}
+        merge_bom(tx, sub, read_merge_order(body, 100), None)
+        merge_bom(tx, top, read_merge_order(merge_body({sub: 1}), 100), None)
+
+    def marks() -> dict[str, list[str]]:
+        with db.read() as tx:
+            listed = [get_item(tx, number) for number in numbers]
+            found = marks_of(tx, listed)
+        return {item.part_number: found[item.id] for item in listed if item.id in found}
+
+    told = marks()
+    assert told[top] == ["open in 1 BOM below"]
+    assert told[sub] == ["incomplete: 1 missing"]
+    assert told[numbers[2]] == ["never synced"]
+    assert parts[0] not in told
+    db.built.clear()
+    monkeypatch.setattr("silo_server.services.bom.summary.MOST_FOR_A_LIST", 2)
+    assert marks() == {}
+    keep_summaries(db)
+    assert marks() == told

@@ -564,9 +564,10 @@ class Caller:
         """
         wanted = list(dict.fromkeys(keys))
         found: dict[K, T] = {}
-        for start in range(0, len(wanted), MAX_IN_BATCH):
+        chunks = [wanted[start : start + MAX_IN_BATCH] for start in range(0, len(wanted), MAX_IN_BATCH)]
+        while chunks:
             stop_if(cancelled)
-            chunk = wanted[start : start + MAX_IN_BATCH]
+            chunk = chunks.pop(0)
             answer = None
             if ability not in self._refused and getattr(self.abilities, ability) is not False:
                 try:
@@ -578,7 +579,11 @@ class Caller:
                     # No POST for viewers and on a read-only server: GET is allowed all the same.
                     self._refused = self._refused | {ability}
                 except RejectedError:
-                    pass  # one malformed key spoils the batch; asked one by one, only that one is unknown
+                    # Too many at once, or a malformed key, which spoils the batch: alone, it is unknown.
+                    if len(chunk) > 1:
+                        half = len(chunk) // 2
+                        chunks[:0] = [chunk[:half], chunk[half:]]
+                        continue
             found.update(_one_by_one(chunk, single, cancelled) if answer is None else answer)
         return found
 

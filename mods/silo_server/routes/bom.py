@@ -108,7 +108,10 @@ def get_bom(call: Viewer, part_number: str) -> Response:
 
 @several.post("/items/boms", response_model=BomsOut, responses=READ_ERRORS)
 def get_boms(call: Viewer, body: NumbersBody) -> Response:
-    """The lines of many items, one level each; items that are not known are absent. Reads only."""
+    """The lines of many items, one level each; items that are not known are absent. Reads only.
+
+    413 if they have more than 10 000 lines in all; half of them may be asked for, or one however large.
+    """
     with call.read() as tx:
         found = get_by_numbers(tx, body.part_numbers)
         check_line_count(tx, [item.id for item in found.values()])

@@ -20,7 +20,7 @@ from typing import Annotated, Any, NamedTuple
 from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
-from silo.bom.errors import ConflictError
+from silo.bom.errors import BusyError, ConflictError
 from silo.bom.numbers import as_decimal
 from silo_server.db.engine import Tx
 from silo_server.routes.documents import told_of
@@ -35,6 +35,7 @@ from silo_server.services.bom.summary import (
     Worth,
     below,
     last_look,
+    marks_of,
     own_worth,
     summaries,
     summary_of,
@@ -158,8 +159,8 @@ class Structure:
         return tree.parts_of(self._tx, self.graph)
 
     def sought(self, look: Look) -> Callable[[Line], bool]:
-        """Return the test of lines that the view's filter is."""
-        return tree.sought(look.q, look.type, self.parts)
+        """Return the test of lines that the view's filter is; without one nothing is read for it."""
+        return tree.sought(look.q, look.type, self.parts) if look.is_filtered else lambda _line: True
 
     def lines_of(self, item_id: int) -> Sequence[Line]:
         """The lines of a BOM; a branch below the open levels is read when it is asked for."""
@@ -414,7 +415,7 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
             return values | {"table": flat, "has_supplier": supplied}
         table, above = tree_page(shown, look, sum(counts))
         return values | {"table": table, "above": above}
-    except (ConflictError, TooLargeError) as error:
+    except (BusyError, ConflictError, TooLargeError) as error:
         return {**values, "problem": str(error)}
 
 
@@ -479,6 +480,7 @@ def items_page(
     with call.read() as tx:
         found, total = list_items(tx, query)
         used = tree.use_counts(tx, [item.id for item in found])
+        marks = marks_of(tx, found)
     asked = {"q": q, "type": type, "category": category, "archived": "1" if archived else "", "sort": sort}
     return page(
         call,
@@ -486,6 +488,7 @@ def items_page(
         at=Address("/items", {name: value for name, value in asked.items() if value}),
         table=Page(found, total, total, number, PAGE_SIZE),
         used=used,
+        marks=marks,
         q=q,
         type=type,
         types=ITEM_TYPES,

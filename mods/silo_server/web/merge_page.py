@@ -14,7 +14,15 @@ from fastapi import APIRouter, Query
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.bom.errors import ConflictError, CycleError, NotFoundError, RejectedError, SiloError, counted
+from silo.bom.errors import (
+    BusyError,
+    ConflictError,
+    CycleError,
+    NotFoundError,
+    RejectedError,
+    SiloError,
+    counted,
+)
 from silo.bom.numbers import whole_number
 from silo_server import events
 from silo_server.db.engine import Tx
@@ -27,7 +35,7 @@ from silo_server.services.bom.review import Decision
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
 from silo_server.services.search import fits
-from silo_server.settings import DuplicateError, LinesChangedError, TooLargeError
+from silo_server.settings import DuplicateError, LinesChangedError
 from silo_server.values import Line, LineState
 from silo_server.web import line_form
 from silo_server.web.accounts import Reader, Writer
@@ -281,7 +289,7 @@ def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Resp
         seen = events.head(tx)
         try:
             below = summary_of(tx, item).told(item.id)
-        except (CycleError, TooLargeError) as error:
+        except (BusyError, CycleError) as error:
             below, asked = [], replace(asked, problem=asked.problem or _sentence(error))
         by_hand, cad_words = line_form.disputed(tx, item, lines, found)
     conflicts = {conflict.line.id: conflict for conflict in found.conflicts}

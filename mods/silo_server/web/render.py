@@ -166,14 +166,14 @@ _TEMPLATES = _environment()
 _LINK = re.compile(r'(\s(?:href|src|action|formaction|data-events)=")/(?!/)')
 
 
-def _state(request: Request) -> tuple[bool, int]:
-    """Whether the server takes no changes, and how many BOMs wait for a person.
+def _state(request: Request, waiting: int | None) -> tuple[bool, int]:
+    """Whether the server takes no changes, and how many BOMs wait for a person, if the page does not say.
 
     Without its database both are unknown; the page says so.
     """
     try:
         with server_of(request).db.read() as tx:
-            return mode_of(tx) != "normal", waiting_count(tx)
+            return mode_of(tx) != "normal", waiting_count(tx) if waiting is None else waiting
     except SQLAlchemyError:
         return False, 0
 
@@ -190,7 +190,7 @@ def page_for(
 
     Looks into the database for the server's mode, so not to be called on the event loop.
     """
-    closed, waiting = _state(request)
+    closed, waiting = _state(request, values.pop("waiting", None))
     cookie = f"{NOTICE_COOKIE}_{request.query_params.get(NOTICE, '')}"
     undo, _, notice = unquote(request.cookies.get(cookie, "")).partition(" ")
     html = _TEMPLATES.get_template(template).render(

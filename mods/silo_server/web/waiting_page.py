@@ -35,16 +35,17 @@ KINDS: Mapping[str, tuple[str, Callable[[Waiting], int]]] = {
     "unregistered": ("unregistered parts", lambda row: row.unregistered),
 }
 _SORTS: Mapping[str, Callable[[Waiting], Any]] = {
-    "number": lambda row: row.item.part_number.casefold(),
-    "name": lambda row: row.item.name.casefold(),
-    "folder": lambda row: row.last.folder.casefold(),
+    "number": lambda row: row.part_number.casefold(),
+    "name": lambda row: row.name.casefold(),
+    "folder": lambda row: row.folder.casefold(),
     "unreferenced": lambda row: row.unreferenced,
     "conflicts": lambda row: row.conflicts,
     "incomplete": lambda row: row.left_out,
     "unregistered": lambda row: row.unregistered,
-    "synced": lambda row: row.last.at,
+    "synced": lambda row: row.synced_at,
 }
 MOST_TOLD = 20
+PAGE_SIZE = 200
 
 
 @router.get("/waiting")
@@ -156,22 +157,24 @@ def _show(
 ) -> Response:
     with call.read() as tx:
         rows = waiting(tx)
-    folders = Counter(part for row in rows for part in _folders(row.last.folder))
+    folders = Counter(part for row in rows for part in _folders(row.folder))
     test, kind, folder = fits(view.get("q", "")), KINDS.get(view.get("kind", "")), view.get("folder", "")
     found = [
         row
         for row in rows
         if (kind is None or kind[1](row))
-        and (not folder or folder in _folders(row.last.folder))
-        and test(row.item.part_number, row.item.name, row.last.folder, row.last.document_file)
+        and (not folder or folder in _folders(row.folder))
+        and test(row.part_number, row.name, row.folder, row.document_file)
     ]
-    table = page_of(arranged(found, view.get("sort", ""), _SORTS), len(rows), int(view.get("page", "1")))
+    order = arranged(found, view.get("sort", ""), _SORTS)
+    table = page_of(order, len(rows), int(view.get("page", "1")), PAGE_SIZE)
     return page(
         call,
         "waiting.html",
         status=status,
         at=Address("/waiting", view),
         table=table,
+        waiting=len(rows),
         view=view,
         sort=view.get("sort", ""),
         folders=sorted(folders.items()),

@@ -10,13 +10,14 @@ What people do to single BOM lines: add, change, remove. Each is one change in t
 from __future__ import annotations
 
 import hashlib
+import json
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
-from sqlalchemy import func, select, text, update
+from sqlalchemy import func, select, text, union, update
 
 from silo.bom.compare import same_quantity
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
@@ -40,9 +41,9 @@ from silo_server.services.bom.lines import (
     new_line_id,
     parent_to_change,
 )
-from silo_server.services.bom.merge import NEVER, LastSync, last_syncs, quantity_problem
-from silo_server.services.bom.tree import Graph, conflicts_in
-from silo_server.services.items import by_ids, get_item
+from silo_server.services.bom.merge import quantity_problem
+from silo_server.services.bom.tree import Graph, Told, conflicts_in
+from silo_server.services.items import get_item
 from silo_server.settings import DuplicateError, LinesChangedError
 from silo_server.values import Item, Line, LineState, json_problem
 
@@ -396,70 +397,71 @@ def _write(
     return apply_changes(tx, parent, changes, note)
 
 
-@dataclass(frozen=True, slots=True)
-class Waiting:
+class Waiting(NamedTuple):
     """A BOM that waits, and for what. ``left_out`` counts what was left out, but the unregistered.
 
-    mark
-        of what a decision is about: the BOM's version, and what CAD says of its conflicts.
+    told
+        what CAD says of its conflicts, by the child's internal id.
     """
 
-    item: Item
-    mark: str
-    last: LastSync
+    part_number: str
+    name: str
+    version: int
+    folder: str
+    document_file: str
+    synced_at: str | None
+    told: Told
     unreferenced: int
-    conflicts: int
     left_out: int
     unregistered: int
 
     @property
-    def total(self) -> int:
-        """All that waits."""
-        return self.unreferenced + self.conflicts + self.left_out + self.unregistered
+    def conflicts(self) -> int:
+        """How many lines CAD has another quantity for."""
+        return len(self.told)
+
+    @property
+    def mark(self) -> str:
+        """What a decision is about: the BOM's version, and what CAD says of its conflicts."""
+        return _mark(self.version, self.told)
 
 
 def waiting(tx: Tx) -> list[Waiting]:
-    """All BOMs that wait, by part number; archived assemblies wait for nobody."""
-    unreferenced, conflicts, gaps = _unreferenced(tx), conflicts_in(tx), _incomplete(tx)
-    found = by_ids(tx, {*unreferenced, *conflicts, *gaps})
-    syncs = last_syncs(tx, found)
-    rows = []
-    for item_id, item in found.items():
-        if item.archived_at:
-            continue
-        last = syncs.get(item_id, NEVER)
-        missing = sum(gap["reason"] == Reason.UNREGISTERED for gap in last.gaps)
-        rows.append(
-            Waiting(
-                item,
-                _mark(item, conflicts.get(item_id, {})),
-                last,
-                unreferenced.get(item_id, 0),
-                len(conflicts.get(item_id, ())),
-                len(last.gaps) - missing,
-                missing,
-            )
+    """All BOMs that wait, by part number; archived assemblies wait for nobody.
+
+    Reads only what a list of them is filtered and sorted by: there may be thousands.
+    """
+    unreferenced, conflicts, gaps = _unreferenced(tx), conflicts_in(tx), _gaps(tx)
+    row, last, nobody = items.c, bom_last_syncs.c, Told()
+    query = (
+        select(row.id, row.part_number, row.name, row.bom_version, last.folder, last.document_file, last.at)
+        .outerjoin_from(items, bom_last_syncs, last.parent_id == row.id)
+        .where(one_of(tx, row.id, {*unreferenced, *conflicts, *gaps}), row.archived_at.is_(None))
+    )
+    found = [
+        Waiting(
+            *(number, name, version, folder or "", file or "", at),
+            *(conflicts.get(one, nobody), unreferenced[one], *gaps.get(one, (0, 0))),
         )
-    return sorted(rows, key=lambda row: row.item.part_number.casefold())
+        for one, number, name, version, folder, file, at in tx.conn.execute(query)
+    ]
+    return sorted(found, key=lambda one: one.part_number.casefold())
 
 
 def waiting_count(tx: Tx) -> int:
     """How many BOMs wait."""
-    ids = {*_unreferenced(tx), *conflicts_in(tx), *_incomplete(tx)}
-    if not ids:
-        return 0
-    alive = (
-        select(func.count())
-        .select_from(items)
-        .where(one_of(tx, items.c.id, ids), items.c.archived_at.is_(None))
-    )
+    unreferenced = select(bom_lines.c.parent_id).where(text(f"bom_lines.{UNREFERENCED}"))
+    incomplete = select(bom_last_syncs.c.parent_id).where(text(f"({INCOMPLETE})"))
+    disputed = select(items.c.id).where(one_of(tx, items.c.id, conflicts_in(tx)))
+    ids = union(unreferenced, incomplete, disputed)
+    alive = select(func.count()).select_from(items).where(items.c.id.in_(ids), items.c.archived_at.is_(None))
     return tx.conn.scalar(alive) or 0
 
 
-def _mark(item: Item, conflicts: Mapping[int, tuple[float, str]]) -> str:
+def _mark(version: int, conflicts: Told) -> str:
     # A sync that only brings other conflicts changes no line, and so not the version.
     told = repr(sorted((child, said[0]) for child, said in conflicts.items()))
-    return f"{item.bom_version}-{hashlib.sha256(told.encode()).hexdigest()[:16]}"
+    return f"{version}-{hashlib.sha256(told.encode()).hexdigest()[:16]}"
 
 
 def lines_for(tx: Tx, part_number: str, action: Action, seen: str) -> tuple[list[Line], list[Line]]:
@@ -476,7 +478,7 @@ def lines_for(tx: Tx, part_number: str, action: Action, seen: str) -> tuple[list
         lines = list(found.unreferenced)
         gone = lines if action is Action.REMOVE else []
     conflicts = {one.line.child_id: (one.cad_quantity, one.since) for one in found.conflicts}
-    if lines and seen != _mark(found.parent, conflicts):
+    if lines and seen != _mark(found.parent.bom_version, conflicts):
         raise VersionConflictError(f"the BOM of {part_number} is not as it was seen")
     return lines, gone
 
@@ -495,5 +497,13 @@ def _unreferenced(tx: Tx) -> Counter[int]:
     return Counter({row[0]: row[1] for row in tx.conn.execute(query.group_by(bom_lines.c.parent_id))})
 
 
-def _incomplete(tx: Tx) -> Sequence[int]:
-    return tx.conn.scalars(select(bom_last_syncs.c.parent_id).where(text(f"({INCOMPLETE})"))).all()
+def _gaps(tx: Tx) -> dict[int, tuple[int, int]]:
+    """By BOM how much its last sync left out: what is registered or cannot be, and what is not yet."""
+    row = bom_last_syncs.c
+    query = select(row.parent_id, row.left_out, row.refused_at).where(text(f"({INCOMPLETE})"))
+    found: dict[int, tuple[int, int]] = {}
+    for parent_id, left_out, refused_at in tx.conn.execute(query):
+        reasons = [one["reason"] for one in json.loads(left_out)]
+        missing = reasons.count(Reason.UNREGISTERED)
+        found[parent_id] = len(reasons) + bool(refused_at) - missing, missing
+    return found

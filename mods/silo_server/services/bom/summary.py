@@ -9,7 +9,7 @@ that after a change only the way up is made again. Only ``component`` lines are 
 which only says so. What is kept of the item and of all that it is in goes in the same transaction
 (``db.engine``). A read makes what is missing from its own snapshot. A thread keeps it later, under the lock
 of the event log, and only what no event since that snapshot concerns: so nothing that is kept is old, and
-looking changes nothing.
+looking changes nothing. What is too large for a read, the thread makes bottom up.
 
 **Always closed.** If an assembly is kept, so are all assemblies in it; so what is not kept has nothing kept
 above it, and outdating an item stops there.
@@ -22,16 +22,18 @@ the sub-assembly states ``mass_kg``, that stands for the whole of it. Cost: each
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from decimal import Decimal
-from itertools import chain, islice, zip_longest
+from itertools import chain, zip_longest
 from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, delete, or_, select
 
-from silo.bom.errors import CycleError, counted
+from silo.bom.errors import BusyError, CycleError, counted
 from silo.bom.numbers import as_decimal, exact_product, exact_sum
 from silo_server import events
 from silo_server.db.engine import EVENT_LOCK, Database, Tx, insert_rows, one_of, uses_of
@@ -47,13 +49,15 @@ from silo_server.db.tables import events as event_log
 from silo_server.services.bom.lines import newer_exists, select_lines, to_line
 from silo_server.services.bom.merge import NEVER, last_syncs
 from silo_server.services.bom.tree import MAX_DEPTH, Graph, Part, conflicts_in, currency_of, positive_number
-from silo_server.settings import TooLargeError, stamp
+from silo_server.settings import stamp
 from silo_server.values import Item, Line, dumps, names_of
 
 # So many items without a value are named; the others are counted.
 MOST_NAMED = 12
-# So many assemblies are made at once if all are made.
-BATCH = 500
+# Assemblies with so many lines are made at once if a part of a product is kept after the other.
+BATCH_LINES = 20_000
+# A list of items sums up what has so many lines in all.
+MOST_FOR_A_LIST = 2000
 SAME_LOOK = timedelta(hours=1)
 # [s] Its waits and its statements.
 LONGEST_CHANGE = 300
@@ -186,8 +190,14 @@ class Built(NamedTuple):
     rows: Sequence[Mapping[str, Any]]
 
 
+class Unmade(NamedTuple):
+    """Products (internal ids) that are too large for one read to make."""
+
+    item_ids: Collection[int]
+
+
 def summary_of(tx: Tx, item: Item) -> Summary:
-    """The summary of one product. Raises CycleError, TooLargeError (more lines below than may be read)."""
+    """The summary of one product. Raises CycleError, BusyError (it is too large, and made meanwhile)."""
     return summaries(tx, [item.id])[item.id]
 
 
@@ -195,7 +205,21 @@ def summaries(tx: Tx, item_ids: Collection[int]) -> dict[int, Summary]:
     """The summaries of these items, by internal id: what is kept, and what is made for it."""
     wanted = set(item_ids)
     found = dict(_kept(tx, wanted))
-    return found | {one: node.summary for one, node in _make(tx, wanted - found.keys()).items()}
+    made = _make(tx, wanted - found.keys(), tx.settings.max_expanded_rows)
+    return found | {one: node.summary for one, node in made.items()}
+
+
+def marks_of(tx: Tx, listed: Iterable[Item]) -> dict[int, list[str]]:
+    """Say what is open in each of these products, for a list of them.
+
+    So that no list waits for large products, those have no mark before the server has summed them up.
+    """
+    wanted = {item.id for item in listed if item.item_type == "assembly" or item.bom_version}
+    found = dict(_kept(tx, wanted))
+    with suppress(BusyError, CycleError):
+        made = _make(tx, wanted - found.keys(), MOST_FOR_A_LIST)
+        found |= {one: node.summary for one, node in made.items()}
+    return {one: summary.inside(one, is_open=False) for one, summary in found.items()}
 
 
 class Below(NamedTuple):
@@ -224,11 +248,11 @@ def _kept(tx: Tx, item_ids: Collection[int]) -> Iterator[tuple[int, Summary]]:
         yield item_id, _summary(written)
 
 
-def _make(tx: Tx, wanted: Collection[int]) -> dict[int, _Node]:
-    """Make the nodes of these items, from the lines of what is not kept below them."""
+def _make(tx: Tx, wanted: Collection[int], most: int | None = None) -> dict[int, _Node]:
+    """Make the nodes of these items, from the lines of what is not kept below them, at most so many."""
     if not wanted:
         return {}
-    lines, nodes = _lines_below(tx, wanted)
+    lines, nodes = _lines_below(tx, wanted, most)
     children = {line.child_id for below in lines.values() for line in below}
     own = _own(tx, {*wanted, *lines, *children} - nodes.keys())
     maker = _Maker(lines, nodes, own, _open(tx, lines, own), _bom_changes(tx, lines))
@@ -248,22 +272,28 @@ def _followed(line: Line) -> bool:
     return line.state.rel_type == "component"
 
 
-def _lines_below(tx: Tx, wanted: Collection[int]) -> tuple[dict[int, list[Line]], dict[int, _Node]]:
+def _lines_below(
+    tx: Tx, wanted: Collection[int], most: int | None
+) -> tuple[dict[int, list[Line]], dict[int, _Node]]:
     """The lines of these items and of all below them, down to what is kept; and the latter."""
     lines: dict[int, list[Line]] = {}
     nodes: dict[int, _Node] = {}
-    level, seen, most, count = set(wanted), set(wanted), tx.settings.max_expanded_rows, 0
+    level, seen, count = set(wanted), set(wanted), 0
     while level:
         query = select_lines().where(one_of(tx, bom_lines.c.parent_id, level))
-        ordered = query.order_by(bom_lines.c.parent_id, bom_lines.c.position).limit(most - count + 1)
+        ordered = query.order_by(bom_lines.c.parent_id, bom_lines.c.position)
+        if most is not None:
+            ordered = ordered.limit(most - count + 1)
         below: set[int] = set()
         with tx.conn.execute(ordered, execution_options={"yield_per": 2000}) as rows:
             for row in rows:
                 count += 1
-                if count > most:
-                    raise TooLargeError(
+                if most is not None and count > most:
+                    if tx.built is not None:
+                        tx.built.append(Unmade(wanted))
+                    raise BusyError(
                         f"there are more than {most} different lines in this product that are not summed up "
-                        "yet; look at its sub-assemblies, or have silo-mod summaries sum all up"
+                        "yet. The server sums them up now: ask again in a minute, or look at a sub-assembly"
                     )
                 line = to_line(row)
                 lines.setdefault(line.parent_id, []).append(line)
@@ -465,10 +495,18 @@ def _node(row: Any) -> _Node:
     return _Node(_summary(row.summary), parts, no_mass, no_cost, assemblies)
 
 
-def keep_summaries(db: Database) -> None:
-    """Keep what reads have made, but for what an event since then concerns; nobody waits for it."""
+def keep_summaries(db: Database, ended: Callable[[], bool] = lambda: False) -> None:
+    """Keep what reads have made, but for what an event since then concerns; nobody waits for it.
+
+    ended
+        says whether to stop before a product that no read could make is made whole.
+    """
     while db.built:
         built = db.built.popleft()
+        if isinstance(built, Unmade):
+            with suppress(CycleError):  # the read that asked says so
+                _keep_below(db, built.item_ids, ended=ended)
+            continue
         with db.write(even_when_read_only=True) as tx:
             tx.lock(EVENT_LOCK)
             _keep(tx, built)
@@ -495,25 +533,67 @@ def keep_all(db: Database, report: Callable[[str], None] = lambda _: None) -> in
         tx.lock(EVENT_LOCK)
         tx.conn.execute(delete(product_summaries))
     with db.read() as tx:
-        row = items.c
-        names = dict(tx.conn.execute(select(row.id, row.part_number)).all())
-        products = set(tx.conn.scalars(select(row.id).where(row.item_type == "assembly")))
+        products = set(tx.conn.scalars(select(items.c.id).where(items.c.item_type == "assembly")))
         products |= set(tx.conn.scalars(select(bom_lines.c.parent_id).distinct()))
-        below: dict[int, list[int]] = {}
+    return _keep_below(db, products, report)
+
+
+def _keep_below(
+    db: Database,
+    wanted: Collection[int],
+    report: Callable[[str], None] = lambda _: None,
+    ended: Callable[[], bool] = lambda: False,
+) -> int:
+    """Make and keep what is not kept of these products, a part after the other; return how many.
+
+    However large a product is, so a read has only to read what is kept.
+    """
+    below: dict[int, list[int]] = {}
+    counts: Counter[int] = Counter()
+    with db.read() as tx:
         line = bom_lines.c
-        edges = select(line.parent_id, line.child_id).where(line.rel_type == "component")
-        with tx.conn.execute(edges, execution_options={"yield_per": 5000}) as rows:
-            for parent_id, child_id in rows:
-                if child_id in products:
-                    below.setdefault(parent_id, []).append(child_id)
-    order, done = _children_first(below, sorted(products), names), 0
-    while part := list(islice(order, BATCH)):
+        kept = select(product_summaries.c.item_id)
+        known = tx.conn.scalars(kept.where(one_of(tx, product_summaries.c.item_id, wanted)))
+        level = set(wanted).difference(known)
+        unmade = set(level)
+        while level:
+            query = select(line.parent_id, line.child_id, line.rel_type)
+            query = query.where(one_of(tx, line.parent_id, level), line.child_id.not_in(kept))
+            level = set()
+            with tx.conn.execute(query, execution_options={"yield_per": 5000}) as rows:
+                for parent_id, child_id, rel_type in rows:
+                    counts[parent_id] += 1
+                    if rel_type == "component":
+                        below.setdefault(parent_id, []).append(child_id)
+                        level.add(child_id)
+            level -= unmade
+            unmade |= level
+        number_of = select(items.c.id, items.c.part_number).where(one_of(tx, items.c.id, below))
+        names = dict(tx.conn.execute(number_of).all())
+    order, done = list(_children_first(below, sorted(unmade & {*wanted, *below}), names)), 0
+    for part in _parts(order, counts):
+        if ended():
+            break
         with db.read() as tx:
-            summaries(tx, part)
-        keep_summaries(db)
+            _make(tx, part)
+        keep_summaries(db, ended)
         done += len(part)
-        report(f"{done} of {len(products)} assemblies")
+        report(f"{done} of {len(order)} assemblies")
     return done
+
+
+def _parts(order: Iterable[int], counts: Mapping[int, int]) -> Iterator[list[int]]:
+    """The assemblies, as many at a time as have :data:`BATCH_LINES` lines in all."""
+    part: list[int] = []
+    lines = 0
+    for one in order:
+        if part and lines + counts[one] > BATCH_LINES:
+            yield part
+            part, lines = [], 0
+        part.append(one)
+        lines += counts[one]
+    if part:
+        yield part
 
 
 def last_look(tx: Tx, user_id: int, item: Item) -> str | None:

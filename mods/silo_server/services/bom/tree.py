@@ -154,24 +154,17 @@ def conflicts_in(tx: Tx, parent_ids: Collection[int] | None = None) -> dict[int,
         of these BOMs only; None: of all.
     """
     told, line = bom_conflicts.c, bom_lines.c
-    asked = select(told.parent_id, told.child_id, told.cad_quantity, told.since).where(~told.accepted)
+    # An outer join begins with the few that are asked about: else SQLite reads all lines, for each page.
+    theirs = (line.parent_id == told.parent_id) & (line.child_id == told.child_id)
+    whose = theirs & (line.rel_type == "component") & (line.source == "manual")
+    query = select(told.parent_id, told.child_id, told.cad_quantity, told.since, line.quantity, line.unit)
+    query = query.outerjoin_from(bom_conflicts, bom_lines, whose).where(~told.accepted)
     if parent_ids is not None:
-        asked = asked.where(one_of(tx, told.parent_id, parent_ids))
-    said = {(row.parent_id, row.child_id): (row.cad_quantity, row.since) for row in tx.conn.execute(asked)}
-    if not said:
-        return {}
-    # The few that are asked about first: else SQLite reads all lines, for each page.
-    query = select(line.parent_id, line.child_id, line.quantity, line.unit).where(
-        one_of(tx, line.parent_id, {parent for parent, _ in said}),
-        one_of(tx, line.child_id, {child for _, child in said}),
-        line.source == "manual",
-        line.rel_type == "component",
-    )
+        query = query.where(one_of(tx, told.parent_id, parent_ids))
     found: dict[int, Told] = {}
-    for row in tx.conn.execute(query):
-        known = said.get((row.parent_id, row.child_id))
-        if known is not None and not says_the_same(known[0], row.quantity, row.unit):
-            found.setdefault(row.parent_id, {})[row.child_id] = known
+    for parent_id, child_id, cad_quantity, since, quantity, unit in tx.conn.execute(query):
+        if quantity is not None and not says_the_same(cad_quantity, quantity, unit):
+            found.setdefault(parent_id, {})[child_id] = (cad_quantity, since)
     return found
 
 
@@ -272,16 +265,17 @@ def flatten(graph: Graph, closed: Collection[int] = ()) -> list[FlatRow]:
     needs: dict[int, tuple[Exact, Exact, bool]] = {graph.root.id: (1, 0, False)}
     totals: dict[tuple[int, str | None], tuple[Exact, Exact, bool]] = {}
     shown: dict[tuple[int, str | None], Line] = {}
-    for item_id in order_of(graph):
+    components = {item_id: graph.components(item_id) for item_id in order_of(graph)}
+    for item_id, lines in components.items():
         if item_id not in needs:
             continue  # below a closed one only
         factor, lost, disputed = needs[item_id]
-        for line in graph.components(item_id):
+        for line in lines:
             amount = multiplied(factor, line)
             gone = amount if line.state.unreferenced_since else multiplied(lost, line)
             unsure = disputed or graph.told(line) is not None
             key = (line.child_id, line.state.unit)
-            below = line.child_id not in closed and graph.components(line.child_id)
+            below = line.child_id not in closed and components.get(line.child_id)
             before = needs.get(line.child_id, nothing) if below else totals.get(key, nothing)
             sums = added(before[0], amount, line), added(before[1], gone, line), before[2] or unsure
             if below:
