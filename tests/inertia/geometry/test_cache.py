@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -236,7 +237,7 @@ def test_another_kernel_is_another_key(tmp_path: Path, monkeypatch: pytest.Monke
     path.write_bytes(b"content")
     options = ReadOptions().content_options()
     before = key_of(path, options)
-    monkeypatch.setattr("silo.inertia.geometry.read.KERNELS", ("numpy",))
+    monkeypatch.setattr(sys.modules["silo.inertia.geometry.read"], "KERNELS", ("numpy",))
     assert key_of(path, options) != before
 
 

@@ -267,6 +267,7 @@ def _reading(path: Path, options: ReadOptions, report: Report, helpers: Helpers)
         from silo.inertia.geometry.step.text import begin
 
         text = begin(path, options, helpers)
+        import silo.inertia.geometry.kernel  # noqa: F401 - first: it says what is wrong with it
         from silo.inertia.geometry.step.read import read_step
 
         return read_step(path, options, report, helpers, text)
