@@ -26,6 +26,7 @@ from silo.platform import (
     limit_this_process,
     own_the_port,
     patiently,
+    shows_locks,
     swap,
 )
 
@@ -231,7 +232,7 @@ def test_files_are_replaced_and_removed_patiently() -> None:
     """On Windows another program may have a file open for a moment, so nobody asks only once."""
     hasty = re.compile(r"\.unlink\(|os\.(?:replace|rename|remove|unlink)\(")
     # The lock's own file is held by us, and waits for nobody.
-    there = {ASKED_THERE, MODS / "silo" / "vault" / "job.py"}
+    there = {ASKED_THERE, MODS / "silo" / "files.py"}
     found = [
         f"{path.relative_to(MODS)}:{number}: {line.strip()}"
         for path in MODS.rglob("*.py")
@@ -362,3 +363,28 @@ def test_a_file_that_is_open_elsewhere_is_waited_for_on_windows(tmp_path: Path) 
     waited: list[float] = []
     patiently(lambda: swap(str(new), str(old), merge=lambda *_: answers.pop(0)), wait=waited.append)
     assert (answers, len(waited)) == ([], 2)
+
+
+def test_disks_that_keep_locks_to_themselves(tmp_path: Path) -> None:
+    """By the kind of disk that the path is on, as Linux lists it; elsewhere, and in doubt, locks are seen."""
+    mounts = tmp_path / "mounts"
+    here = os.path.realpath(tmp_path)
+    mounts.write_text(
+        "21 1 8:1 / / rw,relatime shared:1 - ext4 /dev/sda1 rw\n"
+        f"22 21 0:40 / {here}/far\\040away rw - fuse.sshfs me@there: rw\n"
+        f"23 22 0:41 / {here}/far\\040away/disk rw shared:2 - nfs4 there:/disk rw\n"
+        f"24 21 0:42 / {here}/stick rw - fuseblk /dev/sdb1 rw\n"
+    )
+    names = (
+        "far away/a.lock",
+        "far away/disk/a.lock",
+        "far away",
+        "stick/a.lock",
+        "far awayer/a.lock",
+        "a.lock",
+    )
+    seen = [shows_locks(os.path.join(here, name), str(mounts)) for name in names]
+    assert seen == [False, True, False, True, True, True]
+    assert shows_locks(here, str(tmp_path / "no such list"))
+    mounts.write_text("odd\n")
+    assert shows_locks(here, str(mounts))

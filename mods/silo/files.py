@@ -1,22 +1,27 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""FreeCAD files on disk: which are meant, and their content's hash. Standard library only."""
+"""FreeCAD files on disk: which are meant, their content's hash, and whose turn a folder is. Standard library
+only."""
 
 from __future__ import annotations
 
+import errno
+import getpass
 import glob
 import hashlib
 import json
 import os
+import socket
 import time
 from codecs import BOM_UTF8
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, fields
 from itertools import chain
 from pathlib import Path
+from typing import BinaryIO
 
 from silo.bom.errors import ConfigError, DocumentError, InputError
-from silo.platform import Spelling, hold_lock, one_path, read_memory, replacing
+from silo.platform import Spelling, cache_folder, hold_lock, one_path, read_memory, replacing, shows_locks
 
 IGNORE_FILE = ".siloignore"
 
@@ -190,7 +195,7 @@ class Project:
     def note(self, known: Mapping[str, Kept | None]) -> None:
         """Remember these files, None to forget one. Raises DocumentError where the folder takes nothing."""
         try:
-            with self._alone():
+            with folder_lock(self.root, f"{PROJECT_FILE}.lock", "written", _PATIENCE_S):
                 files = {place: asdict(kept) for place, kept in self.files().items() if place not in known}
                 files |= {place: asdict(kept) for place, kept in known.items() if kept is not None}
                 with replacing(Path(self.root, PROJECT_FILE), mode=0o644) as out:
@@ -200,16 +205,93 @@ class Project:
                 os.path.join(self.root, PROJECT_FILE), f"cannot be written ({error.strerror or error})"
             ) from error
 
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Held while the file is read and written: two commits may run side by side."""
-        path, until = os.path.join(self.root, f"{PROJECT_FILE}.lock"), time.monotonic() + _PATIENCE_S
-        while (lock := hold_lock(path)) is None:
-            if time.monotonic() > until:
-                raise OSError(f"{path}: another program holds it and does not end")
-            time.sleep(0.02)
-        with lock:
-            yield
+
+@contextmanager
+def folder_lock(folder: str, name: str, doing: str, patience: float = 0.0) -> Iterator[str]:
+    """Hold a folder alone; gives why other computers do not see that, "" where they do.
+
+    The lock is a file in the folder, as far as its disk carries locks, else it lies in the user's cache. It
+    ends with its process, however that ends; a file that a killed process left behind holds nothing.
+
+    name, doing
+        the lock's file; what is done to the folder ("synced"), for the message to another process.
+
+    Raises InputError with the name of who holds it, after ``patience`` seconds.
+    """
+    path, problem = os.path.join(one_path(folder), name), ""
+    try:
+        held = _held(path, folder, doing, patience)
+        with suppress(OSError):
+            os.chmod(path, 0o666)  # the next one may be another user
+        if not shows_locks(path):
+            problem = "its disk shows locks to this computer alone"
+    except FileNotFoundError:  # no such folder: nobody else is in it
+        yield problem
+        return
+    except OSError as error:
+        problem = error.strerror or str(error)
+        inner = cache_folder() / "locks" / f"{hashlib.sha256(os.fsencode(path)).hexdigest()[:32]}.lock"
+        try:
+            inner.parent.mkdir(parents=True, exist_ok=True)
+            path = str(inner)
+            held = _held(path, folder, doing, patience)
+        except OSError:  # nowhere to lock at all
+            yield problem
+            return
+    with held:
+        held.truncate(0)
+        held.write(f"{_who()} since {time.strftime('%Y-%m-%d %H:%M:%S')}\n".encode())
+        held.flush()
+        with suppress(OSError):  # NFS keeps it here otherwise
+            os.fsync(held.fileno())
+        try:
+            yield problem
+        finally:
+            removed = _remove(path)  # before the lock ends: see _held
+    if not removed:  # Windows deletes no file that is open
+        _remove(path)
+
+
+def _remove(path: str) -> bool:
+    """Return whether it is gone. One that stays holds nothing, so nobody waits for it."""
+    try:
+        os.unlink(path)
+    except FileNotFoundError:
+        pass
+    except OSError:
+        return False
+    return True
+
+
+def _who() -> str:
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError):  # a container without a user of this number
+        user = "an unnamed user"
+    return f"process {os.getpid()} of {user} on {socket.gethostname()}"
+
+
+def _held(path: str, folder: str, doing: str, patience: float) -> BinaryIO:
+    """Return the locked file. Raises InputError where another process has it, OSError where nobody can."""
+    if os.path.islink(path):  # somebody else's file may be behind it
+        raise OSError(errno.ELOOP, f"{path} is a symbolic link")
+    until = time.monotonic() + patience
+    while True:
+        if (held := hold_lock(path)) is not None:
+            # Its last holder may have deleted the file while we waited for the lock.
+            with suppress(OSError):
+                if os.path.samestat(os.fstat(held.fileno()), os.lstat(path)):
+                    return held
+            held.close()
+        elif time.monotonic() >= until:
+            try:
+                who = Path(path).read_text(encoding="utf-8", errors="replace").strip()
+            except OSError:  # it has ended just now
+                who = ""
+            raise InputError(
+                f"{folder} is being {doing} by {who or 'another process'}. Wait for it, or stop it."
+            )
+        time.sleep(0.02 if patience else 0)
 
 
 def job_text(env: Mapping[str, str]) -> str | None:

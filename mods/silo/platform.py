@@ -261,6 +261,27 @@ def hold_lock(path: str | os.PathLike[str], *, shared: bool = False) -> BinaryIO
         raise
 
 
+def shows_locks(path: str, mounts: str = "/proc/self/mountinfo") -> bool:
+    """True where other computers that share the disk see a lock on it. FUSE and the folders of virtual
+    machines keep locks to themselves, without an error.
+
+    mounts
+        the system's list of what is mounted where (proc(5)); systems without that share locks.
+    """
+    kinds = {"/": ""}
+    with (
+        suppress(OSError, ValueError, IndexError),
+        open(mounts, encoding="utf-8", errors="surrogateescape") as file,
+    ):
+        for line in file:
+            words = line.split()
+            place = re.sub(r"\\(\d{3})", lambda found: chr(int(found[1], 8)), words[4])
+            kinds[place] = words[words.index("-") + 1]
+    real = os.path.realpath(path)
+    place = max((one for one in kinds if one == "/" or f"{real}/".startswith(f"{one}/")), key=len)
+    return not (kinds[place].startswith("fuse.") or kinds[place] in ("9p", "vboxsf", "virtiofs"))
+
+
 def _is_locked_on_windows(descriptor: int) -> bool | None:
     try:
         import msvcrt

@@ -483,6 +483,11 @@ class FakeSilo(FakeStore):
             self._keep("item", idempotency_key, said, item.id)
             return stored.item
 
+    def archive_item(self, part_number: str, /) -> None:
+        with self._changing("archive_item"):
+            del self.items[self._stored(part_number).item.part_number.casefold()]
+            self._announce("item.deleted", {"part_number": part_number})
+
     def update_item(self, part_number: str, /, **changes: Any) -> Item:
         wanted = body(ItemChanges, changes, "an item")
         with self._changing("update_item"):

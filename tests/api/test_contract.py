@@ -530,3 +530,12 @@ def test_a_file_without_an_item_is_used_by_what_links_to_it(silo: Silo, tmp_path
     assert silo.get_document(sheet).used_by == []
     with pytest.raises(NotFoundError):
         silo.get_document(str(uuid4()))
+
+
+def test_an_archived_item_is_found_no_more(silo: Silo) -> None:
+    number = make(silo, "Orphan")
+    item = silo.get_item(number)
+    silo.archive_item(number)
+    assert silo.get_item_by_uuid(item.id) is None
+    with pytest.raises(NotFoundError):
+        silo.archive_item(number)

@@ -6,6 +6,7 @@ Whatever happens, and however often a plain user repeats a command, the server h
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import queue
 import random
@@ -493,3 +494,58 @@ def test_a_silo_without_documents_gets_each_file_where_it_can(tmp_path: Path) ->
         assert sorted(line["child_part_number"] for line in items["T"].lines) == sorted(
             [items["L"].part_number, items["R"].part_number]
         )
+
+
+# -- one folder, two computers ---------------------------------------------------------------------
+
+
+def register_elsewhere(top: str, url: str, home: str) -> int:
+    """Register a project as another computer does, with data of its own; how many errors it reports."""
+    for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME"):
+        os.environ[name] = home
+    extraction = read_assembly(top)
+    with SiloClient(url, TOKEN, timeout=60) as client:
+        proposals = proposals_for(extraction, client, client.find_schema("kindred-rd"))
+        return sum(r.error is not None for r in register_all(proposals, client, schema="kindred-rd"))
+
+
+@pytest.mark.parametrize("moods", [Moods(), Moods(own_ids=False)], ids=["its own ids", "our ids"])
+@pytest.mark.parametrize("locks", [True, False], ids=["locks", "no locks"])
+def test_two_computers_register_one_folder_once(
+    tmp_path: Path, moods: Moods, locks: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both read the folder before either of them registers. Without locks the file itself is the place."""
+    with real_silo(moods) as silo:
+        desk = Desk(tmp_path, silo)
+        jobs = [(str(desk.top), silo.url, str(tmp_path / f"computer {n}")) for n in range(2)]
+        if locks:
+            with multiprocessing.get_context("spawn").Pool(2) as pool:
+                assert pool.starmap(register_elsewhere, jobs) == [0, 0]
+        else:
+            for folder in {path.parent for path in desk.top.parent.rglob("*.FCStd")}:
+                (folder / ".silo-register.lock").mkdir()
+            monkeypatch.setattr(os, "environ", dict(os.environ))
+            assert [register_elsewhere(*job) for job in jobs] == [0, 0]
+        assert (len(silo.items), set(silo.holds().values())) == (NAMES, {1})
+        assert desk.register() == []
+        with desk.client() as client:
+            assert resolve(read_assembly(str(desk.top)), client).unresolved == ()
+
+
+@pytest.mark.parametrize("moods", [Moods(), Moods(own_ids=False)], ids=["its own ids", "our ids"])
+def test_a_project_moves_from_a_trial_server_to_the_real_one(tmp_path: Path, moods: Moods) -> None:
+    """By identity, with the UUIDs if the server takes them. A second computer finds what this one took."""
+    with real_silo(Moods(own_ids=False)) as trial, real_silo(moods) as real:
+        desk = registered(tmp_path, trial)
+        before = {item.description: item.id for item in trial.items.values()}
+        shutil.copytree(desk.top.parent, tmp_path / "another" / "gearbox")
+        desk.silo = real
+        assert desk.register() == []
+        assert (len(real.items), set(real.holds().values())) == (NAMES, {1})
+        if not moods.own_ids:
+            assert {item.description: item.id for item in real.items.values()} == before
+        with desk.client() as client:
+            assert resolve(read_assembly(str(desk.top)), client).unresolved == ()
+        top = str(tmp_path / "another" / "gearbox" / desk.top.name)
+        assert register_elsewhere(top, real.url, str(tmp_path / "computer 2")) == 0
+        assert (len(real.items), set(real.holds().values())) == (NAMES, {1})

@@ -29,6 +29,7 @@ from silo.registering.on_disk import carry_out_on_disk, proposals_for
 from silo.registering.orders import Order
 from silo.registering.table import ITEM_TYPES
 from silo.testing import FakeSilo
+from silo_server.run import running_server
 
 CATEGORIES = {"A01": "Assembly", "F01": "Fastener, screw", "M01": "Machined part", "M06": "Machined frame"}
 
@@ -399,12 +400,18 @@ def test_probable_duplicates_are_not_made_in_silence(
     assert (len(joined["registered"]), len(silo.client.search_items())) == (9, 9)
 
 
-def test_a_lost_identity_comes_back_without_a_question(run: Any, silo: Any, gearbox: Path) -> None:
-    """FreeCAD saved its own copy over the stamped file; its item is its own, no duplicate."""
+def test_a_lost_identity_comes_back_by_one_word(run: Any, silo: Any, gearbox: Path) -> None:
+    """FreeCAD saved its own copy over the stamped file, or a copy of the part lies there: nobody but a person
+    knows. Nothing is taken and nothing is made before the answer."""
     before = gearbox.read_bytes()
     assert run("register", gearbox, "--yes").code == 0
     gearbox.write_bytes(before)
-    done = run("register", gearbox, "--yes", "--json").json()
+    asked = run("register", gearbox, "--yes", "--json")
+    assert (asked.code, gearbox.read_bytes() == before) == (1, True)
+    (failed,) = asked.json()["failed"]
+    assert "The same part, or a copy of it?" in failed["error"]["message"]
+    assert "--unclear take" in failed["error"]["message"]
+    done = run("register", gearbox, "--yes", "--unclear", "take", "--json").json()
     assert ([row["found"] for row in done["registered"]], done["unregistered"]) == ([True], [])
     assert len(silo.client.search_items()) == 9
 
@@ -413,10 +420,53 @@ def test_an_interrupted_registration_goes_on_without_a_question(run: Any, silo: 
     """Killed between the item and the file: the item of the same name is its own, no duplicate."""
     path = part("Bracket", "Body").save(tmp_path / "Bracket.FCStd")
     entry = read_assembly(str(path)).assembly
-    intent, _ = Journal().begin(component_key(entry), silo.client.base_url)
+    intent, _ = Journal().begin(component_key(entry))
     made = silo.client.create_item("kindred-rd", "M01", "Bracket", idempotency_key=intent.wanted)
     (row,) = run("register", path, "--yes", "--json").json()["registered"]
     assert (row["part_number"], row["found"]) == (made.part_number, True)
+
+
+def test_an_item_that_no_file_names_is_named(run: Any, silo: Any, tmp_path: Path) -> None:
+    """Of this folder alone; registering takes it, or a person puts it out of use."""
+    paths = [part(name, "Body").save(tmp_path / name / f"{name}.FCStd") for name in ("Bracket", "Cover")]
+    for path in paths:
+        entry = read_assembly(str(path)).assembly
+        intent, _ = Journal().begin(component_key(entry))
+        silo.client.create_item("kindred-rd", "M01", path.stem, idempotency_key=intent.wanted)
+    Journal().begin(f"{tmp_path}/Never.FCStd#Body")
+    listed = run("register", tmp_path, "--orphans", "list", "--json")
+    assert (listed.code, [row["name"] for row in listed.json()["orphans"]]) == (1, ["Bracket", "Cover"])
+    text = run("register", paths[0], "--orphans", "list").out
+    assert (f"M01-0001  Bracket  {paths[0]}#" in text, "Cover" in text) == (True, False)
+    assert len(run("register", paths[0], "--orphans", "archive", "--json").json()["archived"]) == 1
+    assert [item.name for item in silo.client.search_items()] == ["Cover"]
+    assert run("register", paths[1], "--yes").code == 0
+    assert run("register", tmp_path, "--orphans", "list", "--json").json()["orphans"] == []
+    assert len(silo.client.search_items()) == 1
+
+
+def test_a_project_of_another_server_is_taken_over_when_a_person_says_so(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Never by --yes, which knows nothing of where an identity is from; the UUIDs stay."""
+    database = f"sqlite:///{tmp_path / 'trial.db'}"
+    with running_server(database, token=silo.token) as trial, monkeypatch.context() as patch:
+        patch.setenv("SILO_API_URL", trial.base_url)
+        assert run("register", gearbox, "--yes").code == 0
+    before = gearbox.read_bytes()
+    left = run("register", gearbox, "--yes", "--json")
+    assert (left.code, len(left.json()["unregistered"])) == (1, 9)
+    assert all("another server" in row["note"] for row in left.json()["unregistered"])
+    assert "register --adopt" in run("register", gearbox, "--yes").out
+    assert silo.client.search_items() == []
+    table = planned(run, gearbox, tmp_path / "plan.csv")
+    assert {row["register"] for row in table} == {"no"}
+    new = part("New", "Body").save(gearbox.parent / "parts" / "New.FCStd")
+    done = run("register", gearbox, "--adopt", "--json").json()
+    assert (len(done["registered"]), done["failed"], done["unregistered"]) == (9, [], [])
+    assert (gearbox.read_bytes(), len(silo.client.search_items())) == (before, 9)
+    assert "has its part number already" in run("register", gearbox, "--yes").out
+    assert run("register", new, "--adopt").code == 1, "it carries no identity"
 
 
 def test_a_category_that_is_not_there_is_bad_input(run: Any, silo: Any, gearbox: Path) -> None:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from other_disk import other_disk
 
 from silo.bom.errors import DocumentError
-from silo.bom.model import identity_of
+from silo.bom.model import document_identity, identity_of
 from silo.fcstd import check_stampable, open_document, stamp, unstamp
 from silo.fcstd.container import ContainerFile, FileState, Limits
 from silo.fcstd.stamp import _read_back, replace_file, replaced_entry
@@ -149,10 +149,25 @@ def test_a_property_that_would_go_first_is_an_identity_too(tmp_path: Path) -> No
     path = (
         Doc(extra={"SiloUUID": "u-1"}).add("Part::Box", "Box", SiloItemId="u-3").save(tmp_path / "part.FCStd")
     )
-    assert "SiloUUID is another identity already: u-1" in refused(path, replace=True)
+    assert "SiloUUID is another identity already: u-1" in refused(path)
     assert "SiloItemId is another identity already: u-3" in refused(path, object_name="Box")
     assert stamp(path, "u-1")
     assert stamp(path, "u-3", object_name="Box")
+
+
+def test_replacing_reaches_every_place_of_an_identity(tmp_path: Path) -> None:
+    """A part that FreeCAD registered carries its identity in properties too, which go before Meta."""
+    doc = Doc(extra={"SiloUUID": "u-1"}).add("Part::Box", "Box", SiloItemId="u-1", SiloUUID="u-1")
+    path = doc.add("Part::Box", "Other", SiloItemId="u-9").save(tmp_path / "part.FCStd")
+    check_stampable(path, item_object="Box", replace=True)
+    assert stamp(path, "u-2", item_object="Box", replace=True)
+    document = open_document(path)
+    names = ("Box", "Other")
+    assert (document_identity(document), *(identity_of(document.getObject(name)) for name in names)) == (
+        *("u-2", "u-2"),
+        "u-9",
+    )
+    assert stamp(path, "u-2", item_object="Box", replace=True) is False
 
 
 def test_an_object_that_is_not_there(tmp_path: Path) -> None:
@@ -454,7 +469,7 @@ def test_the_object_names_its_item_too(tmp_path: Path) -> None:
         assert after.count(word) == before.count(word) + more
     assert stamp(path, "u-1", item_object="Box") is False
     with pytest.raises(DocumentError, match="SiloItemId is another identity"):
-        stamp(path, "u-2", item_object="Box", replace=True)
+        stamp(path, "u-2", item_object="Box")
     with pytest.raises(DocumentError, match="no object named"):
         check_stampable(tmp_path / "a.FCStd", item_object="Gone")
 

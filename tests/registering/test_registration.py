@@ -6,6 +6,7 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -30,7 +31,7 @@ from silo.bom.errors import (
 from silo.bom.model import BomEntry
 from silo.bom.resolve import propose
 from silo.fcstd import Library, stamp
-from silo.registering.items import REGISTRATION_PROPERTY, component_key, register
+from silo.registering.items import REGISTRATION_PROPERTY, Registration, component_key, register
 from silo.registering.journal import Journal
 
 ENTRY = BomEntry(doc_path="/v/bracket.FCStd", object_name="Body", document_label="Bracket")
@@ -274,8 +275,8 @@ def simple_document(path: Path, uid: str = "11111111-2222-4333-8444-555555555555
     return path.read_bytes()
 
 
-def test_an_identity_that_was_saved_over_is_written_again(journal: Journal, tmp_path: Path) -> None:
-    """FreeCAD had the file open while it was registered: the same document, the same item."""
+def test_an_identity_that_was_saved_over_is_a_question(journal: Journal, tmp_path: Path) -> None:
+    """FreeCAD had the file open while it was registered, or a copy lies in its place: both look the same."""
     path = tmp_path / "bracket.FCStd"
     before = simple_document(path)
     proposal = replace(PROPOSAL, entry=replace(ENTRY, doc_path=str(path)))
@@ -286,7 +287,10 @@ def test_an_identity_that_was_saved_over_is_written_again(journal: Journal, tmp_
 
     first = register(proposal, api, journal, write)
     path.write_bytes(before)  # FreeCAD saves what it has in memory
-    again = register(proposal, api, Journal(journal.path), write)
+    asked = register(proposal, api, Journal(journal.path), write)
+    assert "M01-0001 may be its item" in str(asked.error)
+    assert (path.read_bytes(), len(api.items)) == (before, 1)
+    again = register(proposal, api, Journal(journal.path), write, ask=lambda _p, found: found[0])
     assert (again.item_id, again.found, len(api.items)) == (first.item_id, True, 1)
     with Library() as library:
         assert library.open(str(path)).Meta["SiloUUID"] == first.item_id
@@ -310,8 +314,7 @@ def test_another_document_in_the_same_place_gets_an_item_of_its_own(journal: Jou
 def _many(path: str, first: int, count: int) -> None:
     journal = Journal(Path(path))
     for number in range(first, first + count):
-        with journal.turn():
-            journal.begin(f"part {number}")
+        journal.begin(f"part {number}")
 
 
 def test_two_processes_keep_all_their_intents(journal: Journal) -> None:
@@ -330,24 +333,193 @@ def test_two_runs_for_one_component_make_one_item(journal: Journal, tmp_path: Pa
     path = tmp_path / "bracket.FCStd"
     simple_document(path)
     proposal = replace(PROPOSAL, entry=replace(ENTRY, doc_path=str(path)))
-    api, files = Items(), Files()
+    api = Items()
+
+    def write(entry: BomEntry, identity: str) -> None:
+        stamp(entry.doc_path, identity)
+
     with ThreadPoolExecutor(2) as pool:
-        done = list(pool.map(lambda _: register(proposal, api, Journal(journal.path), files.stamp), range(2)))
+        done = list(pool.map(lambda _: register(proposal, api, Journal(journal.path), write), range(2)))
     assert (len(api.items), len({result.item_id for result in done})) == (1, 1)
 
 
-def test_a_turn_that_never_ends_is_reported(journal: Journal) -> None:
-    """With words, not with a traceback."""
-    impatient = Journal(journal.path, patience=0.05)
-    with journal.turn(), pytest.raises(InputError, match="another registration"), impatient.turn():
-        pass
+def test_a_turn_that_never_ends_is_reported(tmp_path: Path) -> None:
+    """With words, not with a traceback; it is that of one folder, whatever the server of another does."""
+    one, other = (Journal(tmp_path / name, patience=0.0) for name in ("one", "another computer"))
+    (tmp_path / "slow").mkdir()
+    (tmp_path / "healthy").mkdir()
+    with one.turn(str(tmp_path / "slow" / "a.FCStd")) as unseen:
+        assert unseen == ""
+        with other.turn(str(tmp_path / "healthy" / "a.FCStd")):
+            pass
+        busy = other.turn(str(tmp_path / "slow" / "b.FCStd"))
+        with pytest.raises(InputError, match="slow is being registered by process"), busy:
+            pass
+    assert list((tmp_path / "slow").iterdir()) == []
 
 
-def test_a_slow_server_holds_nobody_up_at_another(tmp_path: Path) -> None:
-    """Each server has a turn of its own; two projects at one server take turns."""
-    journal, other = (Journal(tmp_path / "registrations", patience=0.0) for _ in range(2))
-    with journal.turn("http://slow"):
-        with other.turn("http://healthy"):
-            pass
-        with pytest.raises(InputError, match="another registration runs"), other.turn("http://slow"):
-            pass
+# -- another computer ------------------------------------------------------------------------------
+
+
+class Shared:
+    """One file on a shared disk, and a server that calls :attr:`between` while it makes an item.
+
+    lockable
+        others see the folder's lock.
+    """
+
+    def __init__(self, folder: Path, *, own_ids: bool = False, lockable: bool = False) -> None:
+        self.path = folder / "shared" / "bracket.FCStd"
+        self.path.parent.mkdir()
+        simple_document(self.path)
+        if not lockable:
+            (self.path.parent / ".silo-register.lock").mkdir()
+        self.proposal = replace(PROPOSAL, entry=replace(ENTRY, doc_path=str(self.path)))
+        self.api = Items(own_ids=own_ids)
+        self.folder = folder
+
+    def journal(self, computer: str) -> Journal:
+        return Journal(self.folder / computer / "journal", patience=0.0)
+
+    @staticmethod
+    def write(entry: BomEntry, identity: str) -> None:
+        stamp(entry.doc_path, identity, replace=bool(entry.silo_uuid))
+
+    def register(self, computer: str, **how: Any) -> Registration:
+        """As that computer, which has read the file before anybody registered it."""
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("XDG_CACHE_HOME", str(self.folder / computer))
+            return register(self.proposal, self.api, self.journal(computer), self.write, **how)
+
+    @property
+    def identity(self) -> str | None:
+        with Library() as library:
+            return library.open(str(self.path)).Meta.get("SiloUUID")
+
+
+@pytest.mark.parametrize("own_ids", [False, True])
+def test_where_nobody_sees_a_lock_the_file_has_the_identity_first(tmp_path: Path, own_ids: bool) -> None:
+    """The second computer asks while the first one's item is made: it makes none, and says what to do."""
+    shared = Shared(tmp_path, own_ids=own_ids)
+    inside: list[Registration] = []
+    create = shared.api.create_item
+
+    def between(*args: Any, **more: Any) -> Mapping[str, Any]:
+        assert shared.identity == more["idempotency_key"]
+        inside.append(shared.register("second"))
+        return create(*args, **more)
+
+    shared.api.create_item = between  # type: ignore[method-assign]
+    first = shared.register("first")
+    assert (first.error, shared.identity) == (None, first.item_id)
+    assert "--adopt takes it over" in str(inside[0].error)
+    second = shared.register("second")
+    assert (second.item_id, second.found, len(shared.api.items)) == (first.item_id, True, 1)
+    assert shared.journal("second").pending() == shared.journal("first").pending() == {}
+
+
+@pytest.mark.parametrize("own_ids", [False, True])
+@pytest.mark.parametrize("lost", [Crash(), RejectedError("no")], ids=["crash", "refused"])
+def test_what_was_reserved_in_the_file_is_continued(
+    tmp_path: Path, own_ids: bool, lost: BaseException
+) -> None:
+    """By the computer that did it: its journal knows the identity, so this is no file of another server."""
+    shared = Shared(tmp_path, own_ids=own_ids)
+    shared.api.before = lost  # type: ignore[assignment]
+    with suppress(Crash):
+        shared.register("first")
+    (reserved,) = shared.journal("first").pending().values()
+    assert shared.identity == reserved
+    shared.api.before = None
+    shared.proposal = replace(shared.proposal, entry=replace(shared.proposal.entry, silo_uuid=reserved))
+    done = shared.register("first")
+    assert (done.error, len(shared.api.items), shared.identity) == (None, 1, done.item_id)
+    assert own_ids or done.item_id == reserved
+
+
+def test_who_writes_the_file_last_has_it(tmp_path: Path) -> None:
+    """Two computers may write at one moment; who finds another identity than its own makes no item."""
+    shared = Shared(tmp_path)
+    other = shared.api.create_item(
+        "s", "M01", "Bracket", idempotency_key="11111111-2222-4333-8444-999999999999"
+    )
+
+    def write(entry: BomEntry, identity: str) -> None:
+        stamp(entry.doc_path, identity, replace=True)
+        if identity != other["id"]:
+            stamp(entry.doc_path, str(other["id"]), replace=True)
+
+    done = register(shared.proposal, shared.api, shared.journal("first"), write)
+    assert (done.item_id, done.found, len(shared.api.items)) == (other["id"], True, 1)
+    assert shared.journal("first").pending() == {}
+
+
+def test_a_folder_that_another_computer_registers_is_left_alone(tmp_path: Path) -> None:
+    """The lock is held from the look at the file to its identity."""
+    shared = Shared(tmp_path, lockable=True)
+    inside: list[Registration] = []
+    create = shared.api.create_item
+
+    def between(*args: Any, **more: Any) -> Mapping[str, Any]:
+        assert shared.identity is None
+        inside.append(shared.register("second"))
+        return create(*args, **more)
+
+    shared.api.create_item = between  # type: ignore[method-assign]
+    first = shared.register("first")
+    assert "is being registered by process" in str(inside[0].error)
+    assert (shared.register("second").item_id, len(shared.api.items)) == (first.item_id, 1)
+
+
+@pytest.mark.parametrize("own_ids", [False, True])
+def test_an_identity_of_another_server_becomes_that_of_the_item(tmp_path: Path, own_ids: bool) -> None:
+    """The file is written only where the server chose another one. A server that refuses leaves no intent."""
+    shared = Shared(tmp_path, own_ids=own_ids, lockable=True)
+    known = "AAAAAAAA-2222-4333-8444-555555555555"
+    stamp(shared.path, known)
+    before = shared.path.read_bytes()
+    shared.proposal = replace(shared.proposal, entry=replace(shared.proposal.entry, silo_uuid=known))
+    shared.api.before = RejectedError("no")
+    assert isinstance(shared.register("first").error, RejectedError)
+    assert (shared.journal("first").pending(), shared.path.read_bytes() == before) == ({}, True)
+    shared.api.before = None
+    done = shared.register("first")
+    assert done.item_id == ("own-0" if own_ids else known.lower())
+    assert shared.identity == ("own-0" if own_ids else known)
+    assert (shared.path.read_bytes() == before) is not own_ids
+    assert shared.journal("first").pending() == {}
+
+
+def test_an_identity_that_is_no_uuid_gives_way(tmp_path: Path) -> None:
+    """No server takes it for an item's."""
+    shared = Shared(tmp_path, lockable=True)
+    stamp(shared.path, "part nö 7")
+    shared.proposal = replace(shared.proposal, entry=replace(shared.proposal.entry, silo_uuid="part nö 7"))
+    done = shared.register("first")
+    assert (done.error, shared.identity, len(str(done.item_id))) == (None, done.item_id, 36)
+
+
+def test_a_copy_gets_an_identity_of_its_own(tmp_path: Path) -> None:
+    """A person said that it is no more the part whose identity it carries."""
+    shared = Shared(tmp_path, lockable=True)
+    part = shared.api.create_item(
+        "s", "M01", "Bracket", idempotency_key="11111111-2222-4333-8444-999999999999"
+    )
+    stamp(shared.path, str(part["id"]))
+    shared.proposal = replace(
+        shared.proposal, entry=replace(shared.proposal.entry, silo_uuid=str(part["id"]))
+    )
+    done = shared.register("first", copy=True)
+    assert (shared.identity, len(shared.api.items), done.found) == (done.item_id, 2, False)
+    assert done.item_id != part["id"]
+
+
+def test_an_intent_that_an_earlier_run_began_stays_after_a_refusal(journal: Journal) -> None:
+    """That run's item may be there all the same, under a name that this one's question did not find."""
+    api, files = Items(), Files()
+    api.before = UnreachableError("gone")
+    register(PROPOSAL, api, journal, files.stamp)
+    intended = journal.pending()
+    api.before = RejectedError("no")
+    assert isinstance(register(PROPOSAL, api, journal, files.stamp).error, RejectedError)
+    assert journal.pending() == intended

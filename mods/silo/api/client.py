@@ -303,6 +303,10 @@ class ItemCalls(FileCalls):
             return self.get_item(content.part_number or part_number)
         return reply.model(Item)
 
+    def archive_item(self, part_number: str, /) -> None:
+        """Put an item out of use; the server keeps it, and what names it."""
+        self._delete(f"item {part_number}", "items", part_number)
+
     def generate_part_number(self, schema: str, category: str) -> str:
         """The number that the next item of this category would get: a preview, nothing is reserved."""
         wanted = body(NumberBody, {"schema": schema, "category": category}, "a part number")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """``silo-mod register``: items for components without a number, and the identity into their files.
 
-Asked one by one, as a table to edit (``--plan``, ``--apply``), or all at once (``--yes``).
+Asked one by one, as a table to edit (``--plan``, ``--apply``), or all at once (``--yes``). ``--adopt`` takes
+over what another server knows, ``--orphans`` names the items that no file names.
 
 The questions of ``silo-mod register`` on a terminal, one component at a time.
 
@@ -194,6 +195,17 @@ def add_register(parser: argparse.ArgumentParser) -> None:
     common.add_top(parser)
     how = parser.add_mutually_exclusive_group()
     how.add_argument("--yes", action="store_true", help="take every proposal without asking")
+    how.add_argument(
+        "--adopt",
+        action="store_true",
+        help="take over what was registered on another server: an item for each identity that this server "
+        "does not know, with the same UUID",
+    )
+    how.add_argument(
+        "--orphans",
+        choices=("list", "archive"),
+        help="the items of interrupted registrations, which no file names: list or archive them",
+    )
     how.add_argument("--plan", metavar="FILE", help="write the proposals as a table (CSV) to edit; no more")
     how.add_argument("--apply", metavar="FILE", help="register what an edited table says")
     parser.add_argument(
@@ -212,8 +224,8 @@ def add_register(parser: argparse.ArgumentParser) -> None:
         "--unclear",
         choices=("ask", "take", "new"),
         default="ask",
-        help="an interrupted run may have made the item, and the server does not show for which part: "
-        "ask (default), take it where only one fits, or make a new one",
+        help="an item may be that of a part: made by an interrupted run, or registered from this document "
+        "before (which may be a copy now): ask (default), take it where only one fits, or make a new one",
     )
     parser.add_argument(
         "--declare",
@@ -250,7 +262,9 @@ def add_register(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Register what is unregistered; 1 where something was skipped or failed."""
     taken = args.undeclare or args.not_a_part
-    if not (args.yes or args.plan or args.apply or taken or sys.stdin.isatty()):
+    if args.orphans:
+        return _orphans(args)
+    if not (args.yes or args.adopt or args.plan or args.apply or taken or sys.stdin.isatty()):
         raise InputError(
             "register asks before it creates items, and there is nobody to ask here; say --yes, "
             "or write a table with --plan FILE, edit it, and use it with --apply FILE"
@@ -369,7 +383,7 @@ class _Run:
         if self.args.apply:
             planned = orders_of(rows, self.found, self.base, self.client, self.args.apply)
             return self.register(planned.orders, planned.unlisted, already=planned.done)
-        if self.args.yes:
+        if self.args.yes or self.args.adopt:
             return self.register(*self.all_but_duplicates(unused))
         counted = (one for one in self.found.candidates if one.article is None)
         offered = [one for one in counted if one.entry.doc_path not in unused]
@@ -408,8 +422,11 @@ class _Run:
             if one.article is not None or one.same_as or one.entry.doc_path in unused:
                 continue
             earlier.add(one)
-            doubtful = bool(doubts(one, earlier)) and not is_own(one)
-            if not doubtful or self.args.duplicates == "new":
+            told, is_foreign = doubts(one, earlier), one.foreign and not is_own(one)
+            doubtful = len(told) > one.foreign and not is_own(one)
+            if is_foreign != self.args.adopt:
+                left.append(one)
+            elif not doubtful or self.args.duplicates == "new":
                 orders.append(Order.of(one))
             elif self.args.duplicates == "join" and len(one.similar) == 1:
                 orders.append(replace(Order.of(one), existing=one.similar[0]))
@@ -507,8 +524,33 @@ def _undeclare(args: argparse.Namespace) -> int:
     return Exit.DONE
 
 
+def _orphans(args: argparse.Namespace) -> int:
+    """List the items that no file names, or archive them; 1 where some are left."""
+    journal, rows, done = Journal(), [], args.orphans == "archive"
+    base = os.path.join(os.path.realpath(args.top), "")
+    with common.client_of(args) as client:
+        for record in journal.unfinished():
+            if not os.path.join(record.component.rpartition("#")[0], "").startswith(base):
+                continue
+            found = filter(None, map(client.get_item_by_uuid, {record.item_id, record.wanted}))
+            if (item := next(found, None)) is None:
+                continue
+            if done:
+                client.archive_item(item.part_number)
+                journal.forget(record.component)
+            rows.append({"part_number": item.part_number, "name": item.name, "component": record.component})
+    if args.json:
+        common.print_json({"archived" if done else "orphans": rows})
+    for row in rows if not args.json else ():
+        print(*map(plain, (row["part_number"], row["name"], row["component"])), sep="  ")
+    if rows and not done:
+        words = "registering these files again takes the items; --orphans archive puts them out of use"
+        print(f"silo-mod: {words}", file=sys.stderr)
+    return Exit.UNDONE if rows and not done else Exit.DONE
+
+
 def _asker(how: str) -> Ask:
-    """Which of the items that fit an interrupted run made: as ``--unclear`` says."""
+    """Which of the items that fit is the component's: as ``--unclear`` says."""
 
     def ask(proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
         if how == "new":
@@ -520,7 +562,7 @@ def _asker(how: str) -> Ask:
                 return unclear(proposal, found)
             except ConflictError as error:
                 raise ConflictError(f"{error}: --unclear take, or --unclear new") from None
-        print(f"{proposal.name}: an interrupted run may have made its item already:", file=sys.stderr)
+        print(f"{proposal.name}: is it one of these items? A copy of it is not.", file=sys.stderr)
         for number, item in enumerate(found, start=1):
             print(f"  {number}  {item['part_number']}  {item.get('created_at') or ''}", file=sys.stderr)
         answer = input("which one is it? [number, n = make a new item] ").strip()

@@ -256,6 +256,9 @@ Registered = _shape(
     modelled=_many(Modelled),
 )
 Undeclared = _shape("Undeclared", undeclared=list[str])
+Orphan = _shape("Orphan", part_number=str, name=str, component=_said(str, "file#object that it was made for"))
+Orphans = _shape("Orphans", orphans=_many(Orphan))
+Archived = _shape("Archived", archived=_many(Orphan))
 PulledFile = _shape(
     "PulledFile",
     path=str,
@@ -368,7 +371,7 @@ SHAPES: dict[str, Any] = {
     "where-used": WhereUsed,
     "relink": Relinked,
     "sync": Sync,
-    "register": Registered | Undeclared,
+    "register": Registered | Undeclared | Orphans | Archived,
     "commit": Committed,
     "status": ProjectStatus,
     "pull": Pulled,

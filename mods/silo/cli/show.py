@@ -297,6 +297,8 @@ def registrations(
         reason = f" ({plain(why)})" if why else ""
         text = f"⚠ {plain(where)}: unregistered, left out of the BOM{reason}"
         out.print(text, style="yellow", markup=False)
+    if any(proposal.entry.silo_uuid and not proposal.entry.is_standard for proposal, _ in left):
+        out.print("Are these parts of another server? silo-mod register --adopt takes them over.")
     if args.yes and any(why for _, why in left):
         out.print(
             "Is it the same part? --duplicates join takes the item, --duplicates new makes another; "

@@ -252,7 +252,7 @@ def stamp(
         the object that is the component: it gets the property ``SiloItemId`` too, by which a Silo finds the
         documents that are its own.
     replace
-        write over another identity of the same key.
+        write over another identity.
 
     Raises DocumentError: the file cannot be read or written, is read-only, was changed meanwhile, carries
     another identity, or has no such object. The file is then as it was.
@@ -266,7 +266,8 @@ def stamp(
         if _present(real, state, identity, object_name, replace, limits, item_object):
             return False
         check_writable(real)
-        content = replaced_entry(container, *_stamped_xml(container, key, identity, limits, item_object))
+        xml = _stamped_xml(container, key, identity, limits, item_object, replace)
+        content = replaced_entry(container, *xml)
     replace_file(real, state, content, lambda copy: _read_back(real, copy, key, identity))
     return True
 
@@ -288,7 +289,7 @@ def check_stampable(
     with ContainerFile(real, limits) as container:
         _present(real, container.state, "", object_name, replace, limits, item_object)
         check_writable(real)
-        _stamped_xml(container, meta_key(object_name or ""), "0" * 36, limits, item_object)
+        _stamped_xml(container, meta_key(object_name or ""), "0" * 36, limits, item_object, replace)
 
 
 def unstamp(
@@ -360,11 +361,11 @@ def _present(
             if obj is None:
                 raise DocumentError(path, f"it holds no object named {wanted!r}")
             places += [(obj, "SiloItemId"), (obj, "SiloUUID")]
-        for owner, name in places:
-            # A property of its own goes before Meta, so Meta would have no effect beside another one.
-            own = _text_of(owner, name)
-            if own and own.lower() != identity.lower():
-                raise DocumentError(path, f"its own property {name} is another identity already: {own}")
+        # A property of its own goes before Meta, so Meta would have no effect beside another one.
+        others = {name: own for owner, name in places if (own := _text_of(owner, name))}
+        others = {name: own for name, own in others.items() if own.lower() != identity.lower()}
+        for name, own in others.items() if not replace else ():
+            raise DocumentError(path, f"its own property {name} is another identity already: {own}")
         item = document.getObject(item_object) if item_object else None
         named = item is None or bool(_text_of(item, "SiloItemId"))
         present = document.Meta.get(meta_key(object_name or ""), "").strip()
@@ -372,7 +373,7 @@ def _present(
     if present and not same and not replace:
         what = META_KEY if object_name is None else f"{META_KEY} of {object_name}"
         raise DocumentError(path, f"it carries another identity already ({what}): {present}")
-    return same and named
+    return same and named and not others
 
 
 def _text_of(owner: object, name: str) -> str:
@@ -381,13 +382,15 @@ def _text_of(owner: object, name: str) -> str:
 
 
 def _stamped_xml(
-    container: ContainerFile, key: str, identity: str, limits: Limits, item_object: str | None
+    container: ContainerFile, key: str, identity: str, limits: Limits, item_object: str | None, replace: bool
 ) -> tuple[Entry, bytes]:
     """The entry Document.xml, and its content as it is to become."""
 
     def edit(text: bytes) -> bytes:
-        own = {"SiloItemId": _ITEM_ID % in_attribute(identity).encode()}
-        return _edited(text, {key: identity}, item_object, own, limits.depth)
+        gone = ("SiloUUID",) if replace else ()
+        own = {**dict.fromkeys(gone), "SiloItemId": _ITEM_ID % in_attribute(identity).encode()}
+        whole = gone if key == META_KEY else ()
+        return _edited(text, {key: identity}, item_object, own, limits.depth, whole)
 
     return edited_xml(container, edit, limits)
 
@@ -422,10 +425,10 @@ def _edited(
     object_name: str | None,
     properties: Mapping[str, bytes | None],
     depth_limit: int,
+    whole: Iterable[str] = (),
 ) -> bytes:
-    """The text with these keys in ``Meta``, and these properties on the object; None takes one away.
-
-    Raises ValueError where it cannot be edited (says why).
+    """The text with these keys in ``Meta``, and these properties on the object; without those of the
+    ``whole`` document. None takes one away. Raises ValueError where it cannot be edited (says why).
     """
     if xmltext.as_utf8(text) is not text:
         raise Malformed("is not in UTF-8")
@@ -433,7 +436,12 @@ def _edited(
     if head.properties is None:
         raise Malformed("has no document properties")
     edits: list[tuple[Span, Callable[[bytes], bytes]]]
-    edits = [(head.properties, lambda element: _with_meta(element, meta, depth_limit))]
+    edits = [
+        (
+            head.properties,
+            lambda e: _with_all(_with_meta(e, meta, depth_limit), dict.fromkeys(whole), depth_limit),
+        )
+    ]
     if object_name is not None:
         if object_name not in data:
             raise Malformed(f"has no data of the object {object_name!r}")

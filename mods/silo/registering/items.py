@@ -6,15 +6,23 @@ item shall have, is on disk before the server is asked; the identity is in the f
 finished. Whatever is interrupted, the next run finds the intent and looks for the item that it may have made:
 by its UUID, by the property that carries it, and, where a server shows neither, among the items of the same
 description that were made since. Where that leaves a doubt, a person is asked.
+
+All of that happens under the lock of the file's folder, and with the identity that the file has then:
+another computer may have registered it. Where others do not see that lock, the file itself carries the
+identity before the server is asked.
+
+A file may carry an identity that the server does not know, from another server or from another computer's
+run. Its item gets that identity; what brings such a file here has asked a person.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Protocol
+from uuid import UUID
 
 from silo.bom.errors import (
     BusyError,
@@ -26,7 +34,7 @@ from silo.bom.errors import (
     SiloError,
     UnreachableError,
 )
-from silo.bom.model import BomEntry
+from silo.bom.model import BomEntry, document_identity, own_identity
 from silo.bom.resolve import Proposal
 from silo.registering.journal import Journal, Record
 from silo.standard_items import Memory, by_description, server_of
@@ -89,25 +97,29 @@ def component_key(entry: BomEntry) -> str:
     return f"{path}#{entry.object_name}"
 
 
-def document_uid(entry: BomEntry) -> str:
-    """FreeCAD's UUID of the component's document, as it is on disk; "" where it cannot be read."""
+def on_disk(entry: BomEntry, *, shares_file: bool = False) -> tuple[str, str]:
+    """FreeCAD's UUID of the component's document, and the component's identity, as they are on disk; "" for
+    none, and where the file cannot be read."""
     from silo.fcstd import Library
 
     if not os.path.isfile(entry.doc_path):
-        return ""
+        return "", ""
     try:
         with Library() as library:
-            return str(library.open(entry.doc_path).Uid)
+            document = library.open(entry.doc_path)
+            obj = document.getObject(entry.object_name) if entry.object_name else None
+            found = own_identity(obj) if obj is not None else None
+            return str(document.Uid), found or ("" if shares_file else document_identity(document) or "")
     except DocumentError:
-        return ""
+        return "", ""
 
 
 def unclear(proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """The answer where nobody can be asked: an error that names the items."""
     numbers = ", ".join(str(item["part_number"]) for item in found)
     raise ConflictError(
-        f"{proposal.name}: an interrupted run may have made {numbers} for it (same description, made since). "
-        "Look at that, then take it or make a new item"
+        f"{proposal.name}: {numbers} may be its item: made by an interrupted run, or registered from this "
+        "document before. The same part, or a copy of it? Look at that, then take it or make a new item"
     )
 
 
@@ -121,6 +133,7 @@ def register(
     properties: Mapping[str, Any] | None = None,
     check: Check = lambda _entry: None,
     ask: Ask = unclear,
+    copy: bool = False,
 ) -> Registration:
     """Register one component; an error is returned, not raised, so that the others are still registered.
 
@@ -128,104 +141,160 @@ def register(
         further properties of the first revision, such as the file's hash.
     check, ask
         see :data:`Check` and :data:`Ask`.
+    copy
+        the identity that it carries is another part's; it gets its own.
     """
-    component = component_key(proposal.entry)
     try:
-        check(proposal.entry)
-        with journal.turn(str(getattr(api, "base_url", ""))):
-            uid = document_uid(proposal.entry)
-            item, found = _lost(api, journal, component, uid), True
-            if item is None:
-                item, found = _item(proposal, api, journal, schema, properties or {}, ask)
-            item_id = str(item["id"])
-            stamp(proposal.entry, item_id)
-            journal.done(component, uid or document_uid(proposal.entry))
+        with journal.turn(proposal.entry.doc_path) as unseen:
+            run = _Run(proposal, api, journal, stamp, schema, properties or {}, ask, unseen)
+            item, found = run.item(check, copy)
     except SiloError as error:
         return Registration(proposal, error=error)
-    return Registration(proposal, part_number=str(item["part_number"]), item_id=item_id, found=found)
+    return Registration(proposal, part_number=str(item["part_number"]), item_id=str(item["id"]), found=found)
 
 
-def _lost(api: RegistrationApi, journal: Journal, component: str, uid: str) -> Mapping[str, Any] | None:
-    """The item of a document that was registered before and lost its identity: FreeCAD saved over it."""
-    record = journal.find(component)
-    if record is None or not record.finished or not uid or record.document_uid != uid:
-        return None
-    return api.get_item_by_uuid(record.item_id)
+@dataclass(frozen=True)
+class _Run:
+    """The registration of one component, while nobody else registers anything in its folder.
 
+    unseen
+        why other computers do not see that; "" where they do.
+    """
 
-def _item(
-    proposal: Proposal,
-    api: RegistrationApi,
-    journal: Journal,
-    schema: str,
-    properties: Mapping[str, Any],
-    ask: Ask,
-) -> tuple[Mapping[str, Any], bool]:
-    """The component's item, and whether it was there already."""
-    component = component_key(proposal.entry)
-    intent, begun = journal.begin(component, str(getattr(api, "base_url", "")))
-    item = _made_before(proposal, api, journal, intent, ask) if begun else None
-    found = item is not None
-    if item is None:
-        mark = {} if getattr(api, "keeps_item_ids", False) else {REGISTRATION_PROPERTY: intent.wanted}
-        try:
-            item = api.create_item(
-                schema,
-                proposal.category,
-                proposal.name,
-                item_type=proposal.item_type,
-                properties={**properties, **mark},
-                idempotency_key=intent.wanted,
+    proposal: Proposal
+    api: RegistrationApi
+    journal: Journal
+    stamp: Stamp
+    schema: str
+    properties: Mapping[str, Any]
+    ask: Ask
+    unseen: str
+
+    @property
+    def component(self) -> str:
+        return component_key(self.proposal.entry)
+
+    def item(self, check: Check, copy: bool) -> tuple[Mapping[str, Any], bool]:
+        """The component's item, which its file names, and whether it was there already."""
+        entry = self.proposal.entry
+        uid, now = on_disk(entry, shares_file=self.proposal.shares_file)
+        carried = entry.silo_uuid or ""
+        if now and now.lower() != carried.lower():
+            return self._registered_meanwhile(now), True
+        check(entry)
+        item = None if copy or carried else self._lost(uid)
+        if item is not None:
+            self.stamp(entry, str(item["id"]))
+            self.journal.done(self.component, uid)
+            return item, True
+        wanted = "" if copy else _as_uuid(carried)
+        intent, begun = self.journal.begin(self.component, wanted)
+        if self.unseen and not wanted:
+            # Where others see the file alone, it has the identity before the item is made.
+            wanted = intent.wanted
+            self.stamp(entry, wanted)
+            _, now = on_disk(entry, shares_file=self.proposal.shares_file)
+            if now and now.lower() != wanted:
+                self.journal.forget(self.component)
+                return self._registered_meanwhile(now), True
+            entry = replace(entry, silo_uuid=wanted)
+        item, found = self._made(intent, begun, wanted)
+        item_id = str(item["id"])
+        if item_id.lower() != wanted:
+            self.stamp(entry, item_id)
+        self.journal.done(self.component, uid or on_disk(entry)[0])
+        return item, found
+
+    def _registered_meanwhile(self, identity: str) -> Mapping[str, Any]:
+        """The item that somebody gave the component since it was read."""
+        entry = self.proposal.entry
+        item = self.api.get_item_by_uuid(identity)
+        if item is None:
+            raise ConflictError(
+                f"{self.proposal.name}: {entry.doc_path} carries the identity {identity} now, and this "
+                "server has no such item: another computer registers it just now, or at another server. Wait "
+                "for that and register again; --adopt takes it over"
             )
-        except SiloError as error:
-            if not _may_have_arrived(error):
-                if not begun:
-                    journal.forget(component)
-                raise
-            item = _after_a_lost_answer(proposal, api, journal, intent, ask, error)
-    if str(item["id"]) != intent.item_id:
-        journal.replace(component, str(item["id"]))
-    return item, found
+        self.stamp(entry, identity)  # an open document does not have it yet
+        return item
+
+    def _lost(self, uid: str) -> Mapping[str, Any] | None:
+        """The item of a document that was registered before and lost its identity, if a person says so:
+        FreeCAD saved over it, or a copy lies in its place, which has the same UUID."""
+        record = self.journal.find(self.component)
+        if record is None or not record.finished or not uid or record.document_uid != uid:
+            return None
+        item = self.api.get_item_by_uuid(record.item_id)
+        return None if item is None else self.ask(self.proposal, (item,))
+
+    def _made(self, intent: Record, begun: bool, wanted: str) -> tuple[Mapping[str, Any], bool]:
+        """The component's item, and whether it was there already."""
+        proposal, api = self.proposal, self.api
+        item = self._made_before(intent) if begun or wanted else None
+        found = item is not None
+        if item is None:
+            mark = {} if getattr(api, "keeps_item_ids", False) else {REGISTRATION_PROPERTY: intent.wanted}
+            try:
+                item = api.create_item(
+                    self.schema,
+                    proposal.category,
+                    proposal.name,
+                    item_type=proposal.item_type,
+                    properties={**self.properties, **mark},
+                    idempotency_key=intent.wanted,
+                )
+            except SiloError as error:
+                if not _may_have_arrived(error):
+                    if not begun and not (self.unseen and intent.wanted != proposal.entry.silo_uuid):
+                        self.journal.forget(self.component)
+                    raise
+                item = self._after_a_lost_answer(intent, error)
+        if str(item["id"]) != intent.item_id:
+            self.journal.replace(self.component, str(item["id"]))
+        return item, found
+
+    def _after_a_lost_answer(self, intent: Record, error: SiloError) -> Mapping[str, Any]:
+        try:
+            item = self._made_before(intent)
+        except ConflictError:
+            raise
+        except SiloError:
+            raise error from None  # The way is still broken: the first reason says more.
+        if item is None:
+            raise error
+        return item
+
+    def _made_before(self, intent: Record) -> Mapping[str, Any] | None:
+        """The item that this intent made, if it came that far."""
+        api = self.api
+        for known in dict.fromkeys((intent.item_id, intent.wanted)):
+            item = api.get_item_by_uuid(known)
+            if item is not None:
+                return item
+        if getattr(api, "keeps_item_ids", False):
+            return None  # This server gives an item the UUID that we ask for, so there is none.
+        others = self.journal.item_ids() - {intent.item_id}
+        doubtful: dict[str, Mapping[str, Any]] = {}
+        for item in _of_the_same_name(self.proposal, api, intent.begun_at):
+            mark = _mark(api, item)
+            if mark == intent.wanted:
+                return item
+            if mark is None and str(item["id"]) not in others:
+                doubtful[str(item["id"])] = item
+        return self.ask(self.proposal, tuple(doubtful.values())) if doubtful else None
+
+
+def _as_uuid(identity: str) -> str:
+    """Return an identity as servers write it; "" where it is no UUID, so that its item gets another."""
+    try:
+        return str(UUID(identity))
+    except ValueError:
+        return ""
 
 
 def _may_have_arrived(error: SiloError) -> bool:
     put_off = isinstance(error, (NotSentError, BusyError))
     return isinstance(error, (UnreachableError, ServerFaultError)) and not put_off
-
-
-def _after_a_lost_answer(
-    proposal: Proposal, api: RegistrationApi, journal: Journal, intent: Record, ask: Ask, error: SiloError
-) -> Mapping[str, Any]:
-    try:
-        item = _made_before(proposal, api, journal, intent, ask)
-    except ConflictError:
-        raise
-    except SiloError:
-        raise error from None  # The way is still broken: the first reason says more.
-    if item is None:
-        raise error
-    return item
-
-
-def _made_before(
-    proposal: Proposal, api: RegistrationApi, journal: Journal, intent: Record, ask: Ask
-) -> Mapping[str, Any] | None:
-    """The item that this intent made, if it came that far."""
-    for known in dict.fromkeys((intent.item_id, intent.wanted)):
-        item = api.get_item_by_uuid(known)
-        if item is not None:
-            return item
-    if getattr(api, "keeps_item_ids", False):
-        return None  # This server gives an item the UUID that we ask for, so there is none.
-    others = journal.item_ids() - {intent.item_id}
-    doubtful: dict[str, Mapping[str, Any]] = {}
-    for item in _of_the_same_name(proposal, api, intent.begun_at):
-        mark = _mark(api, item)
-        if mark == intent.wanted:
-            return item
-        if mark is None and str(item["id"]) not in others:
-            doubtful[str(item["id"])] = item
-    return ask(proposal, tuple(doubtful.values())) if doubtful else None
 
 
 def _of_the_same_name(proposal: Proposal, api: RegistrationApi, since: float) -> Iterator[Mapping[str, Any]]:

@@ -8,16 +8,17 @@ must be found again then.
 
 from __future__ import annotations
 
-import hashlib
+import os
 import sqlite3
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from silo.bom.errors import InputError
+from silo.files import folder_lock
 from silo.platform import data_folder, private_file, private_folder
 
 _TABLE = """
@@ -25,13 +26,12 @@ CREATE TABLE IF NOT EXISTS registrations (
     component TEXT PRIMARY KEY,
     wanted TEXT NOT NULL,
     item_id TEXT NOT NULL,
-    server TEXT NOT NULL DEFAULT '',
     document_uid TEXT NOT NULL DEFAULT '',
     begun_at REAL NOT NULL,
     finished_at REAL
 )
 """
-_COLUMNS = "component, wanted, item_id, server, document_uid, begun_at, finished_at"
+_COLUMNS = "component, wanted, item_id, document_uid, begun_at, finished_at"
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,6 @@ class Record:
     component: str
     wanted: str
     item_id: str
-    server: str
     document_uid: str
     begun_at: float
     finished_at: float | None
@@ -74,103 +73,83 @@ class Journal:
 
     def pending(self) -> dict[str, str]:
         """``file#object`` → the UUID that its item was to get, or has."""
-        with self._open() as db:
-            rows = db.execute("SELECT component, item_id FROM registrations WHERE finished_at IS NULL")
-            return dict(rows.fetchall())
+        return {record.component: record.item_id for record in self.unfinished()}
+
+    def unfinished(self) -> list[Record]:
+        """The registrations whose file does not name its item yet, oldest first."""
+        return self._records("finished_at IS NULL ORDER BY begun_at")
 
     def find(self, component: str) -> Record | None:
         """What is known of a component."""
-        with self._open() as db:
-            row = db.execute(
-                f"SELECT {_COLUMNS} FROM registrations WHERE component = ?",  # noqa: S608
-                (component,),
-            ).fetchone()
-        return Record(*row) if row is not None else None
+        return next(iter(self._records("component = ?", component)), None)
 
-    def begin(self, component: str, server: str = "") -> tuple[Record, bool]:
-        """The intent for a component's item, and whether an earlier run had already begun with it."""
+    def begin(self, component: str, carried: str = "") -> tuple[Record, bool]:
+        """The intent for a component's item, and whether an earlier run had already begun with it.
+
+        carried
+            the identity that its file has from elsewhere, and that the item shall have.
+        """
         known = self.find(component)
-        if known is not None and not known.finished:
+        if known is not None and not known.finished and carried in ("", known.wanted, known.item_id):
             return known, True
-        wanted = str(uuid.uuid4())
-        record = Record(component, wanted, wanted, server, "", self._clock(), None)
-        with self._open() as db:
-            db.execute(
-                f"REPLACE INTO registrations ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?)",  # noqa: S608
-                tuple(vars(record).values()),
-            )
+        wanted = carried or str(uuid.uuid4())
+        record = Record(component, wanted, wanted, "", self._clock(), None)
+        self._write(
+            f"REPLACE INTO registrations ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?)",  # noqa: S608
+            *vars(record).values(),
+        )
         return record, False
 
     def replace(self, component: str, item_id: str) -> None:
         """Remember the UUID that the server chose itself."""
-        with self._open() as db:
-            db.execute("UPDATE registrations SET item_id = ? WHERE component = ?", (item_id, component))
+        self._write("UPDATE registrations SET item_id = ? WHERE component = ?", item_id, component)
 
     def done(self, component: str, document_uid: str = "") -> None:
         """The component's file names its item."""
-        with self._open() as db:
-            db.execute(
-                "UPDATE registrations SET finished_at = ?, document_uid = ? WHERE component = ?",
-                (self._clock(), document_uid, component),
-            )
+        changed = "UPDATE registrations SET finished_at = ?, document_uid = ? WHERE component = ?"
+        self._write(changed, self._clock(), document_uid, component)
 
     def forget(self, component: str) -> None:
         """The server certainly made no item for it."""
-        with self._open() as db:
-            db.execute("DELETE FROM registrations WHERE component = ?", (component,))
+        self._write("DELETE FROM registrations WHERE component = ?", component)
 
     def item_ids(self) -> frozenset[str]:
         """The items of all components that are known here."""
-        with self._open() as db:
-            return frozenset(row[0] for row in db.execute("SELECT item_id FROM registrations"))
+        return frozenset(record.item_id for record in self._records("TRUE"))
 
-    @contextmanager
-    def turn(self, server: str = "") -> Iterator[None]:
-        """Hold while one component is registered at a server: two processes never make an item for the same
-        one, and a slow server holds nobody up at another.
+    def turn(self, path: str) -> AbstractContextManager[str]:
+        """Hold a file's folder while one component of it is registered, on whichever computer: two processes
+        never make an item for the same one, and nobody waits for another project's server.
 
-        A transaction on a database of its own: the system ends it with the process, however that dies.
+        Gives why other computers do not see that, "" where they do. Raises InputError.
         """
-        name = hashlib.sha256(server.encode()).hexdigest()[:16]
-        with closing(self._locked(self.path.with_name(f"{self.path.stem}-{name}.lock"))):
-            yield
+        return folder_lock(os.path.dirname(path), ".silo-register.lock", "registered", self._patience)
 
-    def _locked(self, path: Path) -> sqlite3.Connection:
-        with self._translated():
-            db = self._connect(path, self._patience)
-            try:
-                db.execute("BEGIN EXCLUSIVE")
-            except sqlite3.OperationalError as error:
-                db.close()
-                if "locked" not in str(error):
-                    raise
-                raise InputError("another registration runs and does not end; try again later") from error
-        return db
+    def _records(self, where: str, *values: str) -> list[Record]:
+        with self._open() as db:
+            rows = db.execute(f"SELECT {_COLUMNS} FROM registrations WHERE {where}", values)  # noqa: S608
+            return [Record(*row) for row in rows]
+
+    def _write(self, statement: str, *values: object) -> None:
+        with self._open() as db:
+            db.execute(statement, values)
 
     @contextmanager
     def _open(self) -> Iterator[sqlite3.Connection]:
-        with self._translated(), closing(self._connect(self.path, 20.0)) as db:
-            db.execute("PRAGMA synchronous = FULL")
-            db.execute("BEGIN IMMEDIATE")
-            db.execute(_TABLE)
-            yield db
-            db.execute("COMMIT")
-
-    def _connect(self, path: Path, timeout: float) -> sqlite3.Connection:
-        private_folder(path.parent)
-        private_file(path)  # before SQLite opens it
-        return sqlite3.connect(path, timeout=timeout, isolation_level=None)
-
-    @contextmanager
-    def _translated(self) -> Iterator[None]:
         try:
-            yield
+            with closing(self._connect()) as db:
+                db.execute("PRAGMA synchronous = FULL")
+                db.execute("BEGIN IMMEDIATE")
+                db.execute(_TABLE)
+                yield db
+                db.execute("COMMIT")
         except (sqlite3.Error, OSError) as error:
-            raise self._unusable(error, self.path) from error
+            raise InputError(
+                f"{self.path}: the journal of registrations cannot be read ({error}). Mend or move it; items "
+                "of an interrupted run may then exist without a file that names them."
+            ) from error
 
-    @staticmethod
-    def _unusable(error: Exception, path: Path) -> InputError:
-        return InputError(
-            f"{path}: the journal of registrations cannot be read ({error}). Mend or move it; items of "
-            "an interrupted run may then exist without a file that names them."
-        )
+    def _connect(self) -> sqlite3.Connection:
+        private_folder(self.path.parent)
+        private_file(self.path)  # before SQLite opens it
+        return sqlite3.connect(self.path, timeout=20.0, isolation_level=None)

@@ -110,6 +110,13 @@ class Candidate:
         return self.proposal.entry
 
     @property
+    def foreign(self) -> bool:
+        """True where the file carries an identity that the server does not know, from another server or from
+        another computer's run."""
+        has_one = bool(self.entry.silo_uuid) and not self.entry.is_standard
+        return has_one and not self.same_as and self.article is None
+
+    @property
     def shares_file(self) -> bool:
         return self.proposal.shares_file
 
@@ -117,7 +124,7 @@ class Candidate:
     def wanted(self) -> bool:
         """Checked to begin with? Not where a person has to look first."""
         fine = self.state.usable and self.state is not State.ELSEWHERE
-        if self.proposal.is_guess or self.article is not None:
+        if self.proposal.is_guess or self.article is not None or self.foreign:
             return False
         return fine and not self.same_as and not any(s.same_file for s in self.similar)
 

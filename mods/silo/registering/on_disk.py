@@ -15,7 +15,7 @@ from silo.bom.resolve import Proposal, propose_all
 from silo.bom_sync import resolve
 from silo.fcstd import check_stampable, stamp
 from silo.freecads import OpenInFreecad, open_in_any
-from silo.registering.items import Ask, Registration, component_key, document_uid, unclear
+from silo.registering.items import Ask, Registration, component_key, on_disk, unclear
 from silo.registering.journal import Journal
 from silo.registering.offer import Candidate, Control, Seen, State
 from silo.registering.orders import Order, carry_out
@@ -87,7 +87,9 @@ def is_own(candidate: Candidate) -> bool:
     record = Journal().find(component_key(candidate.entry))
     if record is None:
         return False
-    return not record.finished or record.document_uid == document_uid(candidate.entry)
+    if candidate.foreign:
+        return not record.finished and candidate.entry.silo_uuid in (record.wanted, record.item_id)
+    return not record.finished or record.document_uid == on_disk(candidate.entry)[0]
 
 
 def carry_out_on_disk(
@@ -116,7 +118,7 @@ def carry_out_on_disk(
 
     def write(candidate: Candidate, identity: str) -> None:
         for own, item in places(candidate):
-            again = bool(candidate.same_as)
+            again = bool(candidate.entry.silo_uuid)
             stamp(candidate.entry.doc_path, identity, object_name=own, item_object=item, replace=again)
 
     def check(candidate: Candidate) -> None:
@@ -124,7 +126,7 @@ def carry_out_on_disk(
         if not even_if_open and open_in_any().has_file(candidate.entry.doc_path):
             raise DocumentError(candidate.entry.doc_path, OPEN)
         for own, item in places(candidate):
-            again = bool(candidate.same_as)
+            again = bool(candidate.entry.silo_uuid)
             check_stampable(candidate.entry.doc_path, object_name=own, item_object=item, replace=again)
 
     carry_out(

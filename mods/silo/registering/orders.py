@@ -132,11 +132,14 @@ class _Run:
             candidate.proposal,
             self.api,
             self.journal,
-            lambda _entry, identity: self.write(candidate, identity),
+            lambda entry, identity: self.write(
+                replace(candidate, proposal=replace(candidate.proposal, entry=entry)), identity
+            ),
             schema=self.schema,
             properties={"file_sha256": candidate.sha256} if candidate.sha256 else None,
             check=lambda _entry: self.check(candidate),
             ask=lambda proposal, found: self.ask(order, proposal, found),
+            copy=bool(candidate.same_as),
         )
 
     def _join(self, candidate: Candidate, number: str, item_id: str) -> Registration:

@@ -69,6 +69,8 @@ def doubts(candidate: Candidate, earlier: Contents) -> list[str]:
         told.append(f"the same content as {twin.proposal.name}")
     if candidate.same_as:
         told.append(f"carries the identity of {candidate.same_as}, as another file does")
+    if candidate.foreign:
+        told.append("carries an identity of another server, or of another computer's run")
     return told
 
 

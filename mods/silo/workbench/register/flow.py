@@ -274,6 +274,8 @@ class EditedRow:
         if self.candidate.same_as:
             text = translate("Silo", "carries the identity of {number}, as another file does")
             told.append(text.replace("{number}", self.candidate.same_as))
+        if self.candidate.foreign:
+            told.append(translate("Silo", "registered at another server: it keeps its identity"))
         told += [_similar_words(similar) for similar in self.candidate.similar[:2]]
         if self.candidate.twin:
             text = translate("Silo", "the same content as {name}")

@@ -1378,6 +1378,11 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/flow.py" />
+            <source>registered at another server: it keeps its identity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
             <source>the same content as {name}</source>
             <translation type="unfinished" />
         </message>
