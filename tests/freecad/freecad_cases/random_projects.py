@@ -47,6 +47,7 @@ class Project:
             self.parts.append(box)
         for number in range(self.random.randint(0, 2)):
             self.assemblies.append(self.assembly(f"sub{number}"))
+            self.assemblies[-1].Document.save()  # imports are read from files
         self.assembly("top")
         for doc in App.listDocuments().values():
             doc.recompute()
@@ -84,7 +85,7 @@ class Project:
 
     def items(self, doc: Any, root: Any, depth: int) -> list[Any]:
         made: list[Any] = []
-        kinds = [self.linked, self.fastener, self.fastener, self.array_of_links]
+        kinds = [self.linked, self.fastener, self.fastener, self.array_of_links, self.imported]
         seeing = [self.inside, self.again, self.draft, self.copy, self.elements]
         kinds += [*seeing, self.compound, self.cut] if depth else []
         for _ in range(self.random.randint(1, 4)):
@@ -143,6 +144,24 @@ class Project:
             obj.addProperty("App::PropertyEnumeration", name)
             setattr(obj, name, [value])
         obj.Shape = Part.makeBox(1, 1, 10 + size)
+        return self.place(obj)
+
+    def imported(self, doc: Any) -> Any:
+        """What A2plus makes: a copy of the shape, and the file that it came from."""
+        whole = [one for one in self.assemblies if not (NEW and has_assembly_links(one))]
+        source = self.random.choice([*self.parts, *whole])
+        obj = doc.addObject("Part::FeaturePython", "Import")
+        file = Path(source.Document.FileName)
+        path = str(file) if self.random.random() < 0.5 else f"./{file.name}"
+        for name, kind, value in (
+            ("a2p_Version", "App::PropertyString", "V0.4.60"),
+            ("sourceFile", "App::PropertyFile", path),
+            ("timeLastImport", "App::PropertyFloat", 1.0),
+            ("subassemblyImport", "App::PropertyBool", source in whole),
+        ):
+            obj.addProperty(kind, name, "importPart")
+            setattr(obj, name, value)
+        obj.Shape = Part.getShape(source)
         return self.place(obj)
 
     def inside(self, doc: Any, root: Any, depth: int, _made: list[Any]) -> Any:
@@ -232,6 +251,11 @@ class Project:
 def is_shown(obj: Any) -> bool:
     """True where another object shows it already; the base of an array is hidden, which those would see."""
     return bool(obj.InList)
+
+
+def has_assembly_links(root: Any) -> bool:
+    """True for an assembly with what is set to what it shows only in the end."""
+    return bool(root.Document.findObjects("Assembly::AssemblyLink"))
 
 
 def show_as_the_assembly_does(link: Any) -> None:

@@ -59,7 +59,7 @@ def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Help
             base = os.path.dirname(document.FileName).replace("\\", "/")
             walk = Walk(StoredFacts(entries), base, options.hardware)
             top = walk.top(document, options.object_name)
-            unpacked = _Unpacked(entries, Path(folder))
+            unpacked = Unpacked(entries, Path(folder))
 
             def measured(leaves: Sequence[Leaf], done: Callable[[int, int], Any]) -> list[Measured | str]:
                 if len(leaves) > 1 and unpacked.size(leaves) >= WORTH_HELP and helpers.start():
@@ -80,7 +80,7 @@ def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Help
     return Reading(assembly, others=others, absent=tuple(Path(file) for file in sorted(walk.absent)))
 
 
-class _Unpacked:
+class Unpacked:
     """The shapes of products as files of their own, each product's as long as it takes to measure it."""
 
     def __init__(self, entries: Entries, folder: Path) -> None:
