@@ -150,6 +150,14 @@ def test_boms_that_are_too_many_for_one_answer_are_asked_for_in_halves(
     assert [seen.json()["part_numbers"] for seen in server.seen] == [list("ABCD"), list("AB"), list("CD")]
 
 
+def test_a_server_that_keeps_no_summaries_is_no_failure(server: Any, client: SiloClient, answer: Any) -> None:
+    """The real Silo has no such request; an item that is not known is still an error."""
+    server.on("GET /api/items/A/bom/summary", route_missing(answer), answer(404, {"error": "not_found"}))
+    assert client.get_summary("A") is None
+    with pytest.raises(NotFoundError):
+        client.get_summary("A")
+
+
 def test_the_bom_of_another_item_is_no_answer(server: Any, client: SiloClient) -> None:
     """From a proxy's cache, say: it would be compared with the wrong assembly."""
     line = {"child_part_number": "C", "quantity": 2, "parent_part_number": "a01-0001"}

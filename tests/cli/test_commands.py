@@ -17,6 +17,8 @@ import pytest
 from fcstd_writer import Doc, locals_
 from running_freecad import opened
 
+from silo.api.client import SiloClient
+from silo.bom.errors import BusyError
 from silo.cli.demo import remove_from_assembly, set_element_count
 from silo.cli.main import build_parser
 
@@ -376,6 +378,43 @@ def test_resolve_shows_what_has_no_number_on_every_level(run: Any, silo: Any, ge
     run("register", gearbox, "--yes")
     flat = run("bom", gearbox, "--resolve", "--flat", "--json").json()
     assert all(row["part_number"] and row["name"] for row in flat)
+
+
+def test_resolve_shows_what_the_server_says_of_the_product(
+    run: Any, silo: Any, gearbox: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is open on all levels, mass and cost with what they lack; nothing from a server without it."""
+    run("register", gearbox, "--yes")
+    assert "silo" in run("bom", gearbox, "--resolve", "--json").json()
+    run("sync", gearbox, "--recursive")
+    top = run("bom", gearbox, "--resolve", "--json").json()
+    number, part = top["assembly"]["part_number"], flat_number(run, gearbox)
+    silo.client.update_item(part, properties={"mass_kg": 2, "standard_cost": 3})
+    kept = run("bom", gearbox, "--resolve", "--json").json()["silo"]
+    assert kept["part_number"] == number
+    assert kept["mass_missing"]["count"] == kept["parts"] - 1
+    assert kept["totals"][0]["currency"] == "EUR"
+    said = run("bom", gearbox, "--resolve").out
+    assert f"In Silo, {number}:\n" in said
+    assert f"{kept['total_mass_kg']:g} kg for 1 of {kept['parts']} parts" in said
+    for one, words in (*kept["open"].items(), *kept["incomplete"].items()):
+        assert one in said
+        assert words in said
+
+    def busy(*_: Any) -> None:
+        raise BusyError("it is summed up now")
+
+    monkeypatch.setattr(SiloClient, "get_summary", busy)
+    ran = run("bom", gearbox, "--resolve")
+    assert "In Silo" not in ran.out
+    assert "it is summed up now" in ran.err
+    monkeypatch.setattr(SiloClient, "get_summary", lambda *_: None)
+    assert "silo" not in run("bom", gearbox, "--resolve", "--json").json()
+
+
+def flat_number(run: Any, gearbox: Path) -> str:
+    """The part number of one part of the assembly."""
+    return str(run("bom", gearbox, "--resolve", "--flat", "--json").json()[0]["part_number"])
 
 
 @pytest.mark.usefixtures("needs_locks")

@@ -27,6 +27,7 @@ from silo.api.wire import (
     MergeRequest,
     MergeResult,
     MergeWarning,
+    ProductSummary,
     Quantity,
     QuantityLine,
     WhereUsedLine,
@@ -283,6 +284,17 @@ class BomCalls(Caller):
                 return None
 
         return self._many("boms", part_numbers, batch, single, cancelled)
+
+    def get_summary(self, part_number: str, /) -> ProductSummary | None:
+        """What the server keeps of a product over all levels; None from a server that keeps nothing.
+
+        Raises :class:`BusyError` while the server sums up a very large product.
+        """
+        try:
+            reply = self._get(f"the summary of {part_number}", *_bom(part_number), "summary")
+        except RouteMissingError:
+            return None
+        return reply.model(ProductSummary)
 
     def get_bom_version(self, part_number: str, /) -> str | None:
         """The version of the BOM as it is now, for ``if_match``; None where the server keeps none."""

@@ -302,6 +302,39 @@ class MergeEvent(_Merged):
     summary: str = ""
 
 
+class Lacking(Answer):
+    """How many parts lack a value, and the first of them."""
+
+    count: int = 0
+    first: list[str] = Field(default_factory=list)
+
+
+class CostTotal(Answer):
+    """What the parts with a cost in one currency cost."""
+
+    currency: str
+    total_cost: Number
+
+
+class ProductSummary(Answer):
+    """What the server keeps of a product over all levels (``GET …/bom/summary``).
+
+    open, incomplete
+        part number of a BOM → what a person has to decide there, and what its last sync left out.
+    total_mass_kg, totals
+        without what ``mass_missing`` and ``cost_missing`` count.
+    """
+
+    part_number: str
+    open: dict[str, str] = Field(default_factory=dict)
+    incomplete: dict[str, str] = Field(default_factory=dict)
+    parts: int = 0
+    total_mass_kg: Number | None = None
+    totals: list[CostTotal] = Field(default_factory=list)
+    mass_missing: Lacking = Lacking()
+    cost_missing: Lacking = Lacking()
+
+
 class ErrorBody(Answer):
     """The one shape of every HTTP error. ``problems`` lists all bad entries at once, with their index.
 

@@ -18,7 +18,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from silo.bom.document import relative
-from silo.bom.errors import ConfigError, DocumentError, Exit, InputError, SiloError, counted, did_you_mean
+from silo.bom.errors import (
+    BusyError,
+    ConfigError,
+    DocumentError,
+    Exit,
+    InputError,
+    SiloError,
+    counted,
+    did_you_mean,
+)
 from silo.bom.findings import FindingCode
 from silo.bom.headers import safe_cell
 from silo.bom.model import BomDiff, BomEntry, Extraction, walk_entries
@@ -70,7 +79,7 @@ def run_bom(args: argparse.Namespace) -> int:
     check_writable(*(path for path in (args.csv, args.xlsx) if path and path != "-"))
     if os.path.isdir(args.top) or args.assembly == common.EACH:
         return _several(args)
-    extraction = common.read_tops(args)[0]
+    extraction, summary = common.read_tops(args)[0], None
     if args.resolve:
         from silo.batch import ask_for_moved
         from silo.bom_sync import resolve
@@ -78,6 +87,11 @@ def run_bom(args: argparse.Namespace) -> int:
         with common.client_of(args) as client:
             common.reach(client, extraction)
             resolved = ask_for_moved(resolve(extraction, client), client)
+            if number := resolved.assembly.part_number:
+                try:
+                    summary = client.get_summary(number)
+                except BusyError as error:  # a very large product is summed up; the BOM is here
+                    print(error, file=sys.stderr)
         known = {entry.key: entry for entry in resolved.unresolved}
         head = _whole(replace(resolved.assembly, children=resolved.entries), known)
         extraction = Extraction(resolved.assembly, head.children, resolved.findings)
@@ -89,7 +103,8 @@ def run_bom(args: argparse.Namespace) -> int:
     if args.xlsx:
         _write_xlsx(args.xlsx, _table(extraction, flat=args.flat))
     if args.json:
-        common.print_json(flat_json(extraction) if args.flat else bom_json(extraction))
+        kept = {"silo": summary.model_dump(mode="json")} if summary else {}
+        common.print_json(flat_json(extraction) if args.flat else bom_json(extraction) | kept)
     if args.json or args.csv == "-":
         return _exit_of(extraction)
     from silo.cli import show
@@ -101,6 +116,9 @@ def run_bom(args: argparse.Namespace) -> int:
     if told:
         out.print()
         out.print(show.findings_text(told, base_of(extraction)))
+    if summary:
+        out.print()
+        out.print(show.summary_text(summary))
     return _exit_of(extraction)
 
 

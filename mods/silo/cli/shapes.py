@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, create_model
 
 import silo.inertia
-from silo.api.wire import MergeResult
+from silo.api.wire import MergeResult, ProductSummary
 from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode, Severity
 from silo.bom_sync import Status
@@ -101,6 +101,7 @@ Bom = _shape(
     entries=_many(Entry),
     own=(_said(_many(Entry), "what the assembly shows of its own file and is no item yet"), []),
     findings=_many(Finding),
+    silo=(_said(ProductSummary | None, "with --resolve: what the server keeps of the product"), None),
 )
 FlatLine = _shape(
     "FlatLine",

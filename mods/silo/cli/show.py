@@ -23,6 +23,7 @@ from silo.cli import common
 
 if TYPE_CHECKING:
     from silo.activity import ActivityText
+    from silo.api.wire import ProductSummary
     from silo.bom.resolve import Proposal
     from silo.bom_sync import Outcome
     from silo.registering.items import Registration
@@ -141,6 +142,20 @@ def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
         mark, style = _MARK[finding.severity]
         lines.append(Text().append(f"{mark} ", style).append(plain(shorten(finding.message, base)), ""))
     return Group(*lines)
+
+
+def summary_text(summary: ProductSummary) -> Text:
+    """Return what the server says of a product over all levels: what is open, mass and cost."""
+    told = (*summary.open.items(), *((one, f"incomplete: {why}") for one, why in summary.incomplete.items()))
+    lines = [f"⚠ {plain(number)}: {plain(words)}" for number, words in told]
+    rest = len(lines) - MOST_LINES
+    shown = [*lines[:MOST_LINES], f"… and {rest} more"] if rest > 0 else lines or ["✓ nothing is open"]
+    values = [(f"{summary.total_mass_kg:g} kg" if summary.total_mass_kg else "", summary.mass_missing)]
+    costs = ", ".join(f"{one.total_cost:.2f} {plain(one.currency)}" for one in summary.totals)
+    for value, lacking in (*values, (costs, summary.cost_missing)):
+        known = f" for {summary.parts - lacking.count} of {summary.parts} parts" if lacking.count else ""
+        shown += [f"{value}{known}"] if value else []
+    return Text("\n").join(Text(line) for line in (f"In Silo, {plain(summary.part_number)}:", *shown))
 
 
 def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -> RenderableType:
