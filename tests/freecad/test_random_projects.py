@@ -27,8 +27,7 @@ from silo.bom.report import flat_lines
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.freecads import run_freecad
-from silo.inertia.geometry.freecad.files import Unpacked, measured_files
-from silo.inertia.geometry.freecad.places import Entries, StoredFacts
+from silo.inertia.geometry.freecad.files import Entries, StoredFacts, Unpacked, measured_files
 from silo.inertia.geometry.freecad.walk import Leaf, Walk, assembled, one_by_one
 from silo.inertia.geometry.graph import ReadOptions
 from silo.inertia.geometry.measured import Measured

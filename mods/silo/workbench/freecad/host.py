@@ -154,10 +154,8 @@ def real(obj: Any) -> Any:
 
 def sub_objects(obj: Any) -> list[tuple[Any, bool]] | None:
     """What an object shows within itself, and if it is visible there; None for a shape of its own."""
-    if {"BuildShape", "Freeze", "Group"}.issubset(
-        obj.PropertiesList
-    ):  # Assembly3, with or without the add-on
-        return [(one, group.Visibility and one.Visibility) for group in obj.Group for one in group.Group]
+    if {"BuildShape", "Freeze", "Group"}.issubset(obj.PropertiesList):
+        return [one for group in obj.Group for one in _in_group(group)]
     names = obj.getSubObjects()
     if not names or (obj.isDerivedFrom("Part::Feature") and not obj.hasExtension("App::LinkBaseExtension")):
         return None
@@ -170,6 +168,18 @@ def sub_objects(obj: Any) -> list[tuple[Any, bool]] | None:
             visible = obj.isElementVisible(name.rstrip("."))
             found.append((shown, bool(shown.Visibility if visible < 0 else visible)))
     return found
+
+
+def _in_group(group: Any) -> list[tuple[Any, bool]]:
+    """What a group of Assembly3 holds, with or without the add-on, and if it is visible.
+
+    The add-on switches each of its groups off; what is shown stands in the group's own list.
+    """
+    listed = list(getattr(group, "VisibilityList", ()))
+    members = list(group.Group)
+    if len(listed) != len(members):
+        listed = [group.Visibility] * len(members)
+    return [(one, bool(shown and one.Visibility)) for one, shown in zip(members, listed, strict=True)]
 
 
 def root_objects(document: Any) -> list[tuple[Any, bool]]:
