@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from silo.bom.errors import ConfigError, counted, listed
 from silo.inertia.core import Floats
 from silo.inertia.matching import bare
-from silo.inertia.model import Assembly, Instance
+from silo.inertia.model import Assembly, Instance, placed_below
 
 
 class FrameChoice(StrEnum):
@@ -586,18 +586,11 @@ def _lines_of(
 ) -> list[tuple[tuple[str, ...], list[int]]]:
     """Return (path, instances below it), each as high up as everything below belongs to this one link."""
     owner = {index: name for name, indices in members.items() for index in indices}
-    owners: dict[tuple[str, ...], set[str]] = {}
-    below: dict[tuple[str, ...], list[int]] = {}
-    for index, instance in enumerate(assembly.instances):
-        for end in range(1, len(instance.path) + 1):
-            owners.setdefault(instance.path[:end], set()).add(owner[index])
-            below.setdefault(instance.path[:end], []).append(index)
-    lines: dict[tuple[str, ...], list[int]] = {}
-    for index in ids:
-        path = assembly.instances[index].path
-        end = next((n for n in range(1, len(path) + 1) if len(owners[path[:n]]) == 1), len(path))
-        lines[path[:end]] = below[path[:end]]
-    return list(lines.items())
+    below = placed_below(assembly) | {one.path: [index] for index, one in enumerate(assembly.instances)}
+    whole = {path for path, inside in below.items() if len({owner[index] for index in inside}) == 1}
+    paths = (assembly.instances[index].path for index in ids)
+    highest = (next(path[:n] for n in range(1, len(path) + 1) if path[:n] in whole) for path in paths)
+    return [(path, below[path]) for path in dict.fromkeys(highest)]
 
 
 def _pattern(path: tuple[str, ...]) -> str:

@@ -15,7 +15,6 @@ parts that are listed elsewhere belongs to the others.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -26,7 +25,7 @@ from silo.inertia.bom.table import BomCode, BOMEntry
 from silo.inertia.core import Floats, place, rigid_mask
 from silo.inertia.matching import Match, Matching, Suggester
 from silo.inertia.materials import DENSEST, LIGHTEST, Material, MaterialHit, MaterialTable, checked_density
-from silo.inertia.model import Assembly, GeometryCode, Note, Prototype, companions
+from silo.inertia.model import Assembly, GeometryCode, Note, Prototype, companions, placed_below
 from silo.inertia.report import Decided, MassCode, Rule, Source
 
 
@@ -498,20 +497,12 @@ class Groups:
         self, matches: Mapping[str, Match]
     ) -> Iterator[tuple[Match, tuple[str, ...], list[int]]]:
         """Yield each placed sub-assembly that has a row, deepest first, with its instances."""
-        if not matches:
-            return
-        below: dict[tuple[str, ...], list[int]] = defaultdict(list)
-        product: dict[tuple[str, ...], str] = {}
-        for index, instance in enumerate(self.assembly.instances):
-            if not self.counted[index]:
-                continue
-            for depth in range(1, len(instance.product_path)):
-                name = instance.product_path[depth - 1]
-                if name in matches:
-                    below[instance.path[:depth]].append(index)
-                    product[instance.path[:depth]] = name
-        for path in sorted(below, key=len, reverse=True):
-            yield matches[product[path]], path, below[path]
+        for path, indices in sorted(placed_below(self.assembly).items(), key=lambda one: -len(one[0])):
+            names = {index: self.assembly.instances[index].product_path for index in indices}
+            match = matches.get(names[indices[0]][len(path) - 1])
+            below = [index for index in indices if self.counted[index] and len(names[index]) > len(path)]
+            if match is not None and below:
+                yield match, path, below
 
     def _share(self, match: Match, gaps: list[int], mass: float, *, partly: bool) -> None:
         """Spread a mass over parts without data by volume, or evenly if none has a volume."""

@@ -242,19 +242,28 @@ def companions(assembly: Assembly) -> frozenset[str]:
     return frozenset(key for key, where in places.items() if where <= solid_places)
 
 
+def placed_below(assembly: Assembly) -> dict[tuple[str, ...], list[int]]:
+    """Return the indices of the instances in each placed sub-assembly, by its path, as they appear."""
+    below: dict[tuple[str, ...], list[int]] = defaultdict(list)
+    for index, instance in enumerate(assembly.instances):
+        for depth in range(1, len(instance.path)):
+            below[instance.path[:depth]].append(index)
+    return below
+
+
 def sub_assemblies(assembly: Assembly) -> tuple[Product, ...]:
     """Return the products that contain others, by name, in order of appearance.
 
     ``count`` is that of their instances.
     """
-    paths: dict[str, set[tuple[str, ...]]] = {}
+    counts: dict[str, int] = defaultdict(int)
     parents: dict[str, set[str]] = defaultdict(set)
-    for instance in assembly.instances:
-        names = instance.product_path
-        for depth in range(1, len(names)):
-            paths.setdefault(names[depth - 1], set()).add(instance.path[:depth])
-            parents[names[depth - 1]].add(names[depth - 2] if depth > 1 else "")
+    for path, indices in placed_below(assembly).items():
+        names = ("", *assembly.instances[indices[-1]].product_path)
+        if len(names) > len(path) + 1:  # else it is the sub-assembly's own shape
+            counts[names[len(path)]] += 1
+            parents[names[len(path)]].add(names[len(path) - 1])
     return tuple(
-        Product(key=name, name=name, part_number="", count=len(where), parents=frozenset(parents[name]))
-        for name, where in paths.items()
+        Product(key=name, name=name, part_number="", count=count, parents=frozenset(parents[name]))
+        for name, count in counts.items()
     )

@@ -22,6 +22,7 @@ from step_bodies import KINDS, MM, Bodies, begun, some
 from step_writer import StepDocument
 
 from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry.step.part21 import WANTED, read_products, scan
 from silo.inertia.model import GeometryCode, Prototype
 
 COUNT = int(os.environ.get("SILO_HUNT", "60"))
@@ -117,6 +118,20 @@ def test_a_mapped_body_that_is_not_read_is_named(tmp_path: Path, read_in: ReadIn
     assert f"BLOCK #{block}" in part.problems[0].message
 
 
+def test_a_mapped_shape_of_another_product_stays_its_own() -> None:
+    """An assembly may place its parts so; their bodies are theirs alone."""
+    products = "".join(
+        f"#{n}=PRODUCT('{n}','','',());#{n + 1}=PRODUCT_DEFINITION_FORMATION('','',#{n});"
+        f"#{n + 2}=PRODUCT_DEFINITION('','',#{n + 1},$);#{n + 3}=PRODUCT_DEFINITION_SHAPE('','',#{n + 2});"
+        f"#{n + 4}=SHAPE_REPRESENTATION('',(#{item}),$);"
+        f"#{n + 5}=SHAPE_DEFINITION_REPRESENTATION(#{n + 3},#{n + 4});"
+        for n, item in ((10, 32), (20, 30))
+    )
+    mapped = "#30=SPHERE('',1.,$);#31=REPRESENTATION_MAP(#9,#24);#32=MAPPED_ITEM('',#31,#9);"
+    facts = read_products(scan(f"{products}{mapped}END-ISO-10303-21;".encode(), WANTED)).facts
+    assert {number: found.bodies for number, found in facts.items()} == {12: (), 22: (30,)}
+
+
 def test_a_body_that_stands_twice_hides_no_other(tmp_path: Path, read_in: ReadIn) -> None:
     """As many solids as bodies, and one of the bodies is none of them."""
     path = tmp_path / "part.step"
@@ -171,6 +186,25 @@ def test_open_surfaces_beside_a_solid(
     part = only(read_in(step_part(both)))
     assert part.volume_m3 == pytest.approx(1e-6)
     assert (GeometryCode.BODY_MISSING in codes_of(part)) == said
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_an_open_surface_of_triangles_beside_a_solid(
+    beside: bool, tmp_path: Path, read_in: ReadIn, codes_of: Any
+) -> None:
+    """A tetrahedron without one side, alone and beside a surface of exact faces."""
+    path = tmp_path / "part.step"
+    made = begun(path)
+    points = made.add("COORDINATES_LIST('',4,((50.,0.,0.),(56.,0.,0.),(50.,6.,0.),(50.,0.,6.)))")
+    triangles = "((1,3,2),(1,2,4),(1,4,3))"
+    face = made.add(f"TRIANGULATED_FACE('',#{points},4,((0.,0.,1.)),$,(1,2,3,4),{triangles})")
+    made.item(f"TESSELLATED_SHELL('t',(#{face}),$)", 0.0)
+    if beside:
+        shell = made.add(f"OPEN_SHELL('',({','.join(made.faces[:2])}))")
+        made.item(f"SHELL_BASED_SURFACE_MODEL('s',(#{shell}))", 0.0)
+    part = only(read_in(made.write(path)))
+    assert part.volume_m3 == pytest.approx(1e-6)
+    assert GeometryCode.BODY_MISSING in codes_of(part)
 
 
 @pytest.mark.parametrize("over", ["STYLED_ITEM('',(),#{})", "PRESENTATION_LAYER_ASSIGNMENT('','',(#{}))", ""])

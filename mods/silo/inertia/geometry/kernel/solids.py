@@ -491,7 +491,7 @@ def closed_shells(shapes: list[Any]) -> tuple[list[Any], list[Any]]:
         size = max(box(shape)[1] for shape in shapes)
         sewing = _sewn(loose, MEETING * size)
         if sewing is not None:
-            left = []
+            left = [one for one in left if not all(map(occt.has_surface, occt.faces_of(one)))]
             sewn = sewing.SewedShape()
             for shell in occt.loose_shells_of(sewn):
                 (closed if _is_closed(shell) else left).append(shell)
