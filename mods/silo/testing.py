@@ -120,6 +120,7 @@ class FakeStore:
     ) -> None:
         self.base_url = base_url
         self.mode = "normal"
+        self.freecad = ""
         self.before: Callable[[str], None] = _nothing
         self.after: Callable[[str], None] = _nothing
         self.items: dict[str, Stored] = {}  # by case-folded part number
@@ -382,7 +383,7 @@ class FakeSilo(FakeStore):
 
     def ready(self) -> ServerState:
         self.before("ready")
-        return ServerState(mode=self.mode, status="ready")
+        return ServerState(mode=self.mode, status="ready", freecad=self.freecad)
 
     def set_mode(self, mode: str) -> None:
         """``normal``, ``read-only`` or ``degraded``; announced as the server does."""

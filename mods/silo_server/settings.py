@@ -134,6 +134,8 @@ class Settings:
         how long a client may take to send a request; a body gets a second more for each 8 KiB of it.
     request_log
         write a line of JSON for each request to standard error.
+    freecad_version
+        the FreeCAD that the team works with, such as "1.0"; the add-on compares its own with it.
     root_path
         the sub-path at which a proxy shows the server (``/silo``); links and redirects begin with it.
     trusted_proxies
@@ -173,6 +175,7 @@ class Settings:
     login_window_seconds: float = 300.0
     secure_cookies: bool = False
     request_log: bool = False
+    freecad_version: str = ""
     root_path: str = ""
     trusted_proxies: str = "127.0.0.1,::1"
     public_url: str | None = None
@@ -180,6 +183,10 @@ class Settings:
     admin_password: str | None = None
 
     def __post_init__(self) -> None:
+        if self.freecad_version and not re.fullmatch(r"\d{1,3}\.\d{1,3}", self.freecad_version, re.ASCII):
+            raise ConfigError(
+                f"FreeCAD version: wanted two numbers such as 1.0, got {self.freecad_version!r}"
+            )
         path = self.root_path
         if path and (not re.fullmatch(r"(/[\w.~-]+)+", path, re.ASCII)):
             raise ConfigError(f"root path: wanted a path such as /silo, without / at its end, got {path!r}")
@@ -228,7 +235,7 @@ _NAMES = (
     *("database_url", "read_only", "heartbeat_seconds", "event_log_size", "event_log_bytes", "sync_days"),
     *("sync_bytes", "history_days", "audit_days", "housekeeping_seconds", "max_body_bytes", "max_file_bytes"),
     *("max_merge_entries", "secure_cookies", "request_log", "root_path", "trusted_proxies", "public_url"),
-    *("admin_username", "admin_password"),
+    *("admin_username", "admin_password", "freecad_version"),
 )
 _ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir": "SILO_STORAGE_ROOT_DIR"}
 

@@ -132,5 +132,5 @@ def test_modules_and_health(api: Api) -> None:
     stranger = api.as_(None)
     assert stranger.get("/health") == {"status": "ok", "mode": "normal"}
     ready = stranger.get("/ready")
-    assert (ready["status"], ready["database"]) == ("ready", "ok")
+    assert (ready["status"], ready["database"], ready["freecad"]) == ("ready", "ok", "")
     stranger.bad(401, "GET", "/api/modules")

@@ -21,6 +21,7 @@ def test_the_environment_sets_and_what_is_given_wins() -> None:
         "SILO_MAX_BODY_BYTES": "1000",
         "SILO_ADMIN_USERNAME": "chief",
         "SILO_SECURE_COOKIES": "0",
+        "SILO_FREECAD_VERSION": "1.0",
     }
     settings = settings_from_environment(environ, database_url="sqlite:///b.db")
     assert settings.database_url == "sqlite:///b.db"
@@ -30,6 +31,14 @@ def test_the_environment_sets_and_what_is_given_wins() -> None:
     assert settings.max_body_bytes == 1000
     assert settings.admin_username == "chief"
     assert settings.secure_cookies is False
+    assert settings.freecad_version == "1.0"
+
+
+@pytest.mark.parametrize("version", ["newest", "1", "1.0.2", "1.0 "])
+def test_the_team_s_freecad_is_two_numbers(version: str) -> None:
+    """Else FreeCAD could not compare its own with it, and nobody would be told."""
+    with pytest.raises(ConfigError, match="wanted two numbers"):
+        settings_from_environment({"SILO_FREECAD_VERSION": version})
 
 
 def test_without_anything_it_is_sqlite_in_the_user_s_folder(monkeypatch: pytest.MonkeyPatch) -> None:

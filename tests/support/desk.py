@@ -127,7 +127,7 @@ class Documents:
     def is_writable(self, _path: str, /) -> bool:
         return True
 
-    def lost_assemblies(self, _doc: Any, /) -> list[str]:
+    def lost_objects(self, _doc: Any, /) -> list[str]:
         return []
 
     def is_damaged(self, _doc: Any, /) -> bool:

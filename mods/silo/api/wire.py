@@ -450,6 +450,8 @@ class ServerState(Record):
         a new item gets the UUID that the client proposes.
     browser_login
         the page ``/login/program`` lets a program in.
+    freecad
+        the FreeCAD that the team works with, such as "1.0"; "" if nobody has said.
     """
 
     mode: str = "normal"
@@ -458,6 +460,7 @@ class ServerState(Record):
     sse_clients: int | None = None
     takes_item_ids: bool = False
     browser_login: bool = False
+    freecad: str = ""
 
 
 def login_code(proof: str) -> str:

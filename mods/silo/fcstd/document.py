@@ -514,6 +514,10 @@ class FcstdDocument:
         """The recorded paths of linked files, about, where it holds more than geometry."""
         return set() if self.survey.only(_GEOMETRY) else self._xml.linked()
 
+    def mentioning(self, name: str) -> Iterable[str]:
+        """Name the objects that may mention a name."""
+        return self._xml.mentioning(name)
+
     # For the objects of this document and the session; a walker has no use for what follows.
 
     @cached_property

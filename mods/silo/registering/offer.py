@@ -54,7 +54,7 @@ class State(StrEnum):
     NEWER = "newer"  # somebody else saved or registered the file since it was opened here
     MISSING = "missing"
     UNNAMED = "unnamed"  # never saved
-    LOST = "lost"  # saving it in this FreeCAD would destroy its assemblies
+    LOST = "lost"  # saving it in this FreeCAD would destroy objects that it does not know
 
     @property
     def usable(self) -> bool:

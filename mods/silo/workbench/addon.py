@@ -72,7 +72,7 @@ class AddOn:
         self.session.aside(
             "Getting ready",
             lambda _control: [import_module(f"silo.workbench.{name}") for name in WITHOUT_WIDGETS],
-            done=lambda _modules: None,
+            done=lambda _modules: self._prepared(),
             failed=self._bug,
         )
         self._timer = qt.QtCore.QTimer()
@@ -83,6 +83,35 @@ class AddOn:
 
         self._watch = CloseWatch(host.main_window(), self._closing)
         self._find_foreign_commit()
+
+    def _prepared(self) -> None:
+        self._ask_team()
+        self._guard_newer_files()
+
+    def _ask_team(self) -> None:
+        """Say so if the team works with another FreeCAD."""
+        from silo.workbench.pane.entries import of_team
+
+        def told(wanted: str) -> None:
+            if (entry := of_team(wanted, host.version())) is not None:
+                self.session.add(entry)
+
+        self.session.ask(
+            translate("Silo", "Looking at the server"),
+            lambda client, _control: client.ready().freecad,
+            done=told,
+            failed=lambda _error: None,  # whatever else is asked says it
+        )
+
+    def _guard_newer_files(self) -> None:
+        from silo.workbench.freecad.live_desk import LossGuard
+        from silo.workbench.gui.widgets import confirm
+
+        def ask(title: str, text: str) -> bool:
+            yes, no = translate("Silo", "Save over it"), translate("Silo", "Keep the newer file")
+            return confirm(host.main_window(), title, text, yes, no)
+
+        host.add_document_observer(LossGuard(lambda: self.session.outbox, self.session.add, ask))
 
     def _closing(self) -> None:
         """FreeCAD's window is asked to close: what was committed is saved and held before its documents
@@ -177,6 +206,7 @@ class AddOn:
         self.session.settings_changed(
             read_known(self.preferences), live=self.preferences.flag("LiveActivity")
         )
+        self._ask_team()
 
     def _shown(self, shown: Shown) -> None:
         waits = self._drawn is None

@@ -92,6 +92,7 @@ async def ready(server: ServerDep) -> Response:
         "sse_clients": server.hub.listeners,
         "takes_item_ids": True,
         "browser_login": True,
+        "freecad": server.settings.freecad_version,
     }
     return json_answer(body, 200 if state.ready else 503)
 

@@ -21,6 +21,7 @@ from server_testing import reserved_port
 
 from silo.api.client import SiloClient
 from silo_server.run import running_server
+from silo_server.settings import Settings
 
 TOKEN = "silo_" + "0123456789abcdef" * 2
 TIMEOUT_S = 300
@@ -44,9 +45,11 @@ class Server:
         self._database, self._port = f"sqlite:///{folder / 'silo.db'}", port
         self._stack = ExitStack()
         self.url = ""
+        self.freecad_version = ""
 
     def up(self) -> None:
-        running = running_server(self._database, token=TOKEN, port=self._port)
+        settings = Settings(database_url=self._database, freecad_version=self.freecad_version)
+        running = running_server(self._database, token=TOKEN, port=self._port, settings=settings)
         self.url = self._stack.enter_context(running).base_url
 
     def down(self) -> None:

@@ -56,7 +56,7 @@ class Documents:
     def is_writable(self, path: str, /) -> bool:
         return "fixed" not in path
 
-    def lost_assemblies(self, doc: Any, /) -> list[str]:
+    def lost_objects(self, doc: Any, /) -> list[str]:
         return ["Assembly"] if doc.marks.get("newer") else []
 
     def is_damaged(self, doc: Any, /) -> bool:
@@ -146,6 +146,13 @@ def test_states(doc: Doc, state: State, can_commit: bool) -> None:
     (row,) = plan(doc, Documents()).rows
     assert (row.state, row.can_commit) == (state, can_commit)
     assert row.note
+
+
+def test_what_saving_would_destroy_is_named() -> None:
+    """A person has to know what is at stake, and where these edits can be made."""
+    (row,) = plan(Doc("T", changed=True, newer=True), Documents()).rows
+    assert "would destroy Assembly" in row.note
+    assert "newer FreeCAD" in row.note
 
 
 class Outbox:

@@ -17,7 +17,7 @@ from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.workbench import words
 from silo.workbench.pane.activity import Do, Entry
-from silo.workbench.pane.entries import MOST_IN_CONSOLE, badges, console_lines, of_event, of_sent
+from silo.workbench.pane.entries import MOST_IN_CONSOLE, badges, console_lines, of_event, of_sent, of_team
 
 if TYPE_CHECKING:
     from vault import Vault
@@ -152,3 +152,25 @@ def test_what_people_need_not_see_is_no_box(kind: str) -> None:
     """Nor is an event without an item."""
     assert of_event(ServerEvent("1", kind, {"part_number": "M01-0001"}), page) is None
     assert of_event(ServerEvent("1", "item.created", {}), page) is None
+
+
+@pytest.mark.parametrize(
+    ("wanted", "here", "said"),
+    [
+        (
+            "1.0",
+            (1, 1),
+            "that is saved here may hold objects that the FreeCAD of your colleagues does not know",
+        ),
+        ("1.1", (1, 0), "You are asked before a save removes"),
+        ("1.1", (1, 1), ""),
+        ("", (1, 1), ""),
+    ],
+)
+def test_a_team_s_freecad(wanted: str, here: tuple[int, int], said: str) -> None:
+    """Who has another is told what that means; the real Silo says nothing."""
+    entry = of_team(wanted, here)
+    assert (entry is not None) == bool(said)
+    if entry is not None:
+        assert said in entry_text(entry)
+        assert f"FreeCAD {wanted}" in entry.title

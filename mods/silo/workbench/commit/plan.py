@@ -103,7 +103,7 @@ class Documents(Protocol):
 
     def is_writable(self, path: str, /) -> bool: ...
 
-    def lost_assemblies(self, doc: Any, /) -> list[str]: ...
+    def lost_objects(self, doc: Any, /) -> list[str]: ...
 
     def is_damaged(self, doc: Any, /) -> bool: ...
 
@@ -140,6 +140,8 @@ class Row:
         the colleague's revision that a person saw and commits this on top of; empty where there is none.
     is_new
         the file has only just got its item, at a person's word: nobody's newer revision is looked for.
+    lost
+        the objects that saving it here would destroy.
     """
 
     document: Any
@@ -150,6 +152,7 @@ class Row:
     replaced: bool = False
     on_top: Mapping[str, Any] = field(default_factory=dict)
     is_new: bool = False
+    lost: tuple[str, ...] = ()
 
     @property
     def can_commit(self) -> bool:
@@ -165,7 +168,8 @@ class Row:
     @property
     def note(self) -> str:
         """The state in words."""
-        return _words()[self.state]
+        lost = plain(", ".join(self.lost), 300)
+        return _words()[self.state].replace("{lost}", lost)
 
 
 def _words() -> dict[State, str]:
@@ -181,7 +185,9 @@ def _words() -> dict[State, str]:
         ),
         State.READ_ONLY: translate("Silo", "the file is read-only: these edits are not saved"),
         State.LOST: translate(
-            "Silo", "made by a newer FreeCAD: saving it here would destroy its assemblies, so it is not saved"
+            "Silo",
+            "made by a newer FreeCAD: saving it here would destroy {lost}, so it is not saved. Make these "
+            "edits in the newer FreeCAD",
         ),
         State.DAMAGED: translate(
             "Silo",
@@ -234,7 +240,8 @@ def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> Plan:
             # What was only recomputed, and cannot be saved anyway, is nobody's concern.
             if is_top or state is not State.SAVED:
                 replaced = bool(path) and documents.base(doc).replaced
-                rows.append(Row(doc, path, str(doc.Label), state, is_top, replaced))
+                lost = tuple(documents.lost_objects(doc)) if state is State.LOST else ()
+                rows.append(Row(doc, path, str(doc.Label), state, is_top, replaced, lost=lost))
     return Plan(tuple(rows), unregistered)
 
 
@@ -303,7 +310,7 @@ def _held(doc: Any, documents: Documents) -> State | None:
     """Why a document cannot be saved; None where it can."""
     if documents.is_partial(doc):
         return State.PARTIAL
-    if documents.lost_assemblies(doc):
+    if documents.lost_objects(doc):
         return State.LOST
     return None if documents.is_writable(doc.FileName) else State.READ_ONLY
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection
 from typing import Any
 from xml.sax.saxutils import unescape
 
-from silo.bom.document import LinkProblem, object_name, saved_by
+from silo.bom.document import LinkProblem, object_name
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.links import extract, why
@@ -77,6 +77,8 @@ def _refuse_entities(path: str) -> None:
 def extract_live(document: Any, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
     """The BOM of an open document, as it stands in this session, saved or not.
 
+    What this FreeCAD could load only without some of its objects is read from its file.
+
     assembly
         ``Name`` or ``Label`` of the assembly, where the document holds several.
     hardware
@@ -84,6 +86,8 @@ def extract_live(document: Any, assembly: str | None = None, *, hardware: bool =
     """
     if lost := lost_assemblies(document):
         return _lost(document, lost)
+    if (whole := in_file(document)) is not None:
+        return extract(choose_assembly(whole, assembly), hardware=hardware)
     cached = cached_document(document)
     return extract_object(choose_assembly(cached, assembly), hardware=hardware)
 
@@ -120,10 +124,21 @@ def _walking() -> dict[str, Any]:
     return {"inspect": LinkInspector(), "canonical": canonical_paths(), "whole": WholeDocuments()}
 
 
+def in_file(document: Any) -> Any:
+    """Return the document as its file has it, where this FreeCAD did not know the types of some objects; None
+    where FreeCAD has them all."""
+    if not saving.lost_objects(document):
+        return None
+    from silo.fcstd import Library
+
+    return Library().open(document.FileName)
+
+
 class WholeDocuments:
     """Gives a document with all its objects for one that FreeCAD loaded in part: read from its file.
 
-    A document in part cannot be saved, so its file is what there is. For one walk.
+    A document in part cannot be saved, so its file is what there is; and so is one of a newer FreeCAD, with
+    objects of types that are unknown here. For one walk.
     """
 
     def __init__(self) -> None:
@@ -131,7 +146,7 @@ class WholeDocuments:
 
     def __call__(self, document: Any) -> Any:
         real = getattr(document, "real", document)
-        if not getattr(real, "Partial", False):
+        if not getattr(real, "Partial", False) and not saving.lost_objects(real):
             return document
         from silo.fcstd import Library
 
@@ -240,24 +255,12 @@ class _Owner:
 
 
 def lost_assemblies(document: Any) -> list[str]:
-    """Assemblies that the file holds and this FreeCAD (before 1.0) could not load.
-
-    FreeCAD drops such objects without a word, and saving the document then destroys them in the file.
-    """
-    if host.version() >= ASSEMBLY_SINCE or not document.FileName:
-        return []
-    # Reading a large file takes long, and what an old FreeCAD has written holds nothing that this one drops.
-    if (by := saved_by(document.getProgramVersion())) and by < ASSEMBLY_SINCE:
-        return []
-    from silo.fcstd import Library
-
-    try:
-        in_file = Library().open(document.FileName).Objects
-    except DocumentError:
+    """Return the assemblies that the file holds and this FreeCAD (before 1.0) could not load."""
+    if host.version() >= ASSEMBLY_SINCE or (whole := in_file(document)) is None:
         return []
     return [
         object_name(obj)
-        for obj in in_file
+        for obj in whole.Objects
         if obj.TypeId.startswith("Assembly::Assembly") and document.getObject(obj.Name) is None
     ]
 

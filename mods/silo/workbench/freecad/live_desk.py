@@ -16,16 +16,21 @@ Live links that lead nowhere, led to the file that was meant. GUI thread; the pe
 from __future__ import annotations
 
 import os
+import shutil
+import time
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.document import LinkProblem, located
-from silo.bom.errors import DocumentError
+from silo.bom.document import LinkProblem, located, saved_by
+from silo.bom.errors import DocumentError, SiloError
 from silo.bom.findings import Finding
-from silo.bom.links import file_item
+from silo.bom.links import extract, file_item
 from silo.freecads import open_in_any, open_in_others
+from silo.outbox.store import KEPT_ASIDE_DAYS
+from silo.platform import replacing
 from silo.registering.offer import Candidate, Seen, State
 from silo.workbench.commit import plan
 from silo.workbench.commit.flow import Answer, Look
@@ -34,11 +39,13 @@ from silo.workbench.commit.plan import Plan, Snapshot, leaves_first
 from silo.workbench.freecad import host, live, saving
 from silo.workbench.freecad.edits import SHOWN_NUMBER, SHOWN_STATE
 from silo.workbench.gui import qt
-from silo.workbench.words import translate
+from silo.workbench.pane.activity import Entry, Line, Tone
+from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry, Extraction
     from silo.bom.walk.tree import Key
+    from silo.outbox.store import Store
     from silo.workbench.commit.flow import Theirs
     from silo.workbench.freecad.witness import Account
     from silo.workbench.preview.flow import PreviewFlow
@@ -147,7 +154,7 @@ def _look_at(path: str, known: Mapping[str, Any]) -> Seen:
     doc = known.get(path)
     if doc is None:
         return Seen(State.READY)
-    if live.lost_assemblies(doc):
+    if saving.lost_objects(doc):
         return Seen(State.LOST)
     saved_at = str(getattr(doc, "LastModifiedDate", "") or "")
     if not saving.is_modified(doc):
@@ -159,8 +166,7 @@ def write_identity(candidate: Candidate, identity: str) -> None:
     """Write an identity into a component's document and save it. GUI thread."""
     entry = candidate.entry
     doc = saving.open_fully(entry.doc_path)
-    if live.lost_assemblies(doc):
-        raise DocumentError(entry.doc_path, "made by a newer FreeCAD; saving it here would destroy it")
+    saving.refuse_loss(doc)
     whole = not candidate.shares_file
     for name in candidate.article.objects if candidate.article is not None else (entry.object_name,):
         saving.write_identity(doc, name, identity, whole_document=whole)
@@ -174,8 +180,7 @@ def remove_identity(candidate: Candidate, *, no_part: bool) -> None:
         mark it as no part as well; otherwise such a mark goes too.
     """
     doc = saving.open_fully(candidate.entry.doc_path)
-    if live.lost_assemblies(doc):
-        raise DocumentError(doc.FileName, "made by a newer FreeCAD; saving it here would destroy it")
+    saving.refuse_loss(doc)
     for name in candidate.article.objects if candidate.article is not None else ():
         saving.remove_identity(doc, name, no_part=no_part)
     saving.save(doc, mark_parents=True)
@@ -192,8 +197,6 @@ def unedited() -> list[Any]:
 
 def save_marked(doc: Any) -> None:
     """Save a document that was unedited, and that FreeCAD marked because something below it was saved."""
-    if live.lost_assemblies(doc):
-        return
     saving.save_marked(doc)
 
 
@@ -230,6 +233,107 @@ def _target(meant: Any, problem: LinkProblem) -> Any:
     return found
 
 
+class LossGuard:
+    """A document observer: nothing of a newer FreeCAD's file is lost without a question.
+
+    FreeCAD lets nobody stop a save. So the newer file is kept before it, and if the person says so it is put
+    back after it; then the document has edits that are not on disk, and what was saved is kept aside.
+
+    outbox
+        gives the store, which keeps copies.
+    add
+        shows a box in the pane.
+    ask
+        True where the person wants to save over the newer file: title and text.
+    """
+
+    def __init__(
+        self, outbox: Callable[[], Store], add: Callable[[Entry], None], ask: Callable[[str, str], bool]
+    ) -> None:
+        self._outbox, self._add, self._ask = outbox, add, ask
+        self._put_back: dict[str, Path] = {}
+        for doc in host.documents():
+            self._opened(doc.Name)
+
+    # FreeCAD calls these; an exception in them would only be printed.
+
+    def slotChangedDocument(self, doc: Any, prop: str) -> None:
+        """FreeCAD names the file before it reads it; what it could not load is known after that."""
+        if prop == "FileName" and doc.FileName:
+            name = doc.Name
+            qt.later(0, lambda: self._opened(name))
+
+    def _opened(self, name: str) -> None:
+        doc = next((one for one in host.documents() if one.Name == name), None)
+        if doc is not None and (lost := saving.lost_objects(doc)):
+            told = translate("Silo", "This FreeCAD {here} does not know, and has not loaded: {lost}.")
+            advice = translate("Silo", "Saving the file here would remove them from it: change it there.")
+            self._tell(doc, _words(told, doc, lost), advice)
+
+    def slotStartSaveDocument(self, doc: Any, filename: str) -> None:
+        """The file is about to be replaced."""
+        if os.path.realpath(filename) != os.path.realpath(doc.FileName or ""):
+            return
+        if not (lost := saving.lost_objects(doc)):
+            return
+        try:
+            kept = self._outbox().keep_aside(doc.FileName)
+        except SiloError as error:
+            kept = None
+            self._tell(doc, str(error))
+        question = translate(
+            "Silo",
+            "{name} was saved by FreeCAD {there}. This FreeCAD {here} does not know, and would remove from "
+            "the file: {lost}.",
+        )
+        if kept is None or self._ask(translate("Silo", "Newer file"), _words(question, doc, lost)):
+            told = translate("Silo", "Saved over the newer file, without {lost}.")
+            where = translate("Silo", "The newer file is kept for {n} days at {path}")
+            self._tell(doc, _words(told, doc, lost), *([_kept_words(where, kept)] if kept else []))
+        else:
+            self._put_back[doc.Name] = kept
+
+    def slotFinishSaveDocument(self, doc: Any, _filename: str) -> None:
+        """Put the newer file back, if the person wants to keep it."""
+        if (newer := self._put_back.pop(doc.Name, None)) is None:
+            return
+        path, name = doc.FileName, doc.Name
+        mine = self._outbox().keep_aside(path)
+        with newer.open("rb") as read, replacing(path, mode=0o644) as write:
+            shutil.copyfileobj(read, write)
+        where = translate("Silo", "What you saved is kept for {n} days at {path}")
+        self._tell(
+            doc, translate("Silo", "The newer file was kept."), *([_kept_words(where, mine)] if mine else [])
+        )
+        qt.later(0, lambda: saving.mark_modified(name))  # FreeCAD takes the mark away after this
+
+    def _tell(self, doc: Any, *lines: str) -> None:
+        title = translate("Silo", "Made by a newer FreeCAD: {name}")
+        self._add(
+            Entry(
+                key=f"newer-freecad:{doc.FileName}",
+                title=title.replace("{name}", os.path.basename(doc.FileName)),
+                when=time.time(),
+                tone=Tone.WARNING,
+                lines=tuple(Line(text, Tone.WARNING) for text in lines),
+                rank=1,
+                icon="silo-commit",
+            )
+        )
+
+
+def _words(text: str, doc: Any, lost: list[str]) -> str:
+    here = "{}.{}".format(*host.version())
+    by = ".".join(map(str, saved_by(doc.getProgramVersion()))) or "?"
+    for key, value in (("{name}", os.path.basename(doc.FileName)), ("{here}", here), ("{there}", by)):
+        text = text.replace(key, value)
+    return text.replace("{lost}", plain(", ".join(lost), 300))
+
+
+def _kept_words(text: str, path: Path) -> str:
+    return text.replace("{n}", str(KEPT_ASIDE_DAYS)).replace("{path}", str(path))
+
+
 class LiveDocuments:
     """FreeCAD's documents, as :class:`silo.workbench.commit.plan.Documents` wants them."""
 
@@ -238,7 +342,7 @@ class LiveDocuments:
     is_modified = staticmethod(saving.is_modified)
     is_edited = staticmethod(saving.is_edited)
     is_writable = staticmethod(saving.is_writable)
-    lost_assemblies = staticmethod(live.lost_assemblies)
+    lost_objects = staticmethod(saving.lost_objects)
     save = staticmethod(saving.save)
 
     def __init__(self, opened: Opened) -> None:
@@ -258,8 +362,10 @@ class LiveDesk:
 
     def snapshot(self, doc: Any) -> Snapshot:
         """The assembly that is active in the 3D view decides between several."""
-        cached = live.cached_document(doc)
         hardware = self._count_hardware()
+        if (whole := live.in_file(doc)) is not None:
+            return plan.take(whole, walk=partial(extract, hardware=hardware))
+        cached = live.cached_document(doc)
         walk = partial(live.extract_object, hardware=hardware)
         return plan.take(cached, assembly=self._hint(doc, cached), walk=walk)
 

@@ -115,6 +115,76 @@ def damage(path: str, name: str = "") -> FcstdError | None:
     return None
 
 
+# File → its state, and the name, label and type of each object of a type that this FreeCAD does not know.
+_UNKNOWN: dict[str, tuple[object, dict[str, tuple[str, str]]]] = {}
+
+
+def lost_objects(doc: Any) -> list[str]:
+    """Return the objects of a document's file that this FreeCAD could not load: "LCS (App::Point)".
+
+    FreeCAD drops objects of types that it does not know, says so in the report view only, and saving the
+    document then destroys them in the file. The file's own version says whether that can be: to read each
+    file takes too long.
+    """
+    if not doc.FileName or _is_ours(doc.getProgramVersion()):
+        return []
+    return [
+        f"{label} ({kind})"
+        for name, (label, kind) in _of_unknown_types(doc).items()
+        if doc.getObject(name) is None
+    ]
+
+
+def refuse_loss(doc: Any) -> None:
+    """Raise DocumentError for a document whose saving would destroy objects of a newer FreeCAD."""
+    from silo.bom.errors import DocumentError
+
+    if lost := lost_objects(doc):
+        told = f"made by a newer FreeCAD; saving it here would destroy {', '.join(lost)}"
+        raise DocumentError(doc.FileName, f"{told}. Open and change it in the newer FreeCAD")
+
+
+def _is_ours(program: str) -> bool:
+    from silo.bom.document import saved_by  # late: FreeCAD's start waits for this module
+
+    by = saved_by(program)
+    return bool(by) and by[:2] <= host.version()
+
+
+def _of_unknown_types(doc: Any) -> dict[str, tuple[str, str]]:
+    from silo.bom.errors import DocumentError
+    from silo.fcstd import Library
+    from silo.fcstd.container import ANY_SIZE, FileState
+
+    path = doc.FileName
+    try:
+        state = FileState.of(os.stat(path))
+        if (known := _UNKNOWN.get(path)) is not None and known[0] == state:
+            return known[1]
+        with Library(limits=ANY_SIZE) as library:
+            document = library.open(path)
+            types = frozenset(() if _is_ours(document.ProgramVersion) else doc.supportedTypes())
+            objects = [obj for obj in document.Objects if types and obj.TypeId not in types]
+            found = {obj.Name: (obj.Label, obj.TypeId) for obj in objects if not _is_made_again(obj, objects)}
+    except (OSError, DocumentError):
+        return {}
+    _UNKNOWN[path] = state, found
+    return found
+
+
+def _is_made_again(obj: Any, unknown: list[Any]) -> bool:
+    """True for the point of an origin that nothing else refers to: FreeCAD 1.1 makes it when it is missing.
+
+    Each origin of 1.1 has such a point, and so each file with a body.
+    """
+    if obj.TypeId != "App::Point":
+        return False
+    # A coordinate system that is lost as well is named itself.
+    lost = {one.Name for one in unknown}
+    others = [obj.Document.getObject(name) for name in obj.Document.mentioning(obj.Name) if name not in lost]
+    return all(other.TypeId == "App::Origin" for other in others)
+
+
 def save(doc: Any, *, mark_parents: bool = False) -> None:
     """Save a document to its file; :class:`DocumentError` unless the file really was written.
 
@@ -132,6 +202,7 @@ def save(doc: Any, *, mark_parents: bool = False) -> None:
         raise DocumentError(path, "the file is read-only")
     if (damaged := damage(path)) is not None:
         raise DocumentError(path, f"{damaged.reason}; {DAMAGED}")
+    refuse_loss(doc)
     before = stamp_of(path)
     try:
         with nullcontext() if mark_parents else others_unmarked(doc):
@@ -156,6 +227,16 @@ def _save(doc: Any) -> None:
         from silo.workbench.gui.widgets import save_in_view
 
         save_in_view(doc)
+
+
+def mark_modified(name: str) -> None:
+    """Mark the document of this name as one with edits that are not on disk."""
+    for doc in (one for one in host.documents() if one.Name == name):
+        if host.version() < (0, 21):
+            for obj in doc.Objects[:1]:
+                obj.touch()  # 0.20 takes no mark, and marks a document for this
+        elif (view := host.view_of(doc)) is not None:
+            view.Modified = True
 
 
 @contextmanager

@@ -224,14 +224,30 @@ def read(parent: Any, title: str, lines: Iterable[str]) -> None:
     window.deleteLater()
 
 
-def warn(parent: Any, title: str, text: str) -> None:
-    """Show a problem and wait until it is read."""
+def _message(parent: Any, title: str, text: str) -> Any:
     box = QtWidgets.QMessageBox(parent)
     box.setIcon(QtWidgets.QMessageBox.Icon.Warning)
     box.setWindowTitle(title)
     box.setTextFormat(QtCore.Qt.TextFormat.PlainText)
     box.setText(words.visible(text, 2000))
+    return box
+
+
+def warn(parent: Any, title: str, text: str) -> None:
+    """Show a problem and wait until it is read."""
+    run_dialog(_message(parent, title, text))
+
+
+def confirm(parent: Any, title: str, text: str, yes: str, no: str) -> bool:
+    """Ask a question with two answers; ``no`` is the harmless answer, also of Return and Escape."""
+    box = _message(parent, title, text)
+    box.setObjectName("SiloConfirm")
+    wanted = box.addButton(yes, QtWidgets.QMessageBox.ButtonRole.DestructiveRole)
+    harmless = box.addButton(no, QtWidgets.QMessageBox.ButtonRole.RejectRole)
+    box.setDefaultButton(harmless)
+    box.setEscapeButton(harmless)
     run_dialog(box)
+    return bool(box.clickedButton() == wanted)
 
 
 class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no types

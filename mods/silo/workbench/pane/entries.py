@@ -13,6 +13,7 @@ from silo.activity import Count, count_texts, headline, no_changes, unregistered
 from silo.api.boms import unusual
 from silo.api.events import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
+from silo.bom.document import saved_by
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.model import BomEntry, walk_entries
@@ -49,6 +50,36 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
         icon="silo-bom" if sent.status in (Status.MERGED, Status.BLOCKED) else "silo-commit",
         part_of=_batch_of(sent, tone),
         document=sent.resolved.assembly.doc_path if sent.resolved is not None else "",
+    )
+
+
+def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> Entry | None:
+    """Return the box that says that the team works with another FreeCAD; None if it does not, or if the
+    server does not say.
+
+    wanted
+        the team's version, such as "1.0".
+    """
+    team = saved_by(wanted)
+    if not team or team == here:
+        return None
+    title = translate("Silo", "Your team works with FreeCAD {team}; this is {here}")
+    if here > team:
+        text = translate(
+            "Silo",
+            "A file that is saved here may hold objects that the FreeCAD of your colleagues does not know "
+            "and does not load.",
+        )
+    else:
+        text = translate(
+            "Silo",
+            "Files of your colleagues may hold objects that this FreeCAD does not know. You are asked before "
+            "a save removes such objects from a file.",
+        )
+    shown = title.replace("{team}", wanted).replace("{here}", "{}.{}".format(*here))
+    when = time.time() if now is None else now
+    return Entry(
+        "team-freecad", shown, when, Tone.WARNING, lines=(Line(text, Tone.WARNING),), icon="silo-commit"
     )
 
 

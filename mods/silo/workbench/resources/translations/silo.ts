@@ -5,6 +5,21 @@
         <name>Silo</name>
         <message>
             <location filename="../../addon.py" />
+            <source>Looking at the server</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>Save over it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>Keep the newer file</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
             <source>{name} has no Silo part number yet. Register it first.</source>
             <translation type="unfinished" />
         </message>
@@ -348,7 +363,7 @@
         </message>
         <message>
             <location filename="../../commit/plan.py" />
-            <source>made by a newer FreeCAD: saving it here would destroy its assemblies, so it is not saved</source>
+            <source>made by a newer FreeCAD: saving it here would destroy {lost}, so it is not saved. Make these edits in the newer FreeCAD</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -389,6 +404,51 @@
         <message>
             <location filename="../../freecad/live_desk.py" />
             <source>What Silo knows of this component</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>This FreeCAD {here} does not know, and has not loaded: {lost}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>Saving the file here would remove them from it: change it there.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>{name} was saved by FreeCAD {there}. This FreeCAD {here} does not know, and would remove from the file: {lost}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>Newer file</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>Saved over the newer file, without {lost}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>The newer file is kept for {n} days at {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>What you saved is kept for {n} days at {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>The newer file was kept.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/live_desk.py" />
+            <source>Made by a newer FreeCAD: {name}</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -643,6 +703,21 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../pane/dock.py" />
             <source>Database Activity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Your team works with FreeCAD {team}; this is {here}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>A file that is saved here may hold objects that the FreeCAD of your colleagues does not know and does not load.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Files of your colleagues may hold objects that this FreeCAD does not know. You are asked before a save removes such objects from a file.</source>
             <translation type="unfinished" />
         </message>
         <message>
