@@ -47,7 +47,8 @@ from silo.bom.resolve import (
     resolve_with,
     unregistered_findings,
 )
-from silo.standard_items import find_items
+from silo.platform import cache_folder
+from silo.standard_items import Memory, find_items, server_of
 
 __all__ = [
     "BomDiff",
@@ -265,7 +266,9 @@ def names_of(resolved: Resolved, lines: Iterable[Mapping[str, Any]] = ()) -> dic
     return names | {entry.part_number: entry.name or "" for entry in known if entry.part_number}
 
 
-def decide(resolved: Resolved, lines: Sequence[Mapping[str, Any]], *, allow_missing: bool = False) -> Outcome:
+def decide(
+    resolved: Resolved, lines: Sequence[Mapping[str, Any]], *, allow_missing: bool = False, server: str = ""
+) -> Outcome:
     """What is to become of one assembly: unregistered, blocked, unchanged, or to be merged.
 
     lines
@@ -273,15 +276,34 @@ def decide(resolved: Resolved, lines: Sequence[Mapping[str, Any]], *, allow_miss
     allow_missing
         sync although links are broken: lines that stood for a missing component in the last sync stay as they
         are; what the server has not heard of stays out, and the server keeps that the BOM is incomplete.
+    server
+        where it is merged: one that does not show which lines are unreferenced is told of each of them once.
     """
     if resolved.assembly.part_number is None:
         return Outcome(Status.UNREGISTERED, resolved)
     plan, names = resolved.plan(lines), names_of(resolved, lines)
     if blocking(resolved) and not allow_missing:
         return Outcome(Status.BLOCKED, resolved, plan, names=names)
-    return Outcome(
-        Status.MERGED if resolved.is_news(plan, lines) else Status.UNCHANGED, resolved, plan, names=names
-    )
+    is_news = resolved.is_news(plan, lines) and not _is_told(resolved, plan, server)
+    return Outcome(Status.MERGED if is_news else Status.UNCHANGED, resolved, plan, names=names)
+
+
+def _told() -> Memory:
+    """Server → part number of an assembly → its unreferenced lines that the server was told of."""
+    return Memory(cache_folder() / "unreferenced.json")
+
+
+def _is_told(resolved: Resolved, plan: MergePlan, server: str) -> bool:
+    if resolved.assembly.silo_uuid in resolved.last_syncs or replace(plan, flag=()).news:
+        return False
+    told = _told().known(server).get(resolved.assembly.part_number or "", "")
+    return bool(plan.flag) and set(plan.flag) <= set(told.split("\n"))
+
+
+def merged(resolved: Resolved, plan: MergePlan, server: str) -> None:
+    """Remember what a merge has told a server that does not show which lines are unreferenced."""
+    if plan.flag and resolved.assembly.silo_uuid not in resolved.last_syncs:
+        _told().remember(server, {resolved.assembly.part_number or "": "\n".join(plan.flag)})
 
 
 def sync(
@@ -308,13 +330,16 @@ def sync(
     number = resolved.assembly.part_number
     try:
         lines = server_lines(resolved, api) if lines is None else lines
-        outcome = decide(resolved, lines, allow_missing=allow_missing)
+        server = server_of(api)
+        outcome = decide(resolved, lines, allow_missing=allow_missing, server=server)
         if dry_run and outcome.status in (Status.MERGED, Status.UNCHANGED):
             return replace(outcome, status=Status.DRY_RUN)
         if outcome.status is not Status.MERGED or number is None:
             return outcome
         request = merge_request(resolved, sync_id, describe())
-        return replace(outcome, result=api.merge_bom(number, request))
+        outcome = replace(outcome, result=api.merge_bom(number, request))
+        merged(resolved, resolved.plan(lines), server)
+        return outcome
     except SiloError as error:
         return Outcome(Status.FAILED, resolved, error=error)
 

@@ -26,7 +26,7 @@ from silo.api.client import SiloClient
 from silo.api.events import Connection, ConnectionState, EventListener, ServerEvent
 from silo.api.policy import Retries
 from silo.batch import Options, TopResult, sync_top
-from silo.bom.errors import InputError, SiloError
+from silo.bom.errors import InputError, ServerFaultError, SiloError
 from silo.bom_sync import Status, compare, resolve
 from silo.cli.common import read_assembly
 from silo.inertia.output.push import PushItem, PushPlan, push
@@ -189,6 +189,10 @@ MOODS = {
     "no auth/me": Moods(auth_me=False),
     "no revisions": Moods(revisions_route=False, properties="item"),
     "no numbers": Moods(numbers=False),
+    "pages of 2, counted": Moods(page=2, total="header", oldest_first=True),
+    "pages of 2, counted in the body": Moods(page=2, total="body", oldest_first=True, batch=200),
+    "pages of 2, next": Moods(page=2, total="next", oldest_first=True),
+    "pages of 2, linked": Moods(page=2, total="link"),
 }
 
 
@@ -549,3 +553,95 @@ def test_a_project_moves_from_a_trial_server_to_the_real_one(tmp_path: Path, moo
         top = str(tmp_path / "another" / "gearbox" / desk.top.name)
         assert register_elsewhere(top, real.url, str(tmp_path / "computer 2")) == 0
         assert (len(real.items), set(real.holds().values())) == (NAMES, {1})
+
+
+# -- pages -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("oldest_first", [True, False], ids=["oldest first", "newest first"])
+@pytest.mark.parametrize("how", ["header", "body", "next", "link"])
+def test_lists_are_read_to_their_end(how: str, oldest_first: bool) -> None:
+    """However the server says that there is more, and whatever size its pages have."""
+    moods = Moods(page=50, total=how, oldest_first=oldest_first)
+    with real_silo(moods) as silo, SiloClient(silo.url, TOKEN) as client:
+        top = client.create_item("kindred-rd", "A01", "Top", item_type="assembly").part_number
+        parts = [client.create_item("kindred-rd", "M01", f"Part {n}").part_number for n in range(120)]
+        for number in parts:
+            client.add_bom_line(top, number)
+            silo.named("Top").revisions.append({"revision_number": len(silo.named("Top").revisions) + 1})
+        silo.seen.clear()
+        assert [one.revision_number for one in client.revisions(top)] == [*range(121, 0, -1)]
+        assert len(silo.seen) == 3
+        assert [one.revision_number for one in client.revisions(top, newest=2)] == [121, 120]
+        assert [one.revision_number for one in client.revisions(top, newest=1, after=120)] == [121]
+        assert client.revisions(top, after=121) == []
+        assert [line.child_part_number for line in client.get_bom(top)] == parts
+        for number in parts:
+            silo.one(number).lines.append({"child_part_number": top, "quantity": 1})
+        assert len(client.where_used(top)) == 120
+
+
+def test_the_newest_of_a_server_that_says_so_is_one_row() -> None:
+    """Newest first, with their count: no second question."""
+    with real_silo(Moods(page=50, total="header")) as silo, SiloClient(silo.url, TOKEN) as client:
+        top = client.create_item("kindred-rd", "A01", "Top").part_number
+        silo.named("Top").revisions += [{"revision_number": n} for n in range(2, 121)]
+        silo.seen.clear()
+        assert [one.revision_number for one in client.revisions(top, newest=1)] == [120]
+        assert len(silo.seen) == 1
+
+
+@pytest.mark.parametrize("how", ["header", "body", "next", "link"])
+def test_a_list_with_more_than_it_shows_is_no_list(how: str) -> None:
+    """A server that shows the first page whatever it is asked: nothing is concluded from that."""
+    with (
+        real_silo(Moods(page=2, total=how, first_page_only=True)) as silo,
+        SiloClient(silo.url, TOKEN) as client,
+    ):
+        top = client.create_item("kindred-rd", "A01", "Top").part_number
+        for n in range(3):
+            client.add_bom_line(top, client.create_item("kindred-rd", "M01", f"Part {n}").part_number)
+        with pytest.raises(ServerFaultError, match="more of them than the 2 that it shows"):
+            client.get_bom(top)
+
+
+def test_an_answer_for_many_that_is_cut_off_is_asked_one_by_one() -> None:
+    """Read as whole, it would have the rest registered again."""
+    with real_silo(Moods(page=2, total="body", batch=200)) as silo, SiloClient(silo.url, TOKEN) as client:
+        made = [client.create_item("kindred-rd", "M01", f"Part {n}").id for n in range(5)]
+        assert sorted(client.get_items_by_uuid(made)) == sorted(made)
+
+
+# -- what everybody is told ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("how", ["sync", "queue"])
+def test_an_unreferenced_line_is_told_once(tmp_path: Path, how: str) -> None:
+    """A Silo that does not show which lines are unreferenced gets no merge and sends no event per sync."""
+    with real_silo() as silo:
+        desk = registered(tmp_path, silo)
+        top = silo.named("Top Assembly")
+
+        def sync() -> int:
+            silo.seen.clear()
+            if how == "sync":
+                assert desk.sync() == []
+            else:
+                extraction = read_assembly(str(desk.top))
+                uuid = extraction.assembly.silo_uuid or ""
+                desk.outbox.add(Commit(str(desk.top), 0.0, identity=uuid, extraction=extraction), silo.url)
+                with desk.client() as client:
+                    (sent,) = send_all(desk.outbox, client, force=True).sent
+                assert sent.status in (Status.MERGED, Status.UNCHANGED)
+            return silo.seen.count(f"POST /api/items/{top.part_number}/bom/merge")
+
+        assert [sync(), sync()] == [1, 0]
+        lines = [{"quantity": 1, "source": "assembly", "child_part_number": f"M01-900{n}"} for n in range(3)]
+        top.lines.append(lines[0])
+        assert [sync(), sync()] == [1, 0]
+        top.lines += lines[1:]
+        assert [sync(), sync()] == [1, 0]
+        top.lines.remove(lines[0])
+        assert sync() == 0, "a person decided about one; the others are known"
+        top.lines[0]["quantity"] = 99
+        assert [sync(), sync()] == [1, 0]

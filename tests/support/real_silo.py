@@ -61,6 +61,10 @@ class Moods:
     expired: bool = False  # the session is over: everything leads to the login page
     revisions_route: bool = True
     numbers: bool = True  # POST /api/generate-part-number
+    page: int = 0  # the most rows in one answer; 0: all
+    total: str = ""  # how a page says that there is more: in the "header", the "body", "next", "link", or not
+    first_page_only: bool = False  # the offset is ignored
+    oldest_first: bool = False  # revisions
 
 
 @dataclass
@@ -76,6 +80,14 @@ class Item:
     files: dict[int, bytes] = field(default_factory=dict)
     attachments: list[tuple[str, bytes]] = field(default_factory=list)
     lines: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Page:
+    """An answer with headers of its own."""
+
+    content: Any
+    headers: dict[str, str]
 
 
 class Refused(Exception):
@@ -191,9 +203,23 @@ class RealSilo(ThreadingHTTPServer):
             data["properties"] = item.revisions[-1]["properties"]
         return data
 
-    def listed(self, rows: list[Any]) -> Any:
-        content = None if self.moods.null_lists and not rows else rows
-        return {self.moods.list_key: content} if self.moods.list_key else content
+    def listed(self, rows: list[Any], query: dict[str, str] | None = None) -> Any:
+        """A list; with its ``query``, one page of it."""
+        if query is None or not self.moods.page:
+            content = None if self.moods.null_lists and not rows else rows
+            return {self.moods.list_key: content} if self.moods.list_key else content
+        start = 0 if self.moods.first_page_only else int(query.get("offset", 0))
+        size = min(self.moods.page, int(query.get("limit", self.moods.page)))
+        shown, more = rows[start : start + size], start + size < len(rows)
+        following = f"/api/elsewhere?offset={start + size}&limit={size}"
+        how = self.moods.total
+        headers = {"X-Total-Count": str(len(rows))} if how == "header" else {}
+        links = f'</api/x?offset=0>; rel="first", <{following}>; rel="next"'
+        headers |= {"Link": links} if how == "link" and more else {}
+        if how not in ("body", "next"):
+            return Page(shown, headers)
+        told = {"total": len(rows)} if how == "body" else {"next": following if more else None}
+        return {self.moods.list_key or "items": shown, **told}
 
     def keys(self, body: Any, *known: str) -> None:
         unknown = sorted(set(body) - set(known)) if self.moods.strict else []
@@ -233,6 +259,8 @@ def _list(silo: RealSilo, query: dict[str, str], _body: Any) -> Answer:
     found = [
         i for _, i in sorted(silo.items.items()) if wanted in f"{i.part_number} {i.description}".casefold()
     ]
+    if silo.moods.page:
+        return 200, silo.listed([silo.shown(item) for item in found], query)
     start, limit = int(query.get("offset", 0)), int(query.get("limit", 50))
     return 200, silo.listed([silo.shown(item) for item in found[start : start + limit]])
 
@@ -282,7 +310,8 @@ def _by_uuid(silo: RealSilo, _query: dict[str, str], _body: Any, wanted: str) ->
 def _batch(silo: RealSilo, _query: dict[str, str], body: Any) -> Answer:
     if silo.moods.batch != 200:
         raise Refused(silo.moods.batch, "refused")
-    return 200, silo.listed([silo.shown(item) for item in silo.items.values() if item.id in body["uuids"]])
+    found = [silo.shown(item) for item in silo.items.values() if item.id in body["uuids"]]
+    return 200, silo.listed(found, {} if silo.moods.total else None)
 
 
 def _update(silo: RealSilo, _query: dict[str, str], body: Any, number: str) -> Answer:
@@ -294,10 +323,12 @@ def _update(silo: RealSilo, _query: dict[str, str], body: Any, number: str) -> A
     return 200, silo.shown(item)
 
 
-def _revisions(silo: RealSilo, _query: dict[str, str], _body: Any, number: str) -> Answer:
+def _revisions(silo: RealSilo, query: dict[str, str], _body: Any, number: str) -> Answer:
     if not silo.moods.revisions_route:
         raise PlainError("404 page not found")
-    return 200, silo.listed([silo.shown_revision(row) for row in reversed(silo.one(number).revisions)])
+    rows = silo.one(number).revisions
+    rows = rows if silo.moods.oldest_first else rows[::-1]
+    return 200, silo.listed([silo.shown_revision(row) for row in rows], query)
 
 
 def _revision(silo: RealSilo, _query: dict[str, str], _body: Any, number: str, revision: str) -> Answer:
@@ -350,8 +381,19 @@ def _presign(silo: RealSilo, _query: dict[str, str], body: Any) -> Answer:
     }
 
 
-def _bom(silo: RealSilo, _query: dict[str, str], _body: Any, number: str) -> Answer:
-    return 200, silo.listed([dict(line) for line in silo.one(number).lines])
+def _bom(silo: RealSilo, query: dict[str, str], _body: Any, number: str) -> Answer:
+    return 200, silo.listed([dict(line) for line in silo.one(number).lines], query)
+
+
+def _where_used(silo: RealSilo, query: dict[str, str], _body: Any, number: str) -> Answer:
+    child = silo.one(number).part_number
+    lines = [
+        {"parent_part_number": item.part_number, "quantity": line["quantity"]}
+        for item in silo.items.values()
+        for line in item.lines
+        if line["child_part_number"] == child
+    ]
+    return 200, silo.listed(lines, query)
 
 
 def _line_of(silo: RealSilo, item: Item, child: str) -> dict[str, Any]:
@@ -460,6 +502,7 @@ _ROUTES: tuple[tuple[str, str, Callable[..., Answer]], ...] = (
     (f"api/items/{_N}/file/{_N}", "GET", _download),
     (f"api/items/{_N}/bom", "GET", _bom),
     (f"api/items/{_N}/bom", "POST", _add_line),
+    (f"api/items/{_N}/bom/where-used", "GET", _where_used),
     (f"api/items/{_N}/bom/merge", "POST", _merge),
     (f"api/items/{_N}/bom/{_N}", "PUT", _change_line),
     ("api/uploads/presign", "POST", _presign),
@@ -522,7 +565,8 @@ class _Handler(BaseHTTPRequestHandler):
             return self._write(*early["502 before"])
         if fault == "slow":
             self.server.ending.wait(1.0)  # longer than the client waits for an answer
-        return self._write(status, content, {}, cut=fault == "cut")
+        page = content if isinstance(content, Page) else Page(content, {})
+        return self._write(status, page.content, page.headers, cut=fault == "cut")
 
     do_GET = do_POST = do_PUT = do_DELETE = _any
 

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 from pydantic import ValidationError
 
 from silo.api.policy import Reply, complaint
-from silo.api.transport import LISTS, Caller, Cancel, Params, body, stop_if
+from silo.api.transport import Caller, Cancel, body, stop_if
 from silo.api.wire import (
     Answer,
     BomLine,
@@ -258,8 +258,8 @@ class BomCalls(Caller):
 
     def get_bom(self, part_number: str, /) -> list[BomLine]:
         """The BOM lines directly below an item."""
-        reply = self._get(f"the BOM of {part_number}", *_bom(part_number))
-        return _checked(part_number, reply.models(BomLine, *LISTS))
+        pages = self._all(BomLine, f"the BOM of {part_number}", *_bom(part_number))
+        return _checked(part_number, [line for page, _ in pages for line in page])
 
     def get_boms(
         self, part_numbers: Iterable[str], /, *, cancelled: Cancel | None = None
@@ -302,15 +302,9 @@ class BomCalls(Caller):
 
     def where_used(self, part_number: str, /) -> list[WhereUsedLine]:
         """The parents that have this item on their BOM; all of them, from however many pages."""
-        found: list[WhereUsedLine] = []
-        while True:
-            params: Params = {"offset": len(found)} if found else {}
-            subject = f"the uses of {part_number}"
-            reply = self._get(subject, *_bom(part_number), "where-used", params=params)
-            page = reply.models(WhereUsedLine, "where_used", "parents", *LISTS)
-            found.extend(page)
-            if not page or len(found) >= reply.total:
-                return found
+        where = (f"the uses of {part_number}", *_bom(part_number), "where-used")
+        pages = self._all(WhereUsedLine, *where, keys=("where_used", "parents"))
+        return [line for page, _ in pages for line in page]
 
     def merge_bom(
         self,

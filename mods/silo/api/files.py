@@ -307,27 +307,29 @@ class FileCalls(Caller):
 
     def documents_of(self, part_number: str, /) -> list[Document]:
         """The documents that hold an item, its own first."""
-        reply = self._get(f"the files of {part_number}", "items", part_number, "documents")
-        return reply.models(Document, "documents", *LISTS)
+        where = (f"the files of {part_number}", "items", part_number, "documents")
+        return [one for page, _ in self._all(Document, *where, keys=("documents",)) for one in page]
 
     def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
         """The revisions of an item, newest first; those above the number ``after``.
 
-        ``newest``: only so many. A server that knows neither sends all, and gets no further question.
+        ``newest``: only so many. A server that knows neither sends all, in whatever order and pages.
         """
-        found: list[Revision] = []
-        params: dict[str, int] = {"limit": newest or _PAGE, **({"after": after} if after else {})}
-        while True:
+
+        def read(limit: int) -> Iterator[tuple[list[Revision], int]]:
+            more = {"after": after} if after else {}
+            where = (*_path_of(part_number), "revisions")
             subject = f"the revisions of {part_number}"
-            reply = self._get(subject, *_path_of(part_number), "revisions", params=params)
-            page = reply.models(Revision, "revisions", *LISTS)
-            lowest = found[-1].revision_number if found else None
-            fresh = [r for r in page if r.revision_number > after]
-            fresh = [r for r in fresh if lowest is None or r.revision_number < lowest]
-            found += sorted(fresh, key=lambda revision: revision.revision_number, reverse=True)
-            if newest is not None or not fresh or len(found) >= reply.total:
-                return found[:newest]
-            params["before"] = found[-1].revision_number
+            return self._all(Revision, subject, *where, keys=("revisions",), limit=limit, **more)
+
+        pages = read(newest or _PAGE)
+        known, total = next(pages)
+        # Numbers rise from 1: oldest first, the newest is not here while its number is below their count.
+        is_whole = max((one.revision_number for one in known), default=after) >= after + total
+        if newest is None or not is_whole:
+            known = [one for page, _ in (read(_PAGE) if newest else pages) for one in page] + known
+        found = {one.revision_number: one for one in known if one.revision_number > after}
+        return [found[number] for number in sorted(found, reverse=True)][:newest]
 
     def get_revision(self, part_number: str, number: int, /) -> Revision:
         """One revision, with the files that its file links to."""

@@ -50,6 +50,7 @@ from dataclasses import dataclass, field, replace
 from email.utils import parsedate_to_datetime
 from enum import StrEnum
 from typing import Any, TypeVar
+from urllib.parse import parse_qsl, urlsplit
 
 import pydantic
 import requests
@@ -278,7 +279,17 @@ class Reply:
     @property
     def total(self) -> int:
         """How many things there are on all pages; 0 where the server does not say."""
-        return whole_number(self.headers.get("X-Total-Count", "")) or 0
+        said = self.data() if "X-Total-Count" not in self.headers else None
+        told = said.get("total") if isinstance(said, dict) else self.headers.get("X-Total-Count", "")
+        return whole_number(str(told)) or 0
+
+    @property
+    def next(self) -> dict[str, str]:
+        """The parameters of the page that the answer names as its next one; {} for none."""
+        said = self.data()
+        links = re.search(r'<([^>]*)>;[^,]*rel="?next\b', self.headers.get("Link", ""))
+        address = links[1] if links else said.get("next") if isinstance(said, dict) else None
+        return dict(parse_qsl(urlsplit(address).query)) if isinstance(address, str) else {}
 
     def data(self) -> Any:
         """The JSON of a good answer; raises :class:`ServerFaultError` where it is none."""

@@ -495,6 +495,31 @@ class Caller:
             )
         )
 
+    def _all(
+        self, kind: type[Body], subject: str, *segments: str, keys: Sequence[str] = (), **params: str | int
+    ) -> Iterator[tuple[list[Body], int]]:
+        """The rows of a list, page by page, each with how many there are in all (0: not known), to the end.
+
+        Raises :class:`ServerFaultError` where the server has more and does not show them: a list is whole, or
+        it is none.
+        """
+        more, rows, last = dict(params), 0, list[Body]()
+        while True:
+            reply = self._get(subject, *segments, params=more)
+            page = reply.models(kind, *keys, *LISTS)
+            fresh = [] if page == last else page  # a server that knows no pages sends the same once more
+            rows, following = rows + len(fresh), reply.next if page else {}
+            total = max(reply.total, rows + bool(following))
+            yield fresh, total
+            if rows >= total:
+                return
+            if not fresh:
+                raise ServerFaultError(
+                    f"{subject}: {self._address.host} has more of them than the {rows} that it shows, "
+                    "whatever page is asked for. Its administrator can make the pages of lists larger"
+                )
+            last, more = page, {**params, **(following or {"offset": rows})}
+
     def _ask(self, subject: str, *segments: str, body: BaseModel, cancelled: Cancel | None = None) -> Reply:
         """Ask what is too long for an address: a POST that may be repeated freely."""
         return self._change("POST", subject, *segments, body=body, repeatable=True, cancelled=cancelled)

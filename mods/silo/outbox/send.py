@@ -52,9 +52,10 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.report import from_plain, project_folder
-from silo.bom_sync import Resolved, Status, decide, merge_request, resolve, server_lines
+from silo.bom_sync import Resolved, Status, decide, merge_request, merged, resolve, server_lines
 from silo.outbox.entry import ASKED, SAME_PART, Entry, InFile, State, new_key
 from silo.outbox.store import OutboxError, Store
+from silo.standard_items import server_of
 
 
 @dataclass(frozen=True)
@@ -512,7 +513,8 @@ class _Run:
             resolved = sent.resolved
             assert resolved is not None  # an entry with a BOM has an extraction or a request
             lines = server_lines(resolved, self.client)
-            decided = decide(resolved, lines, allow_missing=entry.allow_missing)
+            where = server_of(self.client)
+            decided = decide(resolved, lines, allow_missing=entry.allow_missing, server=where)
             sent = replace(sent, plan=decided.plan, status=decided.status, sync_id=entry.key)
             if decided.status is not Status.MERGED:
                 self.store.arrived(entry, "bom", note=decided.status is Status.UNCHANGED)
@@ -540,6 +542,8 @@ class _Run:
             self._again(entry)
             raise _PassingError(str(error)) from error
         self.store.arrived(entry, "bom")
+        if sent.resolved is not None and sent.plan is not None:
+            merged(sent.resolved, sent.plan, server_of(self.client))
         return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
 
     def _at_revision(self, entry: Entry) -> Entry:

@@ -313,17 +313,17 @@ def _of_the_same_name(proposal: Proposal, api: RegistrationApi, since: float) ->
 def _all_items(name: str, api: RegistrationApi) -> Iterator[Mapping[str, Any]]:
     yield from api.search_items(name)
     # A search may be fuzzy, late or short: what is not in it may exist all the same.
-    before: frozenset[str] = frozenset()
-    for page in range(PAGES):
+    seen, before = 0, frozenset[str]()
+    while seen < PAGE * PAGES:
         try:
-            items = list(api.search_items("", limit=PAGE, offset=page * PAGE))
+            items = list(api.search_items("", limit=PAGE, offset=seen))
         except NotFoundError:
             return
         ids = frozenset(str(item["id"]) for item in items)
         if not ids or ids == before:  # the end, or a server that knows no pages
             return
         yield from items
-        before = ids
+        seen, before = seen + len(items), ids
 
 
 def _mark(api: RegistrationApi, item: Mapping[str, Any]) -> str | None:

@@ -96,11 +96,12 @@ def list_revisions(
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
     before: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
     after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
+    offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
 ) -> Response:
     """Revisions with a file, newest first, as those of an item."""
     with call.read() as tx:
         of = documents.get(tx, items.normal_uuid(uuid))
-        found, total = revisions.list_revisions(tx, of, limit, before=before, after=after)
+        found, total = revisions.list_revisions(tx, of, limit, before=before, after=after, skip=offset)
     told = [revision_to_wire(of, revision) for revision in found]
     return json_answer(told, headers={"X-Total-Count": str(total)})
 

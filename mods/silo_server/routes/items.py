@@ -324,6 +324,7 @@ def list_revisions(
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
     before: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
     after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
+    offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
 ) -> Response:
     """Revisions, newest first; those below the number ``before`` and above ``after``.
 
@@ -331,7 +332,7 @@ def list_revisions(
     """
     with call.read() as tx:
         item = items.get_item(tx, part_number)
-        found, total = revisions.list_revisions(tx, item, limit, before=before, after=after)
+        found, total = revisions.list_revisions(tx, item, limit, before=before, after=after, skip=offset)
     told = [revision_to_wire(item, revision) for revision in found]
     return json_answer(told, headers={"X-Total-Count": str(total)})
 

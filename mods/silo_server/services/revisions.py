@@ -148,9 +148,15 @@ def check_document(tx: Tx, item: Item, base: int | None, checksum: str | None) -
 
 
 def list_revisions(
-    tx: Tx, of: Item | Document, limit: int = 100, *, before: int | None = None, after: int = 0
+    tx: Tx,
+    of: Item | Document,
+    limit: int = 100,
+    *,
+    before: int | None = None,
+    after: int = 0,
+    skip: int = 0,
 ) -> tuple[list[Revision], int]:
-    """The newest ``limit`` of the revisions below ``before`` and above ``after``, newest first.
+    """``limit`` of the revisions below ``before`` and above ``after``, newest first, without ``skip`` ones.
 
     And how many revisions above ``after`` there are in all.
     """
@@ -159,7 +165,7 @@ def list_revisions(
     if before is not None:
         wanted &= revisions.c.revision_number < before
     rows = tx.conn.execute(
-        select(revisions).where(wanted).order_by(revisions.c.revision_number.desc()).limit(limit)
+        select(revisions).where(wanted).order_by(revisions.c.revision_number.desc()).limit(limit).offset(skip)
     ).all()
     return [_to_revision(row) for row in rows], total
 
