@@ -21,6 +21,7 @@ from typing import Any
 import pytest
 from other_disk import other_disk
 
+from silo.api.config import Pause
 from silo.api.files import standing
 from silo.api.wire import Revision
 from silo.bom.errors import DocumentError, InputError
@@ -524,7 +525,7 @@ def test_a_folder_that_does_not_take_it_is_reported(tmp_path: Path, document: Pa
     """With what to do, and nothing half done."""
     blocked = tmp_path / "file"
     blocked.write_text("in the way")
-    with pytest.raises(InputError, match="the outbox cannot be made"):
+    with pytest.raises(InputError, match=r"cannot be written .*Nothing was kept"):
         Store(blocked / "outbox.sqlite3").add(commit(document))
 
 
@@ -633,3 +634,39 @@ def test_a_revision_that_a_person_saw_is_known_however_its_checksum_is_written(w
     theirs = Revision(revision_number=2, file_name="A.FCStd", file_checksum=checksum)
     assert standing([theirs], "", seen=seen({"revision_number": 2, "file_checksum": checksum})).newer is None
     assert standing([theirs], "", seen=seen({"revision_number": 2, "file_checksum": "cd" * 32})).newer
+
+
+def test_a_folder_that_takes_nothing_is_listed_truthfully(
+    tmp_path: Path, document: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What waits is seen, also what no checkpoint has brought into the database yet; nothing is written."""
+    store = Store(tmp_path / "data" / "outbox.sqlite3")
+    first = store.add(Commit(str(document), 1.0, label="first", file=document))
+    with closing(sqlite3.connect(store.path)) as reader:
+        reader.execute("SELECT * FROM entry").fetchall()  # keeps the log of changes from being folded in
+        second = store.add(Commit(str(document), 2.0, label="second", file=document))
+        store.set_pause("http://silo", Pause(10.0, "busy", "busy", 1, told=True))
+        before = {path: path.read_bytes() for path in store.path.parent.rglob("*") if path.is_file()}
+
+        def closed(path: Path) -> None:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+        monkeypatch.setattr("silo.outbox.store.private_file", closed)
+        looked = Store(store.path)
+        assert [one.key for one in looked.entries()] == [first.key, second.key]
+        assert (looked.pause("http://silo") or Pause(0.0, "")).reason == "busy"
+        assert "2 commits in " in looked.closed
+        for write in (
+            lambda: looked.sweep(),
+            lambda: looked.discard(first.id),
+            lambda: looked.stage(commit(document)),
+        ):
+            with pytest.raises(
+                OutboxError, match=r"cannot be written \(Read-only.*2 commits in .* cannot be sent"
+            ):
+                write()
+    descriptions = {path: path.read_bytes() for path in store.copies.iterdir()}
+    assert descriptions == {path: before[path] for path in descriptions}
+    store.path.write_bytes(b"damaged")
+    with pytest.raises(OutboxError, match="2 commits in "):
+        Store(store.path).entries()

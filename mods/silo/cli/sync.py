@@ -303,6 +303,8 @@ def run_queue(args: argparse.Namespace) -> int:
     pause = store.pause(here) if here else None
     if pause is not None and not pause.left(store.clock()):
         pause = None
+    if store.closed:
+        print(f"silo-mod: {store.closed}", file=sys.stderr)
     _show_queue(args, left, here, pause, store.clock())
     return Exit.UNDONE if left else Exit.DONE
 

@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from silo.api.config import Pause, canonical
-from silo.bom.errors import ConflictError, DocumentError, InputError
+from silo.bom.errors import ConflictError, DocumentError, InputError, counted
 from silo.bom.report import to_plain
 from silo.files import content_hash, seen_as
 from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
@@ -44,6 +44,7 @@ from silo.platform import (
     remove_patiently,
     replace_patiently,
     replacing,
+    scratch_folder,
     stamp_of,
     sync_folder,
 )
@@ -132,6 +133,10 @@ class OutboxError(InputError):
     """The outbox cannot be used now: its disk is full, its database is locked, or nobody may write there."""
 
 
+class _ClosedError(OutboxError):
+    """Nobody may write there; what is there can be read."""
+
+
 class Database:
     """The file, and the folder of copies beside it; made where they are missing, for their owner only."""
 
@@ -139,12 +144,14 @@ class Database:
         self.path = path
         self.clock = clock
         self.copies = path.parent / f"{path.stem}-files"
+        self.closed = ""  # why nothing can be written there, where reading found that
         self._lock = threading.Lock()
         self._is_ready = False
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
         """All or nothing, on disk when it returns."""
+        self._make_ready()
         with self._open() as db, _transaction(db):
             yield db
 
@@ -159,8 +166,21 @@ class Database:
 
     @contextmanager
     def _open(self) -> Iterator[sqlite3.Connection]:
-        self._make_ready()
+        """Open the database to read it: a copy of it in a folder that takes nothing."""
         with self._translated(), ExitStack() as stack:
+            try:
+                self._make_ready()
+            except _ClosedError as error:
+                self.closed = str(error)
+                folder = Path(stack.enter_context(scratch_folder("silo-outbox-")))
+                for end in ("", "-wal"):
+                    if (file := self.path.with_name(self.path.name + end)).exists():
+                        shutil.copyfile(file, folder / file.name)
+                db = stack.enter_context(closing(self._connect(folder / self.path.name)))
+                if not self._is_ours(db):
+                    raise
+                yield db
+                return
             db = stack.enter_context(closing(self._connect()))
             if not self._is_ours(db):  # it was deleted or replaced while we run
                 stack.pop_all().close()
@@ -170,8 +190,8 @@ class Database:
             db.execute("PRAGMA synchronous = FULL")
             yield db
 
-    def _connect(self) -> sqlite3.Connection:
-        db = sqlite3.connect(self.path, timeout=_PATIENCE_S, isolation_level=None)
+    def _connect(self, path: Path | None = None) -> sqlite3.Connection:
+        db = sqlite3.connect(path or self.path, timeout=_PATIENCE_S, isolation_level=None)
         db.row_factory = sqlite3.Row
         return db
 
@@ -201,9 +221,12 @@ class Database:
                 private_file(path)
             sync_folder(self.path.parent)
         except OSError as error:
-            raise InputError(
-                f"{self.path}: the outbox cannot be made ({error.strerror or error}). Nothing was kept for "
-                "sending; make room or mend the permissions, then commit again"
+            waiting = len([*self.copies.glob("*.json")])
+            told = "Nothing was kept for sending"
+            told = f"{counted(waiting, 'commit')} in {self.copies} cannot be sent" if waiting else told
+            raise _ClosedError(
+                f"{self.path}: the outbox cannot be written ({error.strerror or error}). {told}; make room "
+                "or mend the permissions, then try again"
             ) from error
         with self._translated():
             if not self._is_whole():
