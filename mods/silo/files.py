@@ -207,7 +207,13 @@ class Project:
 
 
 @contextmanager
-def folder_lock(folder: str, name: str, doing: str, patience: float = 0.0) -> Iterator[str]:
+def folder_lock(
+    folder: str,
+    name: str,
+    doing: str,
+    patience: float = 0.0,
+    tell: Callable[[str], object] = lambda _text: None,
+) -> Iterator[str]:
     """Hold a folder alone; gives why other computers do not see that, "" where they do.
 
     The lock is a file in the folder, as far as its disk carries locks, else it lies in the user's cache. It
@@ -215,12 +221,14 @@ def folder_lock(folder: str, name: str, doing: str, patience: float = 0.0) -> It
 
     name, doing
         the lock's file; what is done to the folder ("synced"), for the message to another process.
+    tell
+        gets that message after 5 seconds, then each minute.
 
     Raises InputError with the name of who holds it, after ``patience`` seconds.
     """
     path, problem = os.path.join(one_path(folder), name), ""
     try:
-        held = _held(path, folder, doing, patience)
+        held = _held(path, folder, doing, patience, tell)
         with suppress(OSError):
             os.chmod(path, 0o666)  # the next one may be another user
         if not shows_locks(path):
@@ -234,7 +242,7 @@ def folder_lock(folder: str, name: str, doing: str, patience: float = 0.0) -> It
         try:
             inner.parent.mkdir(parents=True, exist_ok=True)
             path = str(inner)
-            held = _held(path, folder, doing, patience)
+            held = _held(path, folder, doing, patience, tell)
         except OSError:  # nowhere to lock at all
             yield problem
             return
@@ -271,11 +279,12 @@ def _who() -> str:
     return f"process {os.getpid()} of {user} on {socket.gethostname()}"
 
 
-def _held(path: str, folder: str, doing: str, patience: float) -> BinaryIO:
+def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[str], object]) -> BinaryIO:
     """Return the locked file. Raises InputError where another process has it, OSError where nobody can."""
     if os.path.islink(path):  # somebody else's file may be behind it
         raise OSError(errno.ELOOP, f"{path} is a symbolic link")
-    until = time.monotonic() + patience
+    now = time.monotonic()
+    until, due = now + patience, now + 5
     while True:
         if (held := hold_lock(path)) is not None:
             # Its last holder may have deleted the file while we waited for the lock.
@@ -283,14 +292,16 @@ def _held(path: str, folder: str, doing: str, patience: float) -> BinaryIO:
                 if os.path.samestat(os.fstat(held.fileno()), os.lstat(path)):
                     return held
             held.close()
-        elif time.monotonic() >= until:
+        elif (now := time.monotonic()) >= min(until, due):
             try:
                 who = Path(path).read_text(encoding="utf-8", errors="replace").strip()
             except OSError:  # it has ended just now
                 who = ""
-            raise InputError(
-                f"{folder} is being {doing} by {who or 'another process'}. Wait for it, or stop it."
-            )
+            text = f"{folder} is being {doing} by {who or 'another process'}. Wait for it, or stop it."
+            if now >= until:
+                raise InputError(text)
+            tell(text)
+            due = now + 60
         time.sleep(0.02 if patience else 0)
 
 

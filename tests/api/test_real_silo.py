@@ -6,11 +6,14 @@ Whatever happens, and however often a plain user repeats a command, the server h
 
 from __future__ import annotations
 
+import argparse
 import multiprocessing
 import os
 import queue
 import random
+import re
 import shutil
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -26,11 +29,11 @@ from silo.api.client import SiloClient
 from silo.api.events import Connection, ConnectionState, EventListener, ServerEvent
 from silo.api.policy import Retries
 from silo.batch import Options, TopResult, sync_top
-from silo.bom.errors import InputError, ServerFaultError, SiloError
+from silo.bom.errors import BusyError, InputError, ServerFaultError, SiloError
 from silo.bom_sync import Status, compare, resolve
-from silo.cli.common import read_assembly
+from silo.cli.common import client_of, read_assembly
 from silo.inertia.output.push import PushItem, PushPlan, push
-from silo.outbox.entry import Commit, State
+from silo.outbox.entry import Commit, State, pause_text
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.registering.on_disk import proposals_for, register_all
@@ -645,3 +648,59 @@ def test_an_unreferenced_line_is_told_once(tmp_path: Path, how: str) -> None:
         assert sync() == 0, "a person decided about one; the others are known"
         top.lines[0]["quantity"] = 99
         assert [sync(), sync()] == [1, 0]
+
+
+# -- waiting ---------------------------------------------------------------------------------------
+
+
+class Stop(threading.Event):
+    """Waits no time; ``waited``: the seconds that were asked for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.waited: list[float] = []
+
+    def wait(self, timeout: float | None = None) -> bool:
+        self.waited.append(timeout or 0.0)
+        return False
+
+
+@pytest.mark.parametrize(("fault", "seconds"), [("429", 40.0), ("503 later", 70.0)])
+def test_a_command_that_waits_says_for_how_long_and_what_to_do(
+    fault: str, seconds: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On standard error, where it is no terminal as well."""
+    with real_silo() as silo:
+        silo.faults = {0: fault, 1: fault}
+        stop, args = Stop(), argparse.Namespace(server=silo.url, token=TOKEN)
+        with client_of(args, busy_tries=5, longest=120.0, stop=stop) as client:
+            assert client.search_items() == []
+    lines = capsys.readouterr().err.splitlines()
+    assert (stop.waited, len(lines)) == ([seconds, seconds], 2)
+    assert f"asked again in {seconds:.0f} s; Ctrl-C ends this" in lines[0]
+
+
+def test_a_date_in_2099_is_not_waited_for_and_no_number_of_minutes(tmp_path: Path) -> None:
+    """Neither in an error, nor in the pause of the queue, which asks again after an hour."""
+    with real_silo() as silo:
+        silo.faults = {0: "503 in 2099"}
+        once = Retries(longest=1e12, busy_tries=1)
+        with (
+            SiloClient(silo.url, TOKEN, retries=once) as client,
+            pytest.raises(BusyError, match=r"Try again in \d+ days"),
+        ):
+            client.search_items()
+        path = tmp_path / "a.FCStd"
+        path.write_bytes(b"a")
+        store = Store(tmp_path / "outbox.sqlite3")
+        store.add(Commit(str(path), 0.0, part_number="M01-0001", file=path), silo.url)
+        silo.faults = dict.fromkeys(range(1, 9), "503 in 2099")
+        with SiloClient(silo.url, TOKEN, retries=Retries(tries=1)) as client:
+            pause = send_all(store, client).pause
+        assert pause is not None
+        now = store.clock()
+        assert 3500 < pause.left(now) <= 3600
+        assert re.search(
+            r"Nothing is sent to 127.0.0.1:\d+ for (59|60) min: .*in \d+ days",
+            pause_text(pause, silo.url, now),
+        )

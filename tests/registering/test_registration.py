@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -523,3 +525,30 @@ def test_an_intent_that_an_earlier_run_began_stays_after_a_refusal(journal: Jour
     api.before = RejectedError("no")
     assert isinstance(register(PROPOSAL, api, journal, files.stamp).error, RejectedError)
     assert journal.pending() == intended
+
+
+def test_who_waits_for_another_computer_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After 5 seconds, then each minute, with who that is; at last it is an error."""
+
+    class Clock:
+        now = 0.0
+        strftime = staticmethod(time.strftime)
+
+        def monotonic(self) -> float:
+            return self.now
+
+        def sleep(self, seconds: float) -> None:
+            self.now += 0.5 if seconds else 0.0
+
+    clock, told = Clock(), list[tuple[float, str]]()
+    path = str(tmp_path / "a.FCStd")
+    with Journal(tmp_path / "one").turn(path):
+        monkeypatch.setattr("silo.files.time", clock)
+        waiting = Journal(tmp_path / "two", patience=130.0).turn(
+            path, lambda text: told.append((clock.now, text))
+        )
+        with pytest.raises(InputError) as raised, waiting:
+            pass
+    assert (clock.now, [at for at, _ in told]) == (130.0, [5.0, 65.0, 125.0])
+    assert {text for _, text in told} == {str(raised.value)}
+    assert f"is being registered by process {os.getpid()} of" in str(raised.value)

@@ -550,6 +550,7 @@ class _Handler(BaseHTTPRequestHandler):
             "502 before": (502, "<html><title>502 Bad Gateway</title></html>", {"Content-Type": "text/html"}),
             "503": (503, "", {}),
             "503 later": (503, "", {"Retry-After": "70"}),
+            "503 in 2099": (503, "", {"Retry-After": "Thu, 01 Jan 2099 00:00:00 GMT"}),
             "login": (302, "", {"Location": f"/login?next={parts.path}"}),
         }
         if fault in early:

@@ -357,7 +357,9 @@ class _Told:
         self._progress = common.Progress()
 
     def progress(self, detail: str = "", fraction: float | None = None) -> None:
-        if fraction:
+        if fraction is None:
+            print(f"silo-mod: {plain(detail)}", file=sys.stderr)
+        elif fraction:
             self._progress.tell(f"[{fraction:4.0%}] {detail}")
 
     def check(self) -> None:

@@ -134,6 +134,7 @@ def register(
     check: Check = lambda _entry: None,
     ask: Ask = unclear,
     copy: bool = False,
+    tell: Callable[[str], object] = lambda _text: None,
 ) -> Registration:
     """Register one component; an error is returned, not raised, so that the others are still registered.
 
@@ -143,9 +144,11 @@ def register(
         see :data:`Check` and :data:`Ask`.
     copy
         the identity that it carries is another part's; it gets its own.
+    tell
+        gets who else registers in the file's folder, while that is waited for.
     """
     try:
-        with journal.turn(proposal.entry.doc_path) as unseen:
+        with journal.turn(proposal.entry.doc_path, tell) as unseen:
             run = _Run(proposal, api, journal, stamp, schema, properties or {}, ask, unseen)
             item, found = run.item(check, copy)
     except SiloError as error:

@@ -117,13 +117,16 @@ class Journal:
         """The items of all components that are known here."""
         return frozenset(record.item_id for record in self._records("TRUE"))
 
-    def turn(self, path: str) -> AbstractContextManager[str]:
+    def turn(
+        self, path: str, tell: Callable[[str], object] = lambda _text: None
+    ) -> AbstractContextManager[str]:
         """Hold a file's folder while one component of it is registered, on whichever computer: two processes
         never make an item for the same one, and nobody waits for another project's server.
 
-        Gives why other computers do not see that, "" where they do. Raises InputError.
+        Gives why other computers do not see that, "" where they do. ``tell`` gets who else does it, if that
+        takes long. Raises InputError.
         """
-        return folder_lock(os.path.dirname(path), ".silo-register.lock", "registered", self._patience)
+        return folder_lock(os.path.dirname(path), ".silo-register.lock", "registered", self._patience, tell)
 
     def _records(self, where: str, *values: str) -> list[Record]:
         with self._open() as db:

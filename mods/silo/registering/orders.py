@@ -99,7 +99,7 @@ def carry_out(
     from silo.api.policy import ends_run
 
     gone: SiloError | None = None
-    run = _Run(api, journal, write, schema, check, ask)
+    run = _Run(api, journal, write, schema, check, ask, control)
     for number, order in enumerate(orders):
         control.check()
         control.progress(order.name, number / len(orders))
@@ -116,6 +116,7 @@ class _Run:
     schema: str
     check: Check
     ask: Ask
+    control: Control
 
     def one(self, order: Order) -> Registration:
         candidate = replace(order.candidate, proposal=order.proposal)
@@ -140,6 +141,7 @@ class _Run:
             check=lambda _entry: self.check(candidate),
             ask=lambda proposal, found: self.ask(order, proposal, found),
             copy=bool(candidate.same_as),
+            tell=self.control.progress,
         )
 
     def _join(self, candidate: Candidate, number: str, item_id: str) -> Registration:
