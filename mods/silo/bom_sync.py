@@ -277,7 +277,7 @@ def decide(
         sync although links are broken: lines that stood for a missing component in the last sync stay as they
         are; what the server has not heard of stays out, and the server keeps that the BOM is incomplete.
     server
-        where it is merged: one that does not show which lines are unreferenced is told of each of them once.
+        where it is merged: one that does not show which lines are unreferenced hears of each of them once.
     """
     if resolved.assembly.part_number is None:
         return Outcome(Status.UNREGISTERED, resolved)
@@ -289,7 +289,7 @@ def decide(
 
 
 def _told() -> Memory:
-    """Server → part number of an assembly → its unreferenced lines that the server was told of."""
+    """Server → part number of an assembly → its unreferenced lines that the server has heard of."""
     return Memory(cache_folder() / "unreferenced.json")
 
 
