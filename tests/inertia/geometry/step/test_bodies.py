@@ -104,7 +104,7 @@ def test_angles_are_in_the_unit_of_the_file(tmp_path: Path, read_in: ReadIn) -> 
     assert not complaint(made, only(read_in(path)))
 
 
-def test_a_mapped_body_that_is_not_read_is_named(tmp_path: Path, read_in: ReadIn) -> None:
+def test_a_mapped_body_that_is_not_read_is_named(tmp_path: Path, read_in: ReadIn, codes_of: Any) -> None:
     """Its numbers say another place than it stands in, so it is not made from them."""
     path = tmp_path / "part.step"
     made = begun(path)
@@ -113,8 +113,10 @@ def test_a_mapped_body_that_is_not_read_is_named(tmp_path: Path, read_in: ReadIn
     other = made.add(f"SHAPE_REPRESENTATION('',(#{block}),#{context})")
     source = made.add(f"REPRESENTATION_MAP(#{made.axes(0.0)},#{other})")
     made.item(f"MAPPED_ITEM('',#{source},#{made.axes(90.0)})", None)
-    part = only(read_in(made.write(path)))
+    assembly = read_in(made.write(path))
+    part = only(assembly)
     assert not complaint(made, part)
+    assert codes_of(assembly) == []  # it is not a body of no product as well
     assert f"BLOCK #{block}" in part.problems[0].message
 
 
