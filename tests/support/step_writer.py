@@ -89,8 +89,10 @@ def emptied(path: Path, *names: str) -> Path:
         assert shape is not None
         link = re.search(rf"SHAPE_DEFINITION_REPRESENTATION\(#{shape[1]},#(\d+)\)", text)
         assert link is not None
-        body = re.search(rf"#{link[1]} = ADVANCED_BREP_SHAPE_REPRESENTATION\('',\((#\d+),[^)]*\),", text)
+        body = re.search(rf"#{link[1]} = ADVANCED_BREP_SHAPE_REPRESENTATION\('',\((#\d+),([^)]*)\),", text)
         assert body is not None
         text = text.replace(body[0], f"#{link[1]} = SHAPE_REPRESENTATION('',({body[1]}),")
+        for solid in re.findall(r"#\d+", body[2]):
+            text = re.sub(rf"{solid} = [^;]*;\n", "", text)
     path.write_text(text, "ascii")
     return path

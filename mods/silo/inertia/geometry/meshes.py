@@ -211,11 +211,9 @@ def _tree(graph: Any, nodes: dict[str, Node]) -> tuple[Child, ...]:
         nodes[f"node:{name}"] = Node(f"node:{name}", str(name), tuple(inside))
         return Child(str(name), f"node:{name}", matrix)
 
-    top = graph.base_frame
+    top = graph.base_frame  # trimesh's own, so that it has no mesh
     roots = [use(child, top, (top,)) for child in children.get(top, ())]
-    found = [root for root in roots if root is not None]
-    mesh = graph.transforms.node_data.get(top, {}).get("geometry")
-    return tuple([Child(nodes[mesh].name, mesh)] if mesh in nodes else []) + tuple(found)
+    return tuple(root for root in roots if root is not None)
 
 
 def _unit(scene: MeshScene, options: ReadOptions) -> tuple[float, str, list[Note]]:

@@ -330,6 +330,23 @@ def test_what_a_glb_file_lists_is_read_or_named(
     assert [code for code in found if code != GeometryCode.UNITS] == codes
 
 
+def _nested(tree: Any) -> None:
+    tree["nodes"][0]["children"], tree["scenes"][0]["nodes"] = [1], [0]
+
+
+def _rooted(tree: Any) -> None:
+    tree["nodes"].append({"name": "world", "mesh": 0, "children": [0, 1]})
+    tree["scenes"][0]["nodes"] = [2]
+
+
+@pytest.mark.parametrize(("edit", "count"), [(_nested, 2), (_rooted, 3)])
+def test_a_mesh_beside_branches_counts(edit: Any, count: int, tmp_path: Path, read_in: Any) -> None:
+    """A node of a GLB file may have a mesh and children, and so may its root."""
+    path = tmp_path / "part.glb"
+    trimesh.Scene([brick(), brick(at=(100, 0, 0))]).export(path)
+    assert len(read_in(edited(path, edit)).instances) == count
+
+
 # --- the mathematics ---------------------------------------------------------------------------------------
 
 

@@ -246,6 +246,38 @@ def test_a_body_of_no_product_is_named(tmp_path: Path, read_in: ReadIn, codes_of
     assert f"BLOCK #{body}" in assembly.problems[0].message
 
 
+OTHER_FORMS = {
+    "another kind of definition": (r"= PRODUCT_DEFINITION\(", "= PRODUCT_DEFINITION_OCCURRENCE("),
+    "a complex definition": (
+        r"= PRODUCT_DEFINITION\(('[^)]*)\)",
+        r"= ( CHARACTERIZED_OBJECT('','') PRODUCT_DEFINITION(\1) )",
+    ),
+    "a complex representation": (
+        r"= ADVANCED_BREP_SHAPE_REPRESENTATION\(('',\([^)]*\),#\d+)\)",
+        r"= ( ADVANCED_BREP_SHAPE_REPRESENTATION() REPRESENTATION(\1) SHAPE_REPRESENTATION() )",
+    ),
+    "no definition": (r"#\d+ = SHAPE_DEFINITION_REPRESENTATION[^;]*;", ""),
+}
+
+
+@pytest.mark.parametrize("form", OTHER_FORMS)
+def test_a_product_that_the_kernel_passes_over_is_named(
+    form: str, tmp_path: Path, read_in: ReadIn, codes_of: Any
+) -> None:
+    """Beside another product, which is read: whatever keeps a body from its product, the body is named."""
+    document = StepDocument()
+    for size in (10.0, 20.0):
+        document.part(BRepPrimAPI_MakeBox(size, 10, 10).Shape(), f"p{size:g}")
+    path = document.write(tmp_path / "two.step")
+    text, count = re.subn(*OTHER_FORMS[form], path.read_text("ascii"), count=1)
+    assert count == 1
+    path.write_text(text, "ascii")
+    assembly = read_in(path)
+    assert only(assembly).volume_m3 in (pytest.approx(1e-6), pytest.approx(2e-6))
+    assert codes_of(assembly) == [GeometryCode.BODY_MISSING]
+    assert "MANIFOLD_SOLID_BREP" in assembly.problems[0].message
+
+
 @pytest.mark.parametrize(
     "form", ["", "GLOBAL_UNIT_ASSIGNED_CONTEXT(())", "GLOBAL_UNIT_ASSIGNED_CONTEXT((#{}))"]
 )

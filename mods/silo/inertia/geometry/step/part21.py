@@ -424,23 +424,33 @@ def _is_body(source: Part21, item: int) -> bool:
     return keyword is not None and _SOLID.fullmatch(keyword) is not None
 
 
+def _is_linked(source: Part21, item: int) -> bool:
+    """Report the triangles of an exact body, which are no other body."""
+    return source.keywords[item] == "TESSELLATED_SOLID" and ref(source.arguments(item), 2) is not None
+
+
 def _within(values: tuple[Value, ...]) -> Iterator[int]:
     for value in values:
         yield from _within(value.values) if isinstance(value, Typed) else refs(value)
 
 
 def _bodies(source: Part21, facts: dict[int, ProductFacts], owners: dict[int, int]) -> tuple[int, ...]:
-    """Put bodies and unit of length into the facts of each product; return the bodies that belong to none."""
+    """Put bodies and unit of length into the facts of each product.
+
+    Returns the bodies that belong to none, and that no other body is made from.
+    """
     hidden = set(_hidden(source))
     mapped = {n: next(iter(source.references(n)[1:]), 0) for n in source.listed("REPRESENTATION_MAP")}
     used = set(mapped.values())
+    known = set[int]()
     found: dict[int, dict[int, None]] = defaultdict(dict)
     contexts: dict[int, tuple[int, ...]] = {}
     moved: set[int] = set()
     hides: dict[int, int] = defaultdict(int)
     for representation in [n for n, word in source.keywords.items() if word.endswith("SHAPE_REPRESENTATION")]:
         owner = owners.get(representation, 0)
-        if not owner and representation in used:
+        if owner not in facts:
+            known.update(source.references(representation) if representation in used else ())
             continue
         waiting, seen = [representation], set[int]()
         while waiting:
@@ -457,24 +467,25 @@ def _bodies(source: Part21, facts: dict[int, ProductFacts], owners: dict[int, in
                     found[owner][item] = None
                     moved.update([item] if one != representation else [])
                     hides[owner] += item in hidden or one in hidden
-                    if source.keywords[item] == "TESSELLATED_SOLID":  # of an exact body: not another one
-                        linked.update([item] if ref(source.arguments(item), 2) else [])
+                    linked.update([item] if _is_linked(source, item) else [])
+            known.update(found[owner])
             for item in linked:
                 del found[owner][item]
             if found[owner]:
                 contexts.setdefault(owner, source.references(one)[-1:])
     for owner, bodies in found.items():
-        if owner in facts:
-            length = _unit_of(source, contexts.get(owner, ()), "LENGTH_UNIT")
-            facts[owner] = replace(
-                facts[owner],
-                bodies=tuple(bodies),
-                hidden=hides[owner],
-                mapped=frozenset(moved.intersection(bodies)),
-                unit_mm=length and length * 1e3,
-                unit_rad=_unit_of(source, contexts.get(owner, ()), "PLANE_ANGLE_UNIT") or 1.0,
-            )
-    return tuple(found.get(0, ()))
+        length = _unit_of(source, contexts.get(owner, ()), "LENGTH_UNIT")
+        facts[owner] = replace(
+            facts[owner],
+            bodies=tuple(bodies),
+            hidden=hides[owner],
+            mapped=frozenset(moved.intersection(bodies)),
+            unit_mm=length and length * 1e3,
+            unit_rad=_unit_of(source, contexts.get(owner, ()), "PLANE_ANGLE_UNIT") or 1.0,
+        )
+    solids = [number_ for number_ in source.keywords if _is_body(source, number_)]
+    known.update(part for solid in solids for part in source.references(solid))
+    return tuple(n for n in solids if n not in known and not _is_linked(source, n))
 
 
 def _hidden(source: Part21) -> Iterator[int]:

@@ -376,8 +376,7 @@ class _Walk:
                 )
                 file.said.append(Note(GeometryCode.BODY_MISSING, words))
             return
-        nameless = [s for key, own in file.shapes.items() if not file.facts[key].bodies for s in own]
-        file.said += [bodies.problem(n) for n in bodies.dropped(self._products.stray, nameless)]
+        file.said += map(bodies.problem, self._products.stray)
         for keys in groups.values():
             # A product of mixed bodies may stand in several leaves: together they have what the text names.
             key, facts = keys[0], file.facts[keys[0]]
