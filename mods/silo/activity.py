@@ -74,6 +74,15 @@ def unregistered_text(count: int, translate: Translate = english) -> str:
     return (one if count == 1 else many).replace("{n}", str(count)) if count else ""
 
 
+def draft_text(result: MergeResult | None, translate: Translate = english) -> str:
+    """Which draft a change of a released product is part of; "" if nothing of it is released."""
+    draft = result.draft if result is not None else None
+    if draft is None:
+        return ""
+    text = translate("Silo", "This is part of draft {draft}. Revision {released} stays released as it is.")
+    return text.replace("{draft}", draft.label).replace("{released}", draft.released)
+
+
 def rules_text(problem: str, translate: Translate = english) -> str:
     """That the site's category rules have a mistake, and which; "" where they have none."""
     text = translate("Silo", "The category rules of this Silo are not used until they are mended: {problem}")

@@ -36,6 +36,7 @@ from silo.api.wire import (
     MergeEvent,
     MergeRequest,
     MergeResult,
+    Release,
     Revision,
     ServerState,
     User,
@@ -126,6 +127,7 @@ class FakeStore:
         self.items: dict[str, Stored] = {}  # by case-folded part number
         self.documents: dict[str, Stored] = {}  # those without an item, by UUID
         self.log: list[ServerEvent] = []
+        self.releases: dict[tuple[str, str], Release] = {}  # (part number, label) → what was frozen
         self.answers: dict[tuple[str, str], tuple[Any, Any]] = {}  # (subject, key) → (request, answer)
         self._clock = clock or (lambda: datetime.now(UTC))
         self._lock = threading.RLock()
@@ -664,6 +666,13 @@ class FakeSilo(FakeStore):
             (one for one in found if item.id in {held.item for held in one.holds}),
             key=lambda one: one.id != item.id,
         )
+
+    def get_release(self, part_number: str, label: str, /) -> Release:
+        item = self.get_item(part_number)
+        found = self.releases.get((item.part_number, label))
+        if found is None:
+            raise NotFoundError(f"{item.part_number} has no revision {label!r}")
+        return found
 
     def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
         self.before("revisions")

@@ -119,6 +119,12 @@ def bom_merged(tx: Tx, item: Item, data: Mapping[str, Any]) -> None:
     _about(tx, "bom_merge", item, data)
 
 
+def released(tx: Tx, item: Item, label: str, what: str) -> None:
+    """Announce what became of a revision of a product: submitted, approved, released, rejected, …"""
+    data = {**_named(item), "revision": label, "status": what, "user": tx.actor.username}
+    _about(tx, "revision.released" if what == "released" else "revision.reviewed", item, data)
+
+
 def set_mode(tx: Tx, mode: str) -> str:
     """Take changes (``normal``), or none (``read-only``); returns the mode that the server is in now."""
     audit.note(tx, "mode.set", mode, f"{mode_of(tx)} → {mode}")

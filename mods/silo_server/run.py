@@ -115,7 +115,7 @@ READING_THREADS = 40
 
 def routers() -> tuple[APIRouter, ...]:
     """Return all routes; imported late, for they are half of the import, and a backup needs none of them."""
-    from silo_server.routes import bom, documents, items, system
+    from silo_server.routes import bom, documents, items, releases, system
     from silo_server.web import pages
 
     return (
@@ -124,6 +124,7 @@ def routers() -> tuple[APIRouter, ...]:
         items.router,
         items.revisions_router,
         documents.router,
+        releases.router,
         bom.router,
         bom.several,
         bom.review_router,

@@ -146,6 +146,10 @@ class Settings:
         for how long, and how much of, the answers to merges are kept for a repeated request.
     warnings
         what was wrong with the settings at the start, for the page of the system; not from the environment.
+    release_labels
+        names of the revisions of products: ``letters`` (A, B, … without I and O) or ``numbers`` (1.0, 2.0).
+    release_approvals, release_override
+        how many people approve a revision, and whether they may release what is blocked, with a reason.
     history_days, audit_days
         older changes of BOMs are folded into one, older lines of the audit list deleted; 0 keeps all.
     """
@@ -179,6 +183,9 @@ class Settings:
     root_path: str = ""
     trusted_proxies: str = "127.0.0.1,::1"
     public_url: str | None = None
+    release_labels: str = "letters"
+    release_approvals: int = 1
+    release_override: bool = True
     admin_username: str = "admin"
     admin_password: str | None = None
 
@@ -190,6 +197,10 @@ class Settings:
         path = self.root_path
         if path and (not re.fullmatch(r"(/[\w.~-]+)+", path, re.ASCII)):
             raise ConfigError(f"root path: wanted a path such as /silo, without / at its end, got {path!r}")
+        if self.release_labels not in ("letters", "numbers"):
+            raise ConfigError(f"release labels: wanted letters or numbers, got {self.release_labels!r}")
+        if self.release_approvals < 1:
+            raise ConfigError(f"release approvals: wanted 1 or more, got {self.release_approvals}")
 
     @property
     def sqlalchemy_url(self) -> str:
@@ -235,7 +246,8 @@ _NAMES = (
     *("database_url", "read_only", "heartbeat_seconds", "event_log_size", "event_log_bytes", "sync_days"),
     *("sync_bytes", "history_days", "audit_days", "housekeeping_seconds", "max_body_bytes", "max_file_bytes"),
     *("max_merge_entries", "secure_cookies", "request_log", "root_path", "trusted_proxies", "public_url"),
-    *("admin_username", "admin_password", "freecad_version"),
+    *("admin_username", "admin_password", "freecad_version", "release_labels", "release_approvals"),
+    "release_override",
 )
 _ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir": "SILO_STORAGE_ROOT_DIR"}
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from fcstd_writer import Doc, Raw, locals_, part
+from server_testing import Api
 
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
@@ -102,6 +103,31 @@ def test_an_item_of_a_file_of_several_is_pulled_with_that_file(
     assert {held.object for held in document.holds} == {"Left", "Right"}
     assert run("pull", item.part_number, "--to", tmp_path / "back").code == 0
     assert set(contents(tmp_path / "back")) == {"parts/Both.FCStd"}
+
+
+def test_a_released_revision_comes_back_as_it_was_frozen(
+    registered: Path, silo: Any, run: Any, tmp_path: Path
+) -> None:
+    """Every file, whatever was committed since; a label that there is not is one sentence."""
+    before = contents(registered)
+    assert run("commit", registered).code == 0
+    number = silo.client.search_items("Robot")[0].part_number
+    with Api(silo.client.base_url, silo.token) as api:
+        api.good("PUT", "/api/users/admin", {"approver": True})
+        api.good("POST", f"/api/items/{number}/releases", {"with_parts": True})
+        api.good("POST", f"/api/items/{number}/releases/A/approval", {"override": "a trial"})
+    for name in ("parts/Both.FCStd", "asm/Top.FCStd"):
+        edit(registered / name, "later")
+    assert run("commit", registered).code == 0
+    pulled = run("pull", number, "--revision", "A", "--to", tmp_path / "A")
+    assert pulled.code == 0, pulled.out
+    assert contents(tmp_path / "A") == {name: before[name] for name in contents(tmp_path / "A")}
+    assert contents(tmp_path / "A").keys() == before.keys()
+    assert run("pull", number, "--to", tmp_path / "now").code == 0
+    assert contents(tmp_path / "now") == contents(registered)
+    missing = run("pull", number, "--revision", "Q", "--to", tmp_path / "Q")
+    assert missing.code != 0
+    assert "no revision 'Q'; there is A" in missing.err
 
 
 def edit(path: Path, text: str) -> None:

@@ -56,6 +56,12 @@ TABLE: dict[tuple[str, str], str] = {
     ("GET", "/api/items/{part_number}"): VIEWER,
     ("PUT", "/api/items/{part_number}"): EDITOR,
     ("PATCH", "/api/items/{part_number}/properties"): EDITOR,
+    ("GET", "/api/items/{part_number}/releases"): VIEWER,
+    ("POST", "/api/items/{part_number}/releases"): EDITOR,
+    ("GET", "/api/items/{part_number}/releases/{label}"): VIEWER,
+    # These two need the right to approve, or an editor who withdraws (tests/contract/test_releases.py).
+    ("POST", "/api/items/{part_number}/releases/{label}/approval"): VIEWER,
+    ("POST", "/api/items/{part_number}/releases/{label}/end"): VIEWER,
     ("DELETE", "/api/items/{part_number}"): EDITOR,
     ("POST", "/api/items/{part_number}/unarchive"): EDITOR,
     ("POST", "/api/generate-part-number"): EDITOR,

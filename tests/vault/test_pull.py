@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.api.files import download_revision
-from silo.api.wire import LinkedFile
-from silo.bom.errors import DocumentError, InputError, ServerFaultError
+from silo.api.wire import FrozenFile, LinkedFile, Release
+from silo.bom.errors import DocumentError, InputError, NotFoundError, ServerFaultError
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
@@ -100,7 +100,7 @@ class Project:
         send_all(self.store, self.silo)
         assert self.store.entries() == ()
 
-    def pull(self, into: Path, name: str = "Arm", revision: int | None = None, **rules: Any) -> Pulled:
+    def pull(self, into: Path, name: str = "Arm", revision: int | str | None = None, **rules: Any) -> Pulled:
         with fetched(self.silo, self.number(name), revision) as tree:
             return place(tree, into, Rules(**rules))
 
@@ -152,6 +152,37 @@ def test_a_chosen_revision_brings_the_files_of_its_time(project: Project, tmp_pa
         assert pulled.complete
         assert (into / "robot/arm/parts/Plate.FCStd").read_bytes() == plate
         assert next(q for i, q, _ in bom(pulled.top) if i == project.ids["Bolt"]) == bolts
+
+
+def test_a_release_brings_its_own_files_and_no_other(project: Project, tmp_path: Path) -> None:
+    """The revisions that it names, also of a file without a link; a file that it lacks is reported."""
+    project.commit()
+    part("Plate, thicker", uuid=project.ids["Plate"]).save(project.path("arm/parts/Plate.FCStd"))
+    project.commit("Plate")
+    files = [
+        FrozenFile(
+            document=project.ids[name],
+            revision=1,
+            file_name=f"{name}.FCStd",
+            file_path=f"{place}{name}.FCStd",
+        )
+        for name, place in (("Arm", "robot/arm/"), ("Plate", "robot/arm/parts/"), ("Nut", "vendor/"))
+    ]
+    release = Release(label="B", status="released", files=files)
+    project.silo.releases[project.number("Arm"), "B"] = release
+    pulled = project.pull(tmp_path / "B", revision="B")
+    there = {"arm/Arm.FCStd", "arm/parts/Plate.FCStd", "vendor/Nut.FCStd"}
+    assert set(states(pulled, tmp_path / "B")) == there
+    plate = sorted(project.stored("Plate").files.items())[0][1]
+    assert (tmp_path / "B/arm/parts/Plate.FCStd").read_bytes() == plate
+    assert [lost.path for lost in pulled.lost] == ["../lib/Bolt.FCStd"]
+    assert not pulled.complete
+    empty = Release(label="C", status="released")
+    project.silo.releases[project.number("Arm"), "C"] = empty
+    with pytest.raises(InputError, match="no file in revision C"):
+        project.pull(tmp_path / "C", revision="C")
+    with pytest.raises(NotFoundError, match="no revision 'Q'"):
+        project.pull(tmp_path / "Q", revision="Q")
 
 
 def test_local_edits_are_not_overwritten_unasked(project: Project, tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from urllib.parse import urljoin
 
 from silo.api.policy import error_of
 from silo.api.transport import LISTS, MAX_ERROR, Call, Caller, Cancel, Transport, as_json, stop_if
-from silo.api.wire import Document, HeldItem, LinkedFile, Revision, Wire
+from silo.api.wire import Document, HeldItem, LinkedFile, Release, Revision, Wire
 from silo.bom.errors import (
     ConflictError,
     DocumentError,
@@ -309,6 +309,14 @@ class FileCalls(Caller):
         """The documents that hold an item, its own first."""
         where = (f"the files of {part_number}", "items", part_number, "documents")
         return [one for page, _ in self._all(Document, *where, keys=("documents",)) for one in page]
+
+    def get_release(self, part_number: str, label: str, /) -> Release:
+        """A released revision of a product, or one in review, with all files as they were frozen.
+
+        Raises NotFoundError, RouteMissingError where the server knows no releases.
+        """
+        subject = f"revision {label} of {part_number}"
+        return self._get(subject, "items", part_number, "releases", label).model(Release)
 
     def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
         """The revisions of an item, newest first; those above the number ``after``.

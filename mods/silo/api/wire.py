@@ -275,6 +275,13 @@ class MergeWarning(Answer):
     server_quantity: Number | None = None
 
 
+class Draft(Record):
+    """What a change of a released product is part of: the coming revision; ``released`` stays as it is."""
+
+    label: str
+    released: str
+
+
 class _Merged(Answer):
     """What answer and event of a merge share."""
 
@@ -290,6 +297,7 @@ class MergeResult(_Merged):
 
     status: str = "merged"
     version: int | None = None
+    draft: Draft | None = None
 
 
 class MergeEvent(_Merged):
@@ -419,6 +427,53 @@ class Document(Revision):
     holds: list[HeldItem] = Field(default_factory=list)
     linked: list[Document] = Field(default_factory=list)
     used_by: list[Document] = Field(default_factory=list)
+
+
+class Approval(Record):
+    """Who approved a revision of a product, when, with which words."""
+
+    username: str
+    at: Time = None
+    comment: str = ""
+
+
+class FrozenFile(Record):
+    """A file as it was when a product was frozen: a revision of a document, its place, its content."""
+
+    document: str
+    revision: int
+    file_name: str = ""
+    file_path: str | None = None
+    sha256: str = ""
+    size: int = 0
+
+
+class Release(Record):
+    """A revision of a product that was submitted for release; ``record`` names what was frozen of it.
+
+    status
+        ``review``, ``released``, ``obsolete``, ``rejected`` or ``withdrawn``.
+    blocks
+        what keeps it from being released, or kept it when it was, in sentences.
+    revision, files
+        the item's revision in it, and all files of the product; only if one release is asked for.
+    """
+
+    label: str
+    status: str
+    record: str = ""
+    with_parts: bool = False
+    blocks: list[str] = Field(default_factory=list)
+    comment: str = ""
+    frozen_at: Time = None
+    created_by: str = ""
+    ended_at: Time = None
+    ended_by: str | None = None
+    note: str = ""
+    override: str | None = None
+    approvals: list[Approval] = Field(default_factory=list)
+    revision: int | None = None
+    files: list[FrozenFile] = Field(default_factory=list)
 
 
 class WhereUsedLine(Record):

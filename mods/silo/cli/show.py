@@ -200,6 +200,7 @@ _STATUS = {
 
 def outcome_text(outcome: Outcome, base: str) -> Text:
     """Return one line: which assembly, what became of it, and its file relative to ``base``."""
+    from silo.activity import draft_text
     from silo.api.boms import unusual
     from silo.batch import STATUS_WORDS
 
@@ -211,6 +212,8 @@ def outcome_text(outcome: Outcome, base: str) -> Text:
     if outcome.error is not None:
         text.append(f": {plain(str(outcome.error))}")
     text.append(f"  {plain(relative(head.doc_path, base))}", "dim")
+    if draft := draft_text(outcome.result):
+        text.append(f"\n  {plain(draft)}", "dim")
     for message in unusual(outcome.result):
         text.append(f"\n  ⚠ {plain(message)}", "yellow")
     return text

@@ -225,13 +225,18 @@ def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> 
     return found
 
 
+def _revision(text: str) -> int | str:
+    return common.above_zero(text) if text.isdigit() else text
+
+
 def add_pull(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("part_number", metavar="PART_NUMBER")
     parser.add_argument(
         "--revision",
-        metavar="N",
-        type=common.above_zero,
-        help="this revision, with the linked files as they were then; else the newest of all",
+        metavar="N|LABEL",
+        type=_revision,
+        help="revision N of the file, with the linked files as they were then; or the released revision "
+        "LABEL, such as B, with all files as they were frozen; else the newest of all",
     )
     parser.add_argument(
         "--to",

@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.api.files import DocumentId, Standing, checksum_of, download_revision, has_file
 from silo.api.transport import Cancel, stop_if
-from silo.api.wire import Item, LinkedFile, Revision
+from silo.api.wire import Item, LinkedFile, Release, Revision
 from silo.bom.compare import Assembly, LineChange, ThreeLines, compare_assemblies, compare_three
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError, listed
 from silo.bom.links import extract
@@ -203,16 +203,22 @@ class _Fetch:
     most: int
     files: dict[str, Fetched] = field(default_factory=dict)
     lost: list[Lost] = field(default_factory=list)
+    release: Release | None = None
     _at: datetime | None = None
     _revisions: dict[str, list[Revision]] = field(default_factory=dict)
     _contents: dict[tuple[str, int], tuple[Path, str]] = field(default_factory=dict)
+    _sought: set[str] = field(default_factory=set)
 
     def tree(self, item: Item, number: int | None) -> Tree:
         holder = self.holder(item)
         known = self.revisions(holder)
         wanted = known if number is None else [one for one in known if one.revision_number == number]
+        if self.release is not None:
+            wanted = list(filter(None, [self.frozen(holder)]))
         if not wanted:
             which = "no file yet" if number is None else f"no file with the revision {number}"
+            if self.release is not None:
+                which = f"no file in revision {self.release.label}"
             raise InputError(f"{item.part_number} has {which} in Silo")
         top = wanted[0]
         self._at = top.created_at
@@ -220,12 +226,35 @@ class _Fetch:
         name = _safe_name(name or f"{item.part_number}.FCStd")
         # The top lies where it lay in its project: a link that steps out of its folder and back leads to one
         # place.
-        safe = not any(":" in one or one in ("", ".", "..") or refusal(one) for one in above.split("/"))
-        left = [(posixpath.join(above, name) if safe else name, holder, top)]
+        left = [(posixpath.join(above, name) if _is_place(above) else name, holder, top)]
         while left:
             position, one, revision = left.pop(0)
             left += self.fetch(position, one, revision)
+            if not left:
+                left = self.unlinked()
         return Tree(tuple(self.files.values()), tuple(self.lost))
+
+    def frozen(self, holder: Holder) -> Revision | None:
+        """The revision of a file in the release that is fetched; None if the file is not in it."""
+        files = self.release.files if self.release is not None else ()
+        numbers = {one.document: one.revision for one in files}
+        known = self.revisions(holder) if holder.id in numbers else []
+        return next((one for one in known if one.revision_number == numbers[holder.id]), None)
+
+    def unlinked(self) -> list[tuple[str, Holder, Revision]]:
+        """The next file of the release that no link led to: a person uploaded it."""
+        there = {one.item for one in self.files.values()} | self._sought
+        for one in self.release.files if self.release is not None else ():
+            if one.document not in there:
+                self._sought.add(one.document)
+                holder = Holder(DocumentId(one.document), one.document)
+                revision = self.frozen(holder)
+                above, name = posixpath.split((one.file_path or one.file_name).replace("\\", "/"))
+                place = posixpath.join(above, _safe_name(name)) if _is_place(above) else _safe_name(name)
+                if revision is not None and place not in self.files:
+                    return [(place, holder, revision)]
+                self.lost.append(Lost(place, place, "it is in the release, and not in Silo at this place"))
+        return []
 
     def holder(self, item: Item) -> Holder:
         """The item, or the file of several items that it lies in."""
@@ -326,6 +355,8 @@ class _Fetch:
         What the top itself links to was written down with it (``sha256``). A file further below
         may have been committed again between the file that links to it and the top.
         """
+        if self.release is not None:
+            return self.frozen(child)
         known = self.revisions(child)
         if not self.pinned or not known:
             return known[0] if known else None
@@ -367,6 +398,11 @@ class _Children:
         return by_path, by_name
 
 
+def _is_place(folder: str) -> bool:
+    """True for a folder inside a project, such as ``parts/bought``."""
+    return not any(":" in one or one in ("", ".", "..") or refusal(one) for one in folder.split("/"))
+
+
 def _refused(path: str) -> str:
     """Why a recorded path is not followed; "" where it is."""
     if _ABSOLUTE.match(path):
@@ -389,7 +425,7 @@ def _safe_name(name: str) -> str:
 def fetched(
     client: SiloClient,
     part_number: str,
-    revision: int | None = None,
+    revision: int | str | None = None,
     *,
     cancelled: Cancel | None = None,
     progress: Progress = lambda _name, _count: None,
@@ -398,15 +434,17 @@ def fetched(
     """The tree of an item, in a scratch folder that goes with the block.
 
     revision
-        of the top; its linked files are then those of its time. None: the newest of all.
+        the number of a file's revision: its linked files are then those of its time. The label of a released
+        revision: all files as they were frozen. None: the newest of all.
 
     Raises InputError where the item has no such file, and for more than ``most`` files.
     """
     item = client.get_item(part_number)
+    number = revision if isinstance(revision, int) else None
+    release = client.get_release(item.part_number, revision) if isinstance(revision, str) else None
     with scratch_folder("silo-pull-") as scratch:
-        yield _Fetch(client, Path(scratch), revision is not None, cancelled, progress, most).tree(
-            item, revision
-        )
+        fetch = _Fetch(client, Path(scratch), number is not None, cancelled, progress, most, release=release)
+        yield fetch.tree(item, number)
 
 
 class State(StrEnum):

@@ -51,6 +51,9 @@ Uuid = String(36)
 # What waits for a person, for indexes that hold little else; a query must say it in these words.
 UNREFERENCED = "unreferenced_since IS NOT NULL"
 INCOMPLETE = "left_out <> '[]' OR refused_at IS NOT NULL"
+# A label that is taken; and the one submission that waits for its approval.
+NUMBERED = "status IN ('review', 'released', 'obsolete')"
+IN_REVIEW = "status = 'review'"
 
 
 def _only(condition: str) -> dict[str, Any]:
@@ -276,6 +279,47 @@ product_looks = Table(
     Column("since", Stamp),
 )
 
+# What is frozen of an item when a product is submitted: JSON under its SHA-256. A row never changes.
+frozen_items = Table(
+    "frozen_items",
+    metadata,
+    Column("hash", String(64), primary_key=True),
+    Column("record", Text, nullable=False),
+)
+
+# A revision of a product that was submitted for release, or was released: ``record`` is its frozen item.
+releases = Table(
+    "releases",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("item_id", Id, ForeignKey("items.id"), nullable=False),
+    Column("label", String(16), nullable=False),
+    Column("status", String(16), nullable=False),
+    Column("record", String(64), ForeignKey("frozen_items.hash"), nullable=False),
+    Column("with_parts", Boolean, nullable=False),
+    Column("blocks", Text, nullable=False),
+    Column("comment", Text, nullable=False),
+    Column("frozen_at", Stamp, nullable=False),
+    Column("created_by", String(64), nullable=False),
+    Column("ended_at", Stamp),
+    Column("ended_by", String(64)),
+    Column("note", Text, nullable=False),
+    Column("override", Text),
+    Index("uq_releases_item_id_label", "item_id", "label", unique=True, **_only(NUMBERED)),
+    Index("uq_releases_in_review", "item_id", unique=True, **_only(IN_REVIEW)),
+    Index(None, "record"),
+    sqlite_autoincrement=True,
+)
+
+release_approvals = Table(
+    "release_approvals",
+    metadata,
+    Column("release_id", Id, ForeignKey("releases.id"), primary_key=True),
+    Column("username", String(64), primary_key=True),
+    Column("at", Stamp, nullable=False),
+    Column("comment", Text, nullable=False),
+)
+
 events = Table(
     "events",
     metadata,
@@ -299,6 +343,7 @@ users = Table(
     Column("role", String(16), nullable=False),
     Column("password_hash", Text),
     Column("active", Boolean, nullable=False),
+    Column("approver", Boolean, nullable=False, server_default=false()),
     Column("created_at", Stamp, nullable=False),
     sqlite_autoincrement=True,
 )

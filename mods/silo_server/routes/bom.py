@@ -661,12 +661,14 @@ IMPORT_BODY = {
 
 @dataclass(frozen=True)
 class Wanted:
-    """What an export shows: the view, for how many pieces, and the filter of the page (words, a type)."""
+    """What an export shows: the view, for how many pieces, the page's filter (words, a type); and of which
+    released revision."""
 
     view: View = View.SINGLE
     pieces: Annotated[int, Query(ge=1, le=1_000_000)] = 1
     q: Annotated[str, Query(max_length=200)] = ""
     type: Annotated[str, Query(max_length=20)] = ""
+    release: Annotated[str, Query(max_length=16)] = ""
 
 
 As = Annotated[Wanted, Depends()]
@@ -815,9 +817,10 @@ def _exported(
     view, pieces = wanted.view, wanted.pieces
 
     def make(tx: Tx) -> transfer.Export:
-        return transfer.export(tx, part_number, view, pieces, wanted.q, wanted.type)
+        return transfer.export(tx, part_number, view, pieces, wanted.q, wanted.type, wanted.release)
 
-    many = f"-for-{pieces}" if pieces > 1 else ""
+    many = f"-{wanted.release}" if wanted.release else ""
+    many += f"-for-{pieces}" if pieces > 1 else ""
     return _file(call, make, write, media_type, f"bom-{view.value}{many}.{suffix}")
 
 

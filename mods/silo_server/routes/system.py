@@ -231,6 +231,7 @@ class UserChangeBody(Body):
     role: Role | None = None
     display_name: Short | None = None
     active: StrictBool | None = None
+    approver: StrictBool | None = None
     password: NewPassword | None = None
 
 
@@ -325,7 +326,7 @@ def create_user(call: Admin, body: NewUserBody) -> dict[str, Any]:
 
 @auth_router.put("/users/{username}", responses=WRITE_ERRORS)
 def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, Any]:
-    """Change a user's role, name, password, or let nobody in under this name any more."""
+    """Change a user's role, name, password, right to approve, or let nobody in under this name any more."""
     with call.write(even_when_read_only=True) as tx:
         user = accounts.change_user(tx, username, **body.model_dump())
         return _user(user)

@@ -278,24 +278,29 @@ def create_user(call: Administrator, form: Form) -> Response:
 
 @router.post("/users/{username}")
 def change_user(call: Administrator, username: str, form: Form) -> Response:
-    """Change what the admin changed: a user's role, or whether anybody gets in under this name."""
-    typed = {name: text(form, name) for name in ("role", "active") if name in form}
+    """Change what the admin changed: a user's role, right to approve, or whether the user may log in."""
+    typed = {name: text(form, name) for name in ("role", "active", "approver") if name in form}
     seen = {name: text(form, f"was_{name}") for name in typed if f"was_{name}" in form}
     try:
         with call.write(even_when_read_only=True) as tx:
             user = accounts.get_user(tx, username)
-            now = {"role": user.role.value, "active": "yes" if user.active else "no"}
+            now = {
+                "role": user.role.value,
+                "active": "yes" if user.active else "no",
+                "approver": "yes" if user.approver else "no",
+            }
             edit = compared(now, seen, typed)
             if edit.clashes:
                 raise ConflictError(
                     f"{username} was changed by somebody else meanwhile, and stays as this page shows it now"
                 )
-            role, active = edit.mine.get("role"), edit.mine.get("active")
+            role, active, approver = map(edit.mine.get, ("role", "active", "approver"))
             accounts.change_user(
                 tx,
                 username,
                 role=_role(role) if role is not None else None,
                 active=active == "yes" if active is not None else None,
+                approver=approver == "yes" if approver is not None else None,
             )
     except SiloError as error:
         return _show(call, problem=str(error), status=error.status_hint)

@@ -43,6 +43,7 @@ KINDS = {
     "BOM edits": ("bom.updated",),
     "items": ("item.created", "item.updated", "item.deleted"),
     "files and revisions": ("revision.created", "document.revised"),
+    "reviews and releases": ("revision.reviewed", "revision.released"),
     "the server": ("server.state",),
 }
 NAMES = tuple(name for names in KINDS.values() for name in names)
@@ -127,6 +128,8 @@ def entry_of(event: LoggedEvent, item: Item | None = None) -> Entry:
     path = f"/items/{segment(number)}" if number else ""
     if event.name in ("bom_merge", "bom.updated"):
         path += "/bom"
+    if event.name in ("revision.reviewed", "revision.released"):
+        path += "/releases"
     if event.name == "document.revised":
         number, path = str(data.get("file_name") or ""), f"/documents/{segment(str(data.get('document')))}"
     return Entry(
@@ -149,6 +152,8 @@ def _words(name: str, data: Mapping[str, Any]) -> str:
         return f"revision {data.get('revision_number', '')}" + (
             f": {isolate(str(comment))}" if comment else ""
         )
+    if name in ("revision.reviewed", "revision.released"):
+        return f"revision {data.get('revision', '')} {data.get('status', '')}"
     if name == "server.state":
         closed = data.get("mode") == "read-only"
         return "The server takes no changes at the moment" if closed else "The server takes changes again"

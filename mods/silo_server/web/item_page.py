@@ -46,6 +46,7 @@ from silo_server.settings import TooLargeError
 from silo_server.values import Item, Line, names_of
 from silo_server.web.accounts import Reader
 from silo_server.web.item_edit_page import shown_properties
+from silo_server.web.releases_page import state_of
 from silo_server.web.render import PAGE_ROWS, Address, Page, arranged, page, page_of, segment
 
 # More open rows than this nobody pages through; a filter or fewer levels bring them down.
@@ -340,11 +341,13 @@ def item_page(
         used, uses = tree.where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
         files = documents.shown(tx, documents.holding(tx, item))
         looked, now = last_look(tx, call.actor.own_id, item), tx.stamp
+        release = state_of(tx, item)
     call.server.db.looks[call.actor.own_id, item.id] = now
     return page(
         call,
         "item.html",
         looked=looked,
+        release=release,
         item=item,
         look=look,
         at=look.address(f"/items/{segment(item.part_number)}"),

@@ -29,6 +29,7 @@ from silo_server.web import (
     item_edit_page,
     item_page,
     merge_page,
+    releases_page,
     waiting_page,
 )
 from silo_server.web.accounts import LoginNeededError, OldFormError, send_again, to_login
@@ -39,6 +40,7 @@ ROUTERS = (
     item_edit_page.router,  # before item_page: /items/new is no part number
     item_page.router,
     merge_page.router,
+    releases_page.router,
     activity_page.router,
     import_page.router,
     waiting_page.router,

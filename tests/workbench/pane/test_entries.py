@@ -12,7 +12,7 @@ from activities import activity_of, entry_text
 from silo.activity import counts_text, english
 from silo.api.boms import NOT_ATOMIC
 from silo.api.events import ServerEvent
-from silo.api.wire import MergeDiff, MergeWarning
+from silo.api.wire import Draft, MergeDiff, MergeWarning
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.workbench import words
@@ -47,6 +47,18 @@ def test_a_merge_is_the_box_of_the_spec(vault: Vault) -> None:
     assert view.target == page(f"/items/{vault.number}/bom")
     # Older boxes of this assembly ask no more.
     assert box(vault).document.endswith("Top.FCStd")
+
+
+def test_a_commit_of_a_released_product_says_which_draft_it_is_part_of(vault: Vault) -> None:
+    """The released revision stays as it is; before the first release nothing is said."""
+    vault.commit(vault.snapshot(vault.part("Bolt", 12)))
+    vault.send()
+    sent = vault.told[-1]
+    assert sent.result is not None
+    assert "draft" not in entry_text(of_sent(sent, page, now=0.0))
+    of_released = sent.result.model_copy(update={"draft": Draft(label="C", released="B")})
+    shown = entry_text(of_sent(replace(sent, result=of_released), page, now=0.0))
+    assert "This is part of draft C. Revision B stays released as it is." in shown.splitlines()
 
 
 LINE = {"part_number": "P", "quantity": 1}

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import Any
 
-from silo.activity import Count, count_texts, headline, no_changes, unregistered_text
+from silo.activity import Count, count_texts, draft_text, headline, no_changes, unregistered_text
 from silo.api.boms import unusual
 from silo.api.events import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
@@ -154,6 +154,8 @@ def _status_lines(sent: Sent) -> tuple[Line, ...]:
     lines = []
     if sent.entry.remark:
         lines.append(Line(sent.entry.remark, Tone.WARNING))
+    if draft := draft_text(sent.result, translate):
+        lines.append(Line(draft, Tone.PLAIN))
     lines += [Line(plain(message, 300), Tone.WARNING) for message in unusual(sent.result)]
     removed = len(sent.result.diff.removed) if sent.result is not None else 0
     if sent.status is Status.UNCHANGED and sent.plan is not None:

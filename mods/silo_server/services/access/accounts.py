@@ -30,13 +30,18 @@ USERNAME_FORM = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,63}")
 
 @dataclass(frozen=True, slots=True)
 class User:
-    """A user. ``has_password`` False means: only tokens and login links let this user in."""
+    """A user. ``has_password`` False means: only tokens and login links let this user in.
+
+    approver
+        may release revisions of products, whatever the role.
+    """
 
     id: int
     username: str
     display_name: str
     role: Role
     active: bool
+    approver: bool
     has_password: bool
     created_at: str
 
@@ -56,7 +61,14 @@ def _decoy() -> str:
 def to_user(row: Any) -> User:
     """A frozen user from its row."""
     known = row.password_hash is not None
-    return from_row(User, row, role=Role(row.role), active=bool(row.active), has_password=known)
+    return from_row(
+        User,
+        row,
+        role=Role(row.role),
+        active=bool(row.active),
+        approver=bool(row.approver),
+        has_password=known,
+    )
 
 
 def list_users(tx: Tx) -> list[User]:
@@ -112,6 +124,7 @@ def change_user(
     role: Role | None = None,
     display_name: str | None = None,
     active: bool | None = None,
+    approver: bool | None = None,
     password: str | None = None,
 ) -> User:
     """Change a user; the last active admin cannot be taken away.
@@ -129,6 +142,8 @@ def change_user(
         check_lasting(tx, "give a higher role")
     if active and not user.active:
         check_lasting(tx, "let a user in again")
+    if approver and not user.approver:
+        check_lasting(tx, "give the right to approve")
     if password is not None:
         check_lasting(tx, "set a password")
     loses = (role is not None and role is not Role.ADMIN) or active is False
@@ -141,6 +156,8 @@ def change_user(
         values["display_name"] = display_name
     if active is not None:
         values["active"] = active
+    if approver is not None:
+        values["approver"] = approver
     if password is not None:
         values["password_hash"] = hash_password(password)
     if values:
@@ -174,6 +191,7 @@ def _what_changed(user: User, values: Mapping[str, object]) -> str:
         "role": user.role.value,
         "display_name": user.display_name,
         "active": user.active,
+        "approver": user.approver,
     }
     told = [
         f"{name.replace('_', ' ')} {old} → {values[name]}"

@@ -51,6 +51,7 @@ from silo_server.services.bom.lines import (
     new_line_id,
 )
 from silo_server.services.items import get_item
+from silo_server.services.releases import draft_of
 from silo_server.services.revisions import check_document
 from silo_server.settings import TooLargeError, spec_time, wire
 from silo_server.values import Item, Line, LineState, dumps, from_row, names_of
@@ -442,6 +443,8 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     kept = [change.part_number for change in prepared.plan.diff.kept]
     remember(tx, parent, order, prepared.child_ids, prepared.before, kept)
     answer = answer_of(prepared.plan.diff, parent.part_number, order.sync_id, order.left_out)
+    if (draft := draft_of(tx, parent)) is not None:
+        answer["draft"] = draft
     text = dumps(answer)
     if request is not None:
         shorter = _without_unchanged(prepared, changes, answer)

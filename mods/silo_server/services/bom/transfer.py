@@ -46,6 +46,7 @@ from silo.bom.numbers import Mark, as_decimal, common_mark, parse_number, plain,
 from silo.bom.resolve import with_allowed_characters
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import items
+from silo_server.services.bom.frozen import Product, frozen_product
 from silo_server.services.bom.history import moment, what_changed
 from silo_server.services.bom.lines import (
     ChangeKind,
@@ -74,6 +75,7 @@ from silo_server.services.bom.tree import (
     sought,
 )
 from silo_server.services.items import get_item
+from silo_server.services.releases import get_release
 from silo_server.settings import TooLargeError, wire
 from silo_server.values import Item, Line, LineState, dumps
 
@@ -136,21 +138,31 @@ class Export:
 
 
 def export(
-    tx: Tx, part_number: str, view: View, pieces: int = 1, words: str = "", item_type: str = ""
+    tx: Tx,
+    part_number: str,
+    view: View,
+    pieces: int = 1,
+    words: str = "",
+    item_type: str = "",
+    release: str = "",
 ) -> Export:
     """The BOM of an item, with the totals for so many ``pieces`` of it.
 
     words, item_type
         the filter: only parts that it finds, and in the other views than the flat one what leads to them.
+    release
+        the label of a revision: the product as it was frozen.
     """
-    root = get_item(tx, part_number)
-    graph = load_graph(tx, root)
-    still, parts = summary_of(tx, root).open, parts_of(tx, graph)
+    root = get_item(tx, part_number, include_archived=bool(release))
+    of = get_release(tx, root, release) if release else None
+    shown = frozen_product(tx, root, of) if of else _present(tx, root)
+    root, graph, parts, known, still = shown.graph.root, shown.graph, shown.parts, shown.worths, shown.open
     filtered = bool(words or item_type)
     # What a sync left out has no number, supplier or type: a filter finds none of it.
-    gaps = [] if filtered else _gap_rows(tx, graph, view)
-    known, fitting = below(tx, graph, parts).worths, sought(words, item_type, parts)
-    notes = [f"For {pieces} pieces of {root.part_number} {root.name}"] if pieces > 1 else []
+    gaps = [] if filtered or of else _gap_rows(tx, graph, view)
+    fitting = sought(words, item_type, parts)
+    notes = [f"Revision {of.label}, {of.status}, frozen at {wire(of.frozen_at)}"] if of else []
+    notes += [f"For {pieces} pieces of {root.part_number} {root.name}"] if pieces > 1 else []
     if filtered:
         asked = f"“{words}”" if words else ""
         notes.append(f"Only what fits {asked}{' of the type ' + item_type if item_type else ''}")
@@ -188,6 +200,12 @@ def export(
             if hit(one.line)
         )
     return Export(root, view, chain(rows, gaps), notes, pieces)
+
+
+def _present(tx: Tx, root: Item) -> Product:
+    graph = load_graph(tx, root)
+    parts = parts_of(tx, graph)
+    return Product(graph, parts, below(tx, graph, parts).worths, summary_of(tx, root).open)
 
 
 _CHANGES = {"what": "What", "within": "In", "part_number": "Part number", "name": "Name"}

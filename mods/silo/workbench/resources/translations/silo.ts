@@ -2033,6 +2033,11 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../../activity.py" />
+            <source>This is part of draft {draft}. Revision {released} stays released as it is.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../activity.py" />
             <source>The category rules of this Silo are not used until they are mended: {problem}</source>
             <translation type="unfinished" />
         </message>

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Released revisions over HTTP: submit a product, approve it, read what was frozen of it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter
+from pydantic import Field, WithJsonSchema
+from starlette.responses import Response
+
+from silo.api import wire
+from silo.bom.errors import ForbiddenError
+from silo_server.db.engine import Tx
+from silo_server.routes import context
+from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Call, Editor, Viewer, json_answer
+from silo_server.routes.models import Body, Text
+from silo_server.services import releases
+from silo_server.services.bom import frozen
+from silo_server.services.items import get_item
+from silo_server.services.releases import LABEL_FORM, Release
+from silo_server.values import Item, Role, to_wire
+
+router = APIRouter(prefix="/api/items/{part_number}/releases", tags=["releases"])
+
+
+class SubmitBody(Body):
+    """``POST …/releases``: without a label the server takes the next one of the site's scheme."""
+
+    comment: Text = ""
+    label: Annotated[
+        str, WithJsonSchema({"type": "string", "pattern": f"^({LABEL_FORM.pattern})?$", "default": ""})
+    ] = ""
+    with_parts: bool = False
+
+
+class ApproveBody(Body):
+    """``POST …/releases/{label}/approval``; ``override``: why it is released in spite of what blocks."""
+
+    comment: Text = ""
+    override: Text = ""
+
+
+class EndBody(Body):
+    """``POST …/releases/{label}/end``: ``rejected``, ``withdrawn`` end a review, ``obsolete`` a release."""
+
+    status: Literal["rejected", "withdrawn", "obsolete"]
+    note: Text = ""
+
+
+class ReleasesOut(wire.Answer):
+    """All revisions that were submitted, newest first, and the label of the draft."""
+
+    draft: str
+    releases: list[wire.Release] = Field(default_factory=list)
+
+
+def release_to_wire(tx: Tx, release: Release, *, whole: bool = False) -> dict[str, Any]:
+    """A revision as it is sent; ``whole``: with the item's revision and all files of the product."""
+    told = {
+        **to_wire(release, "id"),
+        "blocks": releases.blocks_of(tx, release) if release.status == "review" else release.blocks,
+        "approvals": [to_wire(one) for one in releases.approvals_of(tx, release)],
+    }
+    if whole:
+        record = releases.read_record(tx, release.record)
+        told |= {"revision": record["revision"], "files": record["files"]}
+    return told
+
+
+@router.get("", response_model=ReleasesOut, responses=READ_ERRORS)
+def list_releases(call: Viewer, part_number: str) -> Response:
+    """The revisions of a product: in review, released, obsolete, and those that came to nothing."""
+    with call.read() as tx:
+        item = get_item(tx, part_number, include_archived=True)
+        found = [release_to_wire(tx, one) for one in releases.list_releases(tx, item)]
+        told = {"draft": releases.coming_label(tx, item), "releases": found}
+    return json_answer(told)
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=wire.Release,
+    responses=WRITE_ERRORS,
+    openapi_extra=context.refused("the label is taken, or nothing is there to freeze"),
+)
+def submit(call: Editor, part_number: str, body: SubmitBody) -> Response:
+    """Freeze a product as it is now and put it up for review."""
+    made = frozen_now(call, part_number)
+    with call.write() as tx:
+        release = releases.submit(tx, part_number, made, body.comment, body.label, with_parts=body.with_parts)
+        return json_answer(release_to_wire(tx, release, whole=True), 201)
+
+
+def frozen_now(call: Call, part_number: str) -> releases.Frozen:
+    """The product as one snapshot of the database has it."""
+    with call.server.large_reads.enter(), call.read() as tx:
+        return frozen.freeze(tx, get_item(tx, part_number))
+
+
+@router.get("/{label}", response_model=wire.Release, responses=READ_ERRORS)
+def get_release(call: Viewer, part_number: str, label: str) -> Response:
+    """One revision, with all files of the product as they were frozen."""
+    with call.read() as tx:
+        release = releases.get_release(tx, _item(tx, part_number), label)
+        told = release_to_wire(tx, release, whole=True)
+    return json_answer(told)
+
+
+@router.post("/{label}/approval", response_model=wire.Release, responses=WRITE_ERRORS)
+def approve(call: Viewer, part_number: str, label: str, body: ApproveBody) -> Response:
+    """Approve what is in review; the last approval that the site asks for releases it.
+
+    This needs the right to approve, not a role.
+    """
+    with call.write() as tx:
+        release = releases.approve(tx, part_number, label, body.comment, body.override)
+        return json_answer(release_to_wire(tx, release))
+
+
+@router.post("/{label}/end", response_model=wire.Release, responses=WRITE_ERRORS)
+def end(call: Viewer, part_number: str, label: str, body: EndBody) -> Response:
+    """Reject or withdraw what is in review, or call a released revision obsolete.
+
+    An editor withdraws; rejecting and calling obsolete need the right to approve.
+    """
+    if body.status == "withdrawn":
+        check_editor(call)
+    with call.write() as tx:
+        release = releases.end(tx, part_number, label, body.status, body.note)
+        return json_answer(release_to_wire(tx, release))
+
+
+def check_editor(call: Call) -> None:
+    """Raise ForbiddenError if the caller is less than an editor."""
+    if not call.actor.role.covers(Role.EDITOR):
+        raise ForbiddenError(f"{call.actor.username} is {call.actor.role}, this needs editor")
+
+
+def _item(tx: Tx, part_number: str) -> Item:
+    return get_item(tx, part_number, include_archived=True)

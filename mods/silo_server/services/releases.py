@@ -1,0 +1,367 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Released revisions of a product: draft → in review → released → obsolete.
+
+A submission freezes the whole product (:mod:`silo_server.services.bom.frozen`). A revision is a label and the
+record of the product, so nothing that happens later changes it, and no retention touches it. Reviewers
+approve exactly what was frozen.
+
+**What blocks.** Open questions and incomplete syncs on any level, parts of our own without a file, and parts
+and assemblies whose frozen record is not released. Whoever approves may override that with a reason, unless
+the site forbids it (``SILO_RELEASE_OVERRIDE``), or releases the parts with the product (``with_parts``).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count, islice, product
+from typing import Any, NamedTuple
+
+from sqlalchemy import insert, select, update
+
+from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
+from silo_server import events
+from silo_server.db.engine import Tx, insert_rows, one_of
+from silo_server.db.tables import (
+    frozen_items,
+    items,
+    release_approvals,
+    releases,
+    users,
+)
+from silo_server.services.access import audit
+from silo_server.services.items import get_item
+from silo_server.settings import TooLargeError
+from silo_server.values import Item, Scope, dumps, from_row
+
+LABEL_FORM = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,15}")
+# Letters that are read as digits are left out.
+_LETTERS = "ABCDEFGHJKLMNPQRSTUVWXYZ"
+NUMBERED = ("review", "released", "obsolete")
+MOST_BLOCKS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """A revision of a product that was submitted.
+
+    status
+        ``review``, ``released``, ``obsolete``, or ``rejected`` and ``withdrawn`` without a release.
+    record
+        SHA-256 of what was frozen at ``frozen_at``.
+    with_parts
+        parts and assemblies that are not released yet are released with it.
+    blocks
+        what was open in the product when it was frozen, in sentences.
+    note, override
+        the last comment, and why it was released in spite of what blocks.
+    """
+
+    id: int
+    label: str
+    status: str
+    record: str
+    with_parts: bool
+    blocks: Sequence[str]
+    comment: str
+    frozen_at: str
+    created_by: str
+    ended_at: str | None
+    ended_by: str | None
+    note: str
+    override: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Approval:
+    """Who approved, when, with which words."""
+
+    username: str
+    at: str
+    comment: str
+
+
+class Frozen(NamedTuple):
+    """A product as it was read at ``at``: its record, and those of all that is in it, by their hashes."""
+
+    record: str
+    records: Mapping[str, str]
+    blocks: Sequence[str]
+    at: str
+
+
+def labels(scheme: str) -> Iterator[str]:
+    """All labels of a scheme in their order: ``letters`` A, B, …, Z, AA, … or ``numbers`` 1.0, 2.0, …"""
+    if scheme == "numbers":
+        yield from (f"{number}.0" for number in count(1))
+    for length in count(1):
+        yield from map("".join, product(_LETTERS, repeat=length))
+
+
+def next_label(taken: Collection[str], scheme: str) -> str:
+    """Return the label after the last of the scheme that is taken."""
+    # Beyond so many labels of the scheme none can be taken.
+    first = list(islice(labels(scheme), len(taken) + 1000))
+    last = max((place for place, label in enumerate(first) if label in taken), default=-1)
+    return first[last + 1]
+
+
+def list_releases(tx: Tx, item: Item) -> list[Release]:
+    """Return all that was ever submitted of an item, newest first."""
+    row = releases.c
+    found = tx.conn.execute(select(releases).where(row.item_id == item.id).order_by(row.id.desc()))
+    return [_release(one) for one in found]
+
+
+def _release(row: Any) -> Release:
+    return from_row(Release, row, blocks=tuple(json.loads(row.blocks)))
+
+
+def get_release(tx: Tx, item: Item, label: str) -> Release:
+    """Return the revision with this label. Raises NotFoundError."""
+    row = releases.c
+    of_label = (row.item_id == item.id) & (row.label == label)
+    query = select(releases).where(of_label, row.status.in_(NUMBERED))
+    found = tx.conn.execute(query).one_or_none()
+    if found is None:
+        there = ", ".join(one.label for one in list_releases(tx, item) if one.status in NUMBERED)
+        raise NotFoundError(f"{item.part_number} has no revision {label!r}; there is {there or 'none yet'}")
+    return _release(found)
+
+
+def approvals_of(tx: Tx, release: Release) -> list[Approval]:
+    """Return who approved, in order."""
+    row = release_approvals.c
+    query = select(release_approvals).where(row.release_id == release.id).order_by(row.at)
+    return [from_row(Approval, one) for one in tx.conn.execute(query)]
+
+
+def newest_release(tx: Tx, item: Item) -> Release | None:
+    """Return the revision that is released now; None if none is."""
+    row = releases.c
+    query = select(releases).where(row.item_id == item.id, row.status == "released")
+    found = tx.conn.execute(query.order_by(row.id.desc()).limit(1)).one_or_none()
+    return None if found is None else _release(found)
+
+
+def coming_label(tx: Tx, item: Item) -> str:
+    """Return the label of the draft that the item is now."""
+    taken = [one.label for one in list_releases(tx, item) if one.status in NUMBERED]
+    return next_label(taken, tx.settings.release_labels)
+
+
+def draft_of(tx: Tx, item: Item) -> dict[str, str] | None:
+    """Return what a change of a released item says: the draft that it is part of, and what stays released."""
+    released = newest_release(tx, item)
+    return {"label": coming_label(tx, item), "released": released.label} if released else None
+
+
+def is_bought(of: Mapping[str, Any]) -> bool:
+    """True for an item that is purchased, by its columns or its record: nobody releases such a part."""
+    return of.get("sourcing_type") == "purchased"
+
+
+def unreleased_parts(tx: Tx, record: str) -> list[str]:
+    """Return the part numbers in a frozen product with a file or lines that are not released like that."""
+    records = read_records(tx, record)
+    wanted = {
+        one
+        for one, made in records.items()
+        if one != record and (made["lines"] or made["files"]) and not is_bought(made)
+    }
+    row = releases.c
+    of_them = one_of(tx, row.record, wanted) & (row.status == "released")
+    done = set(tx.conn.scalars(select(row.record).where(of_them)))
+    return sorted(records[one]["part_number"] for one in wanted - done)
+
+
+def blocks_of(tx: Tx, release: Release) -> list[str]:
+    """Return what keeps a submission from being released, in sentences."""
+    parts = [] if release.with_parts else unreleased_parts(tx, release.record)
+    return [*release.blocks, *(f"{part}: not released as it is in this product" for part in parts)]
+
+
+def submit(
+    tx: Tx, part_number: str, frozen: Frozen, comment: str, label: str = "", *, with_parts: bool = False
+) -> Release:
+    """Put a frozen product up for review. Raises ConflictError if one is in review or the label is taken."""
+    item = get_item(tx, part_number, lock=True)
+    before = list_releases(tx, item)
+    if waiting := next((one for one in before if one.status == "review"), None):
+        raise ConflictError(
+            f"revision {waiting.label} of {item.part_number} is in review since {waiting.frozen_at[:10]}; "
+            "release, reject or withdraw it first"
+        )
+    taken = [one.label for one in before if one.status in NUMBERED]
+    label = label.strip() or next_label(taken, tx.settings.release_labels)
+    if not LABEL_FORM.fullmatch(label):
+        raise RejectedError(f"label: wanted 1 to 16 letters, digits or . _ -, got {label[:40]!r}")
+    if label.casefold() in map(str.casefold, taken):
+        raise ConflictError(f"{item.part_number} has a revision {label}; leave the label to the server")
+    _keep(tx, frozen.records)
+    blocks = frozen.blocks
+    if len(blocks) > MOST_BLOCKS:
+        blocks = [*blocks[:MOST_BLOCKS], f"and {len(blocks) - MOST_BLOCKS} more"]
+    row = {
+        "item_id": item.id,
+        "label": label,
+        "status": "review",
+        "record": frozen.record,
+        "with_parts": with_parts,
+        "blocks": dumps(list(blocks)),
+        "comment": comment,
+        "frozen_at": frozen.at,
+        "created_by": tx.actor.username,
+        "note": "",
+    }
+    tx.conn.execute(insert(releases).values(row))
+    release = get_release(tx, item, label)
+    _announce(tx, item, release, "submitted")
+    return release
+
+
+def _keep(tx: Tx, records: Mapping[str, str]) -> None:
+    row = frozen_items.c.hash
+    there = set(tx.conn.scalars(select(row).where(one_of(tx, row, records.keys()))))
+    insert_rows(tx, frozen_items, [{"hash": k, "record": v} for k, v in records.items() if k not in there])
+
+
+def approve(tx: Tx, part_number: str, label: str, comment: str, override: str = "") -> Release:
+    """Approve what is in review; the last approval that the site asks for releases it.
+
+    override
+        why it is released in spite of what blocks.
+
+    Raises ForbiddenError, ConflictError (what blocks; it is not in review).
+    """
+    item, release = _in_review(tx, part_number, label)
+    _check_right(tx)
+    blocks = blocks_of(tx, release)
+    override = override.strip() or release.override or ""
+    if blocks and not override:
+        shown = "; ".join(blocks[:5]) + (f"; and {len(blocks) - 5} more" if len(blocks) > 5 else "")
+        way = (
+            "mend that and submit it again, or say why it is released all the same (override)"
+            if tx.settings.release_override
+            else "mend that and submit it again"
+        )
+        raise ConflictError(f"revision {label} of {item.part_number} cannot be released: {shown}; {way}")
+    if blocks and not tx.settings.release_override:
+        raise ForbiddenError("this server releases nothing that is blocked (SILO_RELEASE_OVERRIDE)")
+    given = approvals_of(tx, release)
+    if tx.actor.username in {one.username for one in given}:
+        raise ConflictError(f"you approved revision {label} already; {_wanted(tx, len(given))}")
+    approval = {"release_id": release.id, "username": tx.actor.username, "at": tx.stamp, "comment": comment}
+    tx.conn.execute(insert(release_approvals).values(approval))
+    if blocks:
+        _change(tx, release, override=override)
+    if len(given) + 1 < tx.settings.release_approvals:
+        _announce(tx, item, release, "approved")
+        return get_release(tx, item, label)
+    if release.with_parts:
+        _release_parts(tx, release, f"with revision {label} of {item.part_number}")
+    _make_released(tx, item, release)
+    return get_release(tx, item, label)
+
+
+def _make_released(tx: Tx, item: Item, release: Release) -> None:
+    row = releases.c
+    earlier = (row.item_id == item.id) & (row.status == "released")
+    tx.conn.execute(update(releases).where(earlier).values(status="obsolete"))
+    _change(tx, release, status="released", ended_at=tx.stamp, ended_by=tx.actor.username)
+    _announce(tx, item, release, "released")
+
+
+def _release_parts(tx: Tx, release: Release, comment: str) -> None:
+    numbers = set(unreleased_parts(tx, release.record))
+    records = read_records(tx, release.record)
+    for record, made in records.items():
+        if made["part_number"] not in numbers or record == release.record:
+            continue
+        row = tx.conn.execute(select(items.c.part_number).where(items.c.uuid == made["item"])).one()
+        item = get_item(tx, row.part_number, include_archived=True, lock=True)
+        frozen = Frozen(record, {}, (), release.frozen_at)
+        if any(one.status == "review" for one in list_releases(tx, item)):
+            raise ConflictError(
+                f"{item.part_number} is in review by itself; release, reject or withdraw that first"
+            )
+        part = submit(tx, item.part_number, frozen, comment)
+        _make_released(tx, item, part)
+
+
+def end(tx: Tx, part_number: str, label: str, status: str, note: str) -> Release:
+    """Reject or withdraw what is in review, or call a released revision obsolete, with a comment."""
+    if status == "obsolete":
+        item = get_item(tx, part_number, include_archived=True, lock=True)
+        release = get_release(tx, item, label)
+        _check_right(tx)
+        if release.status != "released":
+            raise ConflictError(f"revision {label} of {item.part_number} is {release.status}, not released")
+    else:
+        item, release = _in_review(tx, part_number, label)
+        if status == "rejected":
+            _check_right(tx)
+    ended = {"ended_at": tx.stamp, "ended_by": tx.actor.username} if status != "obsolete" else {}
+    _change(tx, release, status=status, note=note, **ended)
+    _announce(tx, item, release, status)
+    return next(one for one in list_releases(tx, item) if one.id == release.id)
+
+
+def _in_review(tx: Tx, part_number: str, label: str) -> tuple[Item, Release]:
+    item = get_item(tx, part_number, include_archived=True, lock=True)
+    release = get_release(tx, item, label)
+    if release.status != "review":
+        raise ConflictError(f"revision {label} of {item.part_number} is {release.status}, not in review")
+    return item, release
+
+
+def _check_right(tx: Tx) -> None:
+    row = users.c
+    may = tx.conn.scalar(select(row.approver).where(row.id == tx.actor.user_id, row.active))
+    if not may:
+        raise ForbiddenError(
+            f"{tx.actor.username} may not approve; an admin gives that right on the page Users"
+        )
+    if not tx.actor.scope.covers(Scope.WRITE):
+        raise ForbiddenError("a token of the scope read cannot approve")
+
+
+def _wanted(tx: Tx, given: int) -> str:
+    wanted = tx.settings.release_approvals
+    return f"{given} of {wanted} approvals are given" if wanted > 1 else "it is released"
+
+
+def _change(tx: Tx, release: Release, **values: Any) -> None:
+    tx.conn.execute(update(releases).where(releases.c.id == release.id).values(values))
+
+
+def _announce(tx: Tx, item: Item, release: Release, what: str) -> None:
+    audit.note(tx, f"release.{what}", item.part_number, f"revision {release.label}")
+    events.released(tx, item, release.label, what)
+
+
+def read_record(tx: Tx, record: str) -> dict[str, Any]:
+    """Return one frozen item, by its hash."""
+    row = tx.conn.execute(select(frozen_items.c.record).where(frozen_items.c.hash == record)).one()
+    found: dict[str, Any] = json.loads(row.record)
+    return found
+
+
+def read_records(tx: Tx, record: str) -> dict[str, dict[str, Any]]:
+    """Return a frozen item and all that is in it, by their hashes, itself first. Raises TooLargeError."""
+    found: dict[str, dict[str, Any]] = {}
+    level, lines = {record}, 0
+    while level:
+        row = frozen_items.c
+        rows = tx.conn.execute(select(frozen_items).where(one_of(tx, row.hash, level)).order_by(row.hash))
+        read = {one.hash: json.loads(one.record) for one in rows}
+        found |= read
+        lines += sum(len(one["lines"]) for one in read.values())
+        if lines > tx.settings.max_expanded_rows:
+            raise TooLargeError(
+                f"this revision has more than {tx.settings.max_expanded_rows} lines; look at one of its parts"
+            )
+        level = {line["child"] for one in read.values() for line in one["lines"]} - found.keys() - {None}
+    return found

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The revisions of a product: its draft, what is in review, what was released, and each as it was frozen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from itertools import islice
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from starlette.responses import Response
+
+from silo.bom.errors import ConflictError, SiloError
+from silo.bom.numbers import as_decimal
+from silo_server.db.engine import Tx
+from silo_server.routes.context import Call
+from silo_server.routes.releases import check_editor, frozen_now
+from silo_server.services import releases
+from silo_server.services.access.accounts import get_user
+from silo_server.services.bom import tree
+from silo_server.services.bom.frozen import Product, frozen_product
+from silo_server.services.bom.summary import summary_of
+from silo_server.services.items import get_item
+from silo_server.services.releases import Release
+from silo_server.settings import TooLargeError
+from silo_server.values import Item
+from silo_server.web.accounts import Reader, Writer
+from silo_server.web.forms import Form, back, text
+from silo_server.web.render import Address, page, page_of, segment
+
+router = APIRouter(include_in_schema=False)
+
+# More rows of a frozen tree nobody pages through; an export has all of them.
+MOST_ROWS = 20_000
+DONE = {"rejected": "rejected", "withdrawn": "withdrawn", "obsolete": "obsolete"}
+
+
+def _path(part_number: str) -> str:
+    return f"/items/{segment(part_number)}/releases"
+
+
+@router.get("/items/{part_number}/releases")
+def releases_page(call: Reader, part_number: str) -> Response:
+    """All revisions of a product, with the forms that submit, approve, reject and end them."""
+    return _show(call, part_number)
+
+
+def _show(
+    call: Call, part_number: str, problem: str = "", status: int = 200, typed: Mapping[str, str] | None = None
+) -> Response:
+    with call.read() as tx:
+        item = get_item(tx, part_number, include_archived=True)
+        found = releases.list_releases(tx, item)
+        values: dict[str, Any] = {
+            "rows": [(one, releases.approvals_of(tx, one)) for one in found],
+            "draft": releases.coming_label(tx, item),
+            "state": state_of(tx, item, found),
+            "approver": get_user(tx, call.actor.username).approver,
+            "wanted": tx.settings.release_approvals,
+            "may_override": tx.settings.release_override,
+        }
+        waiting = next((one for one in found if one.status == "review"), None)
+        values |= {"in_review": waiting, "blocks": releases.blocks_of(tx, waiting) if waiting else []}
+    return page(call, "releases.html", status=status, item=item, problem=problem, typed=typed or {}, **values)
+
+
+def state_of(tx: Tx, item: Item, found: list[Release] | None = None) -> dict[str, Any]:
+    """What pages say of a product: the revision that is released, and whether something changed since."""
+    found = releases.list_releases(tx, item) if found is None else found
+    released = next((one for one in found if one.status == "released"), None)
+    waiting = next((one for one in found if one.status == "review"), None)
+    newest = waiting or released
+    changed = False
+    if newest is not None:
+        with suppress(ConflictError, TooLargeError):  # a ring of assemblies, which the page itself reports
+            changed = summary_of(tx, item).changed.at > newest.frozen_at
+    return {"released": released, "review": waiting, "changed": changed}
+
+
+@router.post("/items/{part_number}/releases")
+def submit(call: Writer, part_number: str, form: Form) -> Response:
+    """Freeze the product and put it up for review."""
+    typed = {name: text(form, name, 2000) for name in ("comment", "label", "with_parts")}
+    try:
+        made = frozen_now(call, part_number)
+        with call.write() as tx:
+            parts = bool(typed["with_parts"])
+            release = releases.submit(
+                tx, part_number, made, typed["comment"], typed["label"], with_parts=parts
+            )
+    except SiloError as error:
+        return _show(call, part_number, str(error), error.status_hint, typed)
+    return back(_path(part_number), f"Revision {release.label} is in review.")
+
+
+@router.post("/items/{part_number}/releases/{label}/approval")
+def approve(call: Reader, part_number: str, label: str, form: Form) -> Response:
+    """Approve what is in review, in spite of what blocks if a reason is given."""
+    typed = {name: text(form, name, 2000) for name in ("approval", "override")}
+    try:
+        with call.write() as tx:
+            done = releases.approve(tx, part_number, label, typed["approval"], typed["override"])
+    except SiloError as error:
+        return _show(call, part_number, str(error), error.status_hint, typed)
+    said = "is released" if done.status == "released" else "has your approval, and waits for another"
+    return back(_path(part_number), f"Revision {label} {said}.")
+
+
+@router.post("/items/{part_number}/releases/{label}/end")
+def end(call: Reader, part_number: str, label: str, form: Form) -> Response:
+    """Reject, withdraw, or call obsolete."""
+    status = text(form, "status")
+    if status not in DONE:
+        return _show(call, part_number, "Load the page again: the form has another state.", 400)
+    try:
+        if status == "withdrawn":
+            check_editor(call)
+        with call.write() as tx:
+            releases.end(tx, part_number, label, status, text(form, "note", 2000))
+    except SiloError as error:
+        return _show(call, part_number, str(error), error.status_hint)
+    return back(_path(part_number), f"Revision {label} is {DONE[status]}.")
+
+
+@router.get("/items/{part_number}/releases/{label}")
+def release_page(
+    call: Reader,
+    part_number: str,
+    label: str,
+    view: Annotated[str, Query(max_length=10)] = "tree",
+    number: Annotated[int, Query(alias="page", ge=1, le=10**9)] = 1,
+) -> Response:
+    """One revision as it was frozen: its tree, or the flat list with totals, and its files."""
+    with call.read() as tx:
+        item = get_item(tx, part_number, include_archived=True)
+        release = releases.get_release(tx, item, label)
+        product = frozen_product(tx, item, release)
+        record = releases.read_record(tx, release.record)
+        approvals = releases.approvals_of(tx, release)
+    rows = list(islice(_rows(product, flat=view == "flat"), MOST_ROWS))
+    table = page_of(rows, len(rows), number)
+    at = Address(f"{_path(item.part_number)}/{segment(label)}", {"view": view} if view != "tree" else {})
+    return page(
+        call,
+        "release.html",
+        item=product.graph.root,
+        release=release,
+        approvals=approvals,
+        table=table,
+        at=at,
+        flat=view == "flat",
+        worth=product.worths[product.graph.root.id],
+        files=record["files"],
+        cut=len(rows) == MOST_ROWS,
+    )
+
+
+def _rows(product: Product, *, flat: bool) -> Any:
+    """The rows of the table: the line, its depth, its total, and what one piece is worth."""
+    if flat:
+        for row in tree.flatten(product.graph):
+            yield row.line, 1, row.total, product.worths[row.line.child_id]
+        return
+    for one in tree.expand(product.graph, tree.MAX_DEPTH, MOST_ROWS):
+        yield one.line, one.depth, as_decimal(one.total), product.worths[one.line.child_id]
