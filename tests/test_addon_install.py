@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import io
 import stat
+import subprocess
 import sys
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -177,3 +180,16 @@ def test_success_is_an_import_inside_freecad(tmp_path: Path) -> None:
     command.write_text(command.read_text().replace("exec(sys.argv[2])", bare))
     with pytest.raises(ConfigError, match=r"FreeCAD cannot import them: .*made for another Python"):
         install_packages(replace(found, missing={"requests": ""}))
+
+
+def test_an_archive_of_the_repository_is_small(tmp_path: Path) -> None:
+    """FreeCAD's Addon Manager fetches it; what only developers need stays out."""
+    root = Path(__file__).resolve().parents[1]
+    if not (root / ".git").exists():
+        pytest.skip("not a checkout")
+    command = ["git", "archive", "--format=zip", "HEAD"]
+    packed = subprocess.run(command, cwd=root, capture_output=True, check=True).stdout
+    assert len(packed) <= 1_750_000
+    names = zipfile.ZipFile(io.BytesIO(packed)).namelist()
+    assert {"InitGui.py", "package.xml", "mods/silo/__init__.py"} <= set(names)
+    assert not [name for name in names if name.startswith(("tests/", "benchmarks/", "deploy/", "scripts/"))]

@@ -136,12 +136,13 @@ def test_the_preview_shows_both_sides(day: Told) -> None:
         "Gearbox",
         "4",
         "2",
-        "will take the assembly's quantity",
+        "will take the assembly's quantity; its own BOM differs from Silo",
     ]
     assert rows["0", "BasePlate"][1:5] == [f"= {day.number('BasePlate')}", "BasePlate", "1", "1"]
     assert rows["1", "Bolt"][3:5] == ["8", "8"]
     assert next(row[:3] for row in day["preview"] if row[2] == "Cover") == ["1", "?", "Cover"]
     assert day["can_sync"]
+    assert day["cut"] == []
 
 
 def test_sync_from_the_preview(day: Told) -> None:

@@ -10,8 +10,10 @@ from typing import Any
 sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
+    FOLDER,
     App,
     Gui,
+    QtWidgets,
     addon,
     ask,
     assembly,
@@ -130,7 +132,13 @@ def preview(one: Any, top: Any) -> None:
     Gui.runCommand("Silo_BOM")
     window = wait(lambda: next(iter(one.previews._open.values()), None))
     wait(lambda: window._preview is not None)
+    window.table.setColumnWidth(1, 460)  # little is left for what a sync does
+    window.resize(1, 480)  # as narrow as its buttons let it be
+    for _ in range(20):
+        QtWidgets.QApplication.processEvents()
+    window.grab().save(str(FOLDER / "preview.png"))
     tell(preview=rows(window.table), preview_text=labels(window), can_sync=window.sync_button.isEnabled())
+    tell(cut=cut(window.table))
     window.sync_button.click()
     wait(lambda: settled() and window._preview is not None and _is_synced(window._preview.top.diff))
     tell(preview_after=rows(window.table))
@@ -144,12 +152,28 @@ def preview(one: Any, top: Any) -> None:
     in_themes(one)
 
 
+def cut(tree: Any) -> list[str]:
+    """The lines of the last column that are wider than the column, or higher than their row."""
+    found: list[str] = []
+    metrics, width = tree.fontMetrics(), tree.columnWidth(4)
+    items = QtWidgets.QTreeWidgetItemIterator(tree)
+    while (item := items.value()) is not None:
+        lines = item.text(4).split("\n")
+        if not item.isFirstColumnSpanned() and item.text(4):
+            found += [line for line in lines if " " in line and metrics.horizontalAdvance(line) > width]
+            height = tree.visualItemRect(item).height()
+            if height and height < len(lines) * metrics.height():
+                found.append(item.text(4))
+        items += 1
+    return found
+
+
 def rows(tree: Any) -> list[list[str]]:
     """The rows of a tree, opened all the way down."""
     found: list[list[str]] = []
 
     def walk(item: Any, depth: int) -> None:
-        found.append([str(depth), *(item.text(column) for column in range(5))])
+        found.append([str(depth), *(" ".join(item.text(column).split()) for column in range(5))])
         for number in range(item.childCount()):
             walk(item.child(number), depth + 1)
 

@@ -17,7 +17,7 @@ from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.workbench import words
 from silo.workbench.pane.activity import Do, Entry
-from silo.workbench.pane.entries import MOST_IN_CONSOLE, badges, console_lines, of_event, of_sent, of_team
+from silo.workbench.pane.entries import badges, of_event, of_sent, of_team
 
 if TYPE_CHECKING:
     from vault import Vault
@@ -108,23 +108,6 @@ def test_a_broken_link_can_be_shown_in_the_model(vault: Vault) -> None:
     vault.send()
     (show,) = [a for line in box(vault).lines for a in line.actions]
     assert (show.do, show.document, show.objects) == (Do.SHOW, str(vault.top), ("Link",))
-
-
-def test_the_report_view_is_not_flooded(vault: Vault) -> None:
-    """The consolidation warnings of a large assembly are reported up to a number, then how many more."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 4)))
-    vault.send()
-    (sent,) = vault.told
-    assert sent.resolved is not None
-    many = [
-        Finding(FindingCode.CONSOLIDATION, Severity.WARNING, f"[Silo BOM] P{n} has 2 individual links.")
-        for n in range(300)
-    ]
-    lines = console_lines(replace(sent, resolved=replace(sent.resolved, findings=tuple(many))))
-    assert len(lines) == MOST_IN_CONSOLE + 1
-    assert lines[-1] == f"[Silo BOM] … and {300 - MOST_IN_CONSOLE} more of these; the preview lists them all."
-    few = console_lines(replace(sent, resolved=replace(sent.resolved, findings=tuple(many[:3]))))
-    assert few == tuple(f"[Silo BOM] P{n} has 2 individual links." for n in range(3))
 
 
 def test_a_merge_line_by_line_is_reported(vault: Vault) -> None:

@@ -162,8 +162,40 @@ def test_what_is_not_counted_has_the_reason_of_the_diff(preview: Preview, diff: 
 def test_the_summary_counts_the_same(preview: Preview) -> None:
     """One line over the table."""
     assert summary(preview) == (
-        "1 to add, 1 with another quantity, 1 unreferenced, 1 in conflict, 1 without a part number"
+        "1 to add, 1 with another quantity, 1 unreferenced, 1 in conflict, 1 without a part number; "
+        "1 sub-assembly differs from Silo"
     )
+
+
+def test_a_sub_assembly_whose_own_bom_is_not_in_silo_is_named(tmp_path: Path) -> None:
+    """The lines of the assembly agree: that is not all that a person wants to know."""
+    from silo.bom_sync import resolve, sync
+    from silo.testing import FakeSilo
+
+    silo = FakeSilo()
+    uuids = {
+        name: silo.create_item("kindred-rd", "A01", name, item_type="part", properties={}).id
+        for name in ("Top", "Arm", "Leg", "Pin")
+    }
+
+    def entry(name: str, *children: BomEntry) -> BomEntry:
+        path = str(tmp_path / f"{name}.FCStd")
+        return BomEntry(path, uuids[name], object_name="A", is_assembly=bool(children), children=children)
+
+    top = replace(entry("Top"), is_assembly=True)
+    below = (entry("Arm", entry("Pin")), entry("Leg", entry("Pin")))
+
+    def look() -> Preview:
+        return ask(Snapshot(top.doc_path, "Top", top.silo_uuid, Extraction(top, below)), silo, CONTROL)
+
+    sync(resolve(Extraction(top, below), silo), silo, sync_id="one")
+    assert summary(look()) == "2 lines agree; 2 sub-assemblies are not in Silo yet"
+    assert {row.note for row in rows(look())} == {"its own BOM is not in Silo yet"}
+    sync(resolve(Extraction(below[0], below[0].children), silo), silo, sync_id="two")
+    assert summary(look()) == "2 lines agree; 1 sub-assembly is not in Silo yet"
+    sync(resolve(Extraction(below[1], below[1].children), silo), silo, sync_id="three")
+    assert summary(look()) == "Nothing to sync: all 2 lines agree with Silo."
+    assert {row.note for row in rows(look())} == {""}
 
 
 def test_a_sync_with_its_sub_assemblies_sends_those_that_differ_first(

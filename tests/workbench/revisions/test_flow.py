@@ -198,3 +198,19 @@ def test_theirs_is_not_taken_where_it_is_not_what_they_committed(day: Day) -> No
     assert Path(day.doc.FileName).read_bytes() == b"mine"
     assert (day.cad.docs, day.kept(), day.held is None) == ([day.doc], [], False)
     assert day.boxes()[0] == "Not fetched: Plate.FCStd"
+
+
+def test_what_was_found_without_words_is_there_at_once(day: Day) -> None:
+    """*Open from Silo* shows it before the server has answered; what words found is no such list."""
+    found: list[list[str]] = []
+
+    def search(words: str) -> None:
+        day.flow.search(words, lambda items: found.append([item.name for item in items]), pytest.fail)
+        day.office.settle()
+
+    search("nothing is called so")
+    assert day.flow.recent == []
+    search("")
+    assert [item.name for item in day.flow.recent] == found[-1] != []
+    search("nothing is called so")
+    assert [item.name for item in day.flow.recent] == found[1]

@@ -194,9 +194,8 @@ def _resolved_lines(sent: Sent) -> tuple[Line, ...]:
 
 # However many of a kind there are, the box has room for the other kinds and their buttons.
 MOST_FINDINGS, MOST_CONFLICTS = 6, 4
-MOST_IN_CONSOLE = 20
 
-# Told elsewhere in the box, or in the report view only.
+# Told elsewhere in the box, or in the preview only.
 _NOT_HERE = (FindingCode.UNREGISTERED, FindingCode.CONSOLIDATION)
 
 
@@ -262,17 +261,6 @@ def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
         Line(unregistered_text(count, translate), Tone.WARNING, (register,)),
         Line(f"{names}{more}", Tone.QUIET),
     )
-
-
-def console_lines(sent: Sent) -> tuple[str, ...]:
-    """What goes to the report view: the consolidation warnings in the spec's words (§6)."""
-    findings = sent.resolved.findings if sent.resolved is not None else ()
-    told = [plain(f.message, 300) for f in findings if f.code is FindingCode.CONSOLIDATION]
-    left = len(told) - MOST_IN_CONSOLE
-    if left < 2:
-        return tuple(told)
-    more = translate("Silo", "[Silo BOM] … and {n} more of these; the preview lists them all.")
-    return (*told[:MOST_IN_CONSOLE], more.replace("{n}", str(left)))
 
 
 # --- events of the server --------------------------------------------------------------------------------

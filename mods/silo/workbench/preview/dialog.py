@@ -207,7 +207,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             self._spread(self.table.topLevelItem(number))
         for column in range(4):
             self.table.resizeColumnToContents(column)
-        for column, least, most in ((0, 130, 240), (1, 150, 280), (2, 66, 110), (3, 66, 110)):
+        for column, least, most in ((0, 130, 240), (1, 150, 280), (2, 66, 110), (3, 66, 180)):
             self.table.setColumnWidth(column, min(max(self.table.columnWidth(column) + 12, least), most))
         self._wrap()
 
@@ -227,14 +227,18 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
     def _wrap(self) -> None:
         """Break the sentences to the width that there is; the view itself would cut them."""
         tree = self.table
-        for place in range(tree.topLevelItemCount()):
-            group = tree.topLevelItem(place)
-            width = tree.viewport().width() - 2 * tree.indentation() - 12
-            for number in range(min(group.childCount(), MOST_WRAPPED)):
-                item = group.child(number)
-                if item.data(1, QtCore.Qt.ItemDataRole.UserRole) == Kind.NOT_COUNTED.value:
-                    whole = item.data(2, QtCore.Qt.ItemDataRole.UserRole)
-                    item.setText(0, widgets.broken(whole, tree.fontMetrics(), width))
+        metrics, whole = tree.fontMetrics(), tree.viewport().width() - 2 * tree.indentation() - 12
+        items = QtWidgets.QTreeWidgetItemIterator(tree)
+        left = MOST_WRAPPED
+        while left and (item := items.value()) is not None:
+            text = item.data(2, QtCore.Qt.ItemDataRole.UserRole)
+            if item.data(1, QtCore.Qt.ItemDataRole.UserRole) == Kind.NOT_COUNTED.value:
+                item.setText(0, widgets.broken(text, metrics, whole))
+                left -= 1
+            elif text:
+                item.setText(4, widgets.broken(text, metrics, tree.columnWidth(4) - 12))
+                left -= 1
+            items += 1
 
     def _items(self, wanted: Iterable[Row], left: list[int]) -> Iterable[Any]:
         only = self.changes_only.isChecked()
@@ -253,7 +257,8 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         if row.kind in _WIDE:
             texts = [" ".join(filter(None, (row.number, row.name or note)))]
         item = QtWidgets.QTreeWidgetItem(texts)
-        item.setData(2, QtCore.Qt.ItemDataRole.UserRole, texts[0])
+        sentence = texts[0] if row.kind is Kind.NOT_COUNTED else "" if row.kind is Kind.GROUP else note
+        item.setData(2, QtCore.Qt.ItemDataRole.UserRole, sentence)
         tone = Tone.ERROR if row.number == "✗" else _TONES.get(row.kind, Tone.PLAIN)
         if tone is not Tone.PLAIN:
             for column in range(5):

@@ -25,7 +25,7 @@ from silo.workbench.commit.flow import CommitFlow, Desk, commit_of
 from silo.workbench.commit.plan import Snapshot
 from silo.workbench.session.jobs import Control
 from silo.workbench.session.session import Session
-from silo.workbench.words import MOST_TIP, plain, quantity, translate
+from silo.workbench.words import MOST_TIP, counted, plain, quantity, translate
 
 if TYPE_CHECKING:
     from silo.bom.walk.tree import Key
@@ -92,6 +92,11 @@ class Compared:
     lines: tuple[Mapping[str, Any], ...]
     diff: BomDiff
     to_send: bool
+
+    @property
+    def is_new(self) -> bool:
+        """True where a sync would send it, and the server has no line of it yet."""
+        return self.to_send and not self.lines
 
 
 @dataclass(frozen=True)
@@ -226,6 +231,8 @@ def _assembly_rows(
     above = above | {one.resolved.assembly.key}
     for entry in one.resolved.entries:
         kind, silo, note = states.get(entry.part_number or "", (Kind.UNCHANGED, "", ""))
+        if (own := known.get(entry.key)) is not None and entry.is_assembly and entry.part_number:
+            note = "; ".join(filter(None, (note, _own_words(own))))
         if entry.missing:
             base = os.path.dirname(one.resolved.assembly.doc_path)
             kind, note = Kind.MISSING, _missing_words(relative(entry.doc_path, base), entry.object_name)
@@ -293,6 +300,13 @@ def _notes() -> dict[Kind, str]:
     }
 
 
+def _own_words(one: Compared) -> str:
+    """Whether the BOM of a sub-assembly is in Silo."""
+    if one.is_new:
+        return translate("Silo", "its own BOM is not in Silo yet")
+    return translate("Silo", "its own BOM differs from Silo") if one.to_send else ""
+
+
 def _missing_words(file: str, name: str) -> str:
     text = translate("Silo", "missing: {file}")
     return text.replace("{file}", f"{file}#{name}" if name else file)
@@ -353,10 +367,33 @@ def summary(preview: Preview) -> str:
         (sum(entry.missing for entry in preview.top.resolved.entries), translate("Silo", "{n} missing")),
     )
     told = [text.replace("{n}", str(count)) for count, text in parts if count]
-    if not told:
-        agree = translate("Silo", "Nothing to sync: all {n} lines agree with Silo.")
-        return agree.replace("{n}", str(len(diff.unchanged)))
-    return ", ".join(told)
+    new = sum(one.is_new for one in preview.compared[:-1])
+    below = [
+        counted(count, one, many)
+        for count, one, many in (
+            (
+                new,
+                translate("Silo", "{n} sub-assembly is not in Silo yet"),
+                translate("Silo", "{n} sub-assemblies are not in Silo yet"),
+            ),
+            (
+                preview.to_send_below - new,
+                translate("Silo", "{n} sub-assembly differs from Silo"),
+                translate("Silo", "{n} sub-assemblies differ from Silo"),
+            ),
+        )
+        if count
+    ]
+    agreeing = len(diff.unchanged)
+    if told:
+        own = ", ".join(told)
+    elif below:
+        own = counted(agreeing, translate("Silo", "{n} line agrees"), translate("Silo", "{n} lines agree"))
+    else:
+        own = translate("Silo", "Nothing to sync: all {n} lines agree with Silo.").replace(
+            "{n}", str(agreeing)
+        )
+    return "; ".join((own, *below))
 
 
 def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:

@@ -158,6 +158,8 @@ class OpenDialog(_Window):
         self._typing.setInterval(TYPING_MS)
         self._typing.timeout.connect(self._search)
         self.words.textChanged.connect(lambda _text: self._typing.start())
+        if flow.recent:  # shown at once; the server's answer takes their place
+            self._fill(flow.recent)
         self._search()
 
     def _make_middle(self) -> Any:
@@ -190,6 +192,7 @@ class OpenDialog(_Window):
     def _search(self) -> None:
         self._asked += 1
         mine = self._asked
+        self.say(translate("Silo", "Loading…"))
 
         def done(found: list[Item]) -> None:
             if mine == self._asked:  # what was typed meanwhile has its own answer
@@ -198,6 +201,7 @@ class OpenDialog(_Window):
         self._flow.search(self.words.text().strip(), self._alive(done), self._alive(self.fail))
 
     def _fill(self, found: Sequence[Item]) -> None:
+        chosen = self._number()
         self.items.clear()
         for item in found:
             row = QtWidgets.QTreeWidgetItem([plain(item.part_number, 60), plain(item.name, 120)])
@@ -206,8 +210,10 @@ class OpenDialog(_Window):
             self.items.addTopLevelItem(row)
         self.items.resizeColumnToContents(0)
         self.say("" if found else translate("Silo", "Nothing found."))
-        if found:
-            self.items.setCurrentItem(self.items.topLevelItem(0))
+        numbers = [item.part_number for item in found]
+        if found:  # what a person has chosen meanwhile stays chosen
+            place = numbers.index(chosen) if chosen in numbers else 0
+            self.items.setCurrentItem(self.items.topLevelItem(place))
 
     def _chosen(self) -> None:
         self.revisions.clear()

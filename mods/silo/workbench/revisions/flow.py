@@ -53,6 +53,8 @@ class RevisionFlow:
 
     def __init__(self, session: Session, desk: Desk) -> None:
         self._session, self._desk = session, desk
+        # Of which server, and what it showed without any words.
+        self._recent: tuple[str, list[Item]] = ("", [])
 
     # -- a colleague's file -----------------------------------------------------------------------------
 
@@ -184,12 +186,25 @@ class RevisionFlow:
         self, words: str, done: Callable[[list[Item]], None], failed: Callable[[SiloError], None]
     ) -> None:
         """Items whose number, name or description have all these words."""
+        url = self._session.shown.server.url
+
+        def told(found: list[Item]) -> None:
+            if not words:
+                self._recent = url, found
+            done(found)
+
         self._session.ask(
             translate("Silo", "Searching"),
             lambda client, _control: client.search_items(words, limit=MOST_FOUND),
-            done,
+            told,
             failed,
         )
+
+    @property
+    def recent(self) -> list[Item]:
+        """What the server in use showed last without any words."""
+        url, found = self._recent
+        return found if url == self._session.shown.server.url else []
 
     def details(
         self, part_number: str, done: Callable[[Known], None], failed: Callable[[SiloError], None]

@@ -42,7 +42,7 @@ class Online:
         outbox: Store,
         *,
         entry: Callable[[Entry], None],
-        sent: Callable[[Sent, tuple[str, ...]], None],
+        sent: Callable[[Sent], None],
         state: Callable[[str, str], None],
         newer: Callable[[str, Newer | None], None] = lambda _identity, _newer: None,
         make_client: Callable[[Server], Any] | None = None,
@@ -52,7 +52,6 @@ class Online:
         self._entry, self._sent, self._state, self._newer = entry, sent, state, newer
         self._last_ids = LastIds(outbox.path.with_name("last-events.json"))
         self._own: set[str] = set()  # merges of ours whose event was not heard yet
-        self._hints: set[str] = set()  # in the report view already
         self._client: SiloClient | None = None
         self._server = Server()
         self._listener: EventListener | None = None
@@ -172,10 +171,7 @@ class Online:
             self._own.add(sent.sync_id)
             self._last_ids.save()  # the event may have come before the answer
         self._entry(entries.of_sent(sent, self.client.web_url))
-        # A sub-assembly that goes along has the hints of the assembly once more.
-        hints = [line for line in entries.console_lines(sent) if line not in self._hints]
-        self._hints.update(hints)
-        self._sent(sent, tuple(hints))
+        self._sent(sent)
 
 
 class _SharedPauses:

@@ -215,7 +215,7 @@ class Session:
             self._online = Online(
                 self.outbox,
                 entry=lambda entry: self._deliver(lambda: self.add(entry)),
-                sent=lambda sent, lines: self._deliver(lambda: self._arrived(sent, lines)),
+                sent=lambda sent: self._deliver(lambda: self._arrived(sent)),
                 newer=lambda identity, newer: self._deliver(lambda: self._heard(identity, newer)),
                 state=lambda kind, reason: self._deliver(lambda: self._connection(kind, reason)),
                 make_client=self._make_client,
@@ -342,12 +342,10 @@ class Session:
         self._colleagues.gone(seen, identities)
         self._show(newer=self._colleagues.newer)
 
-    def _arrived(self, sent: Sent, lines: tuple[str, ...]) -> None:
+    def _arrived(self, sent: Sent) -> None:
         if sent.revision is not None:
             self._colleagues.arrived(sent.entry.identity, sent.revision)
             self._show(newer=self._colleagues.newer)
-        for line in lines:
-            self._listener.console(line)
         self._listener.sent(sent)
 
     def tick(self) -> None:

@@ -800,11 +800,6 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
-            <source>[Silo BOM] … and {n} more of these; the preview lists them all.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
             <source>The server no longer knows what happened since. See its own activity page.</source>
             <translation type="unfinished" />
         </message>
@@ -1116,6 +1111,16 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/flow.py" />
+            <source>its own BOM is not in Silo yet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>its own BOM differs from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
             <source>missing: {file}</source>
             <translation type="unfinished" />
         </message>
@@ -1147,6 +1152,36 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../preview/flow.py" />
             <source>{n} missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} sub-assembly is not in Silo yet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} sub-assemblies are not in Silo yet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} sub-assembly differs from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} sub-assemblies differ from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} line agrees</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
+            <source>{n} lines agree</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1589,6 +1624,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../revisions/dialog.py" />
             <source>Project folder:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Loading…</source>
             <translation type="unfinished" />
         </message>
         <message>
