@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from silo.bom.errors import DocumentError
 from silo.inertia.geometry.together import (
     Mesh,
+    about_enclosed,
     components,
     is_inside,
     joined,
@@ -383,6 +384,17 @@ def test_trimesh_agrees_on_a_scene_of_two_bodies() -> None:
     whole = combine_arrays(volumes * densities, coms, units * densities[:, None, None])
     np.testing.assert_allclose(whole.com, scene.center_mass, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(whole.inertia, scene.moment_inertia, rtol=1e-9, atol=1e-9)
+
+
+def test_what_an_open_surface_would_enclose() -> None:
+    """Cones from its middle, wherever it lies, whichever way its triangles look; a flat one has nothing."""
+    mesh = mesh_of(brick((2, 2, 2), (50, 0, 0)))
+    whole = about_enclosed(mesh)
+    assert whole == pytest.approx(8)
+    turned = np.where(np.arange(len(mesh.faces))[:, None] % 2, mesh.faces, mesh.faces[:, ::-1])
+    assert about_enclosed(Mesh(mesh.vertices, turned)) == pytest.approx(whole)
+    assert about_enclosed(Mesh(mesh.vertices, mesh.faces[2:])) > 4
+    assert about_enclosed(Mesh(mesh.vertices, mesh.faces[:1])) == pytest.approx(0, abs=1e-9)
 
 
 def test_components_are_what_shares_no_vertex() -> None:

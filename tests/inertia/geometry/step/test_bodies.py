@@ -19,7 +19,7 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell
 from step_bodies import KINDS, MM, Bodies, begun, some
-from step_writer import StepDocument
+from step_writer import StepDocument, trsf_of
 
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.step.part21 import WANTED, read_products, scan
@@ -244,6 +244,42 @@ def test_a_body_of_no_product_is_named(tmp_path: Path, read_in: ReadIn, codes_of
     assembly = read_in(made.write(path))
     assert codes_of(assembly) == [GeometryCode.BODY_MISSING]
     assert f"BLOCK #{body}" in assembly.problems[0].message
+
+
+def test_a_body_of_an_assembly_itself_is_placed(tmp_path: Path, read_in: ReadIn) -> None:
+    """The kernel gives the assembly no shape of its own; its primitive is made, and counts."""
+    document = StepDocument()
+    top = document.assembly("top")
+    document.place(top, document.part(BRepPrimAPI_MakeBox(10, 10, 10).Shape(), "p"), trsf_of((50, 0, 0)), "i")
+    path = document.write(tmp_path / "top.step")
+    made = Bodies()
+    block = made.add(f"BLOCK('b',#{made.axes(90.0)},1.,2.,3.)")
+    text = path.read_text("ascii").replace(
+        " SHAPE_REPRESENTATION('',(", f" SHAPE_REPRESENTATION('',(#{block},", 1
+    )
+    text = text.replace("ENDSEC;\nEND-ISO", "\n".join([*made.lines, "ENDSEC;\nEND-ISO"]))
+    path.write_text(text, "ascii")
+    assembly = read_in(path)
+    volumes = sorted(assembly.prototypes[one.prototype].volume_m3 for one in assembly.instances)
+    assert volumes == pytest.approx([6e-9, 1e-6])
+
+
+@pytest.mark.parametrize("lost", ["SWEPT_DISK_SOLID", "BLOCK of no product", ""])
+def test_bodies_are_counted_where_positions_mean_nothing(
+    lost: str, tmp_path: Path, read_in: ReadIn, codes_of: Any
+) -> None:
+    """A name looks like an entity, so that ours are not numbered as the kernel's are."""
+    path = tmp_path / "part.step"
+    made = begun(path)
+    if lost == "SWEPT_DISK_SOLID":
+        KINDS[lost](made, 50.0)
+    elif lost:
+        made.add(f"BLOCK('b',#{made.axes(50.0)},1.,2.,3.)")
+    text = made.write(path).read_text("ascii")
+    path.write_text(text.replace("PRODUCT('part','part'", "PRODUCT('part','#1=X(part'"), "ascii")
+    assembly = read_in(path)
+    assert only(assembly).volume_m3 == pytest.approx(1e-6)
+    assert (GeometryCode.BODY_MISSING in codes_of(assembly)) == bool(lost)
 
 
 OTHER_FORMS = {

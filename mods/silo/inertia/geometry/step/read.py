@@ -368,7 +368,8 @@ class _Walk:
         for key, facts in file.facts.items():
             groups.setdefault(id(facts), []).append(key)
         if not self._owners:
-            named = sum(len(facts.bodies) for facts in self._products.facts.values())
+            named = len(self._products.stray)
+            named += sum(len(facts.bodies) for facts in self._products.facts.values())
             solids = sum(len(occt.solids_of(shape)) for own in file.shapes.values() for shape in own)
             if solids < named:
                 words = (
