@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -220,3 +221,34 @@ def test_what_blocks_an_assembly_is_an_error_in_its_file_or_a_loop_anywhere(
     ]
     assert list(bom_sync.blocking(other)) == wanted
     assert bom_sync.blocking(replace(other, findings=())) == ()
+
+
+def synced(*entries: BomEntry, lines: list[dict[str, object]], at: str | None) -> bool:
+    """Whether a server that remembers its syncs learns anything from this assembly."""
+    silo = silo_of("top", "bolt", "lid")
+    top: dict[str, Any] = silo.items["u-top"]
+    top["last_sync"] = {"at": at, "left_out": []}
+    resolved = bom_sync.resolve(Extraction(assembly("top"), entries), silo)
+    plan = resolved.plan(lines)
+    assert not plan.news
+    top["last_sync"]["left_out"] = [one.as_dict() for one in resolved.left_out]
+    return bom_sync.resolve(Extraction(assembly("top"), entries), silo).is_news(plan, lines)
+
+
+def test_the_first_sync_is_news_though_there_is_nothing_to_write() -> None:
+    """An empty assembly that was never synced: "complete" and "not known" are two things."""
+    assert synced(lines=[], at=None)
+    assert not synced(lines=[], at="2026-01-01T00:00:00Z")
+
+
+def test_a_line_that_is_kept_for_a_missing_file_is_no_news() -> None:
+    """The file that is there gives the line one of its two components; the other one is missing, not gone."""
+    there, missing = part("bolt"), replace(part("bolt2", uuid=None), missing=True)
+    line: dict[str, object] = {
+        "child_part_number": "BOLT",
+        "quantity": 1,
+        "components": [{"file": "bolt.FCStd", "object": "Body"}, {"file": "bolt2.FCStd", "object": "Body"}],
+    }
+    assert not synced(there, missing, lines=[line], at="2026-01-01T00:00:00Z")
+    gone = [{**line, "components": [{"file": "other.FCStd", "object": "Body"}]}]
+    assert synced(there, lines=gone, at="2026-01-01T00:00:00Z")

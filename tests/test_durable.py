@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import os
+import stat
+import sys
 from pathlib import Path
 
 import pytest
@@ -98,3 +100,25 @@ def test_a_memory_that_cannot_be_written_keeps_what_it_was(tmp_path: Path) -> No
     (tmp_path / "a file").write_text("kept")
     assert isinstance(write_memory(tmp_path / "a file" / "memory.json", {}), OSError)
     assert (tmp_path / "a file").read_text() == "kept"
+
+
+def test_content_and_name_are_on_disk_in_this_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """First the content, then the name, then the folder that holds the name: a power cut shows old or new."""
+    done: list[str] = []
+    fsync, replace = os.fsync, os.replace
+
+    def synced(handle: int) -> None:
+        done.append(
+            "folder" if stat.S_ISDIR(os.fstat(handle).st_mode) else f"{os.fstat(handle).st_size} bytes"
+        )
+        fsync(handle)
+
+    def renamed(source: str, target: str) -> None:
+        done.append("name")
+        replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(os, "replace", renamed)
+    with replacing(tmp_path / "file") as file:
+        file.write(b"four")
+    assert done == ["4 bytes", "name", *([] if sys.platform == "win32" else ["folder"])]

@@ -207,3 +207,21 @@ def test_any_spelling_gives_the_same_bom_on_every_disk(
     assert read[0] == read[1]
     table = json.loads(read[0])
     assert "missing" not in json.dumps([f["code"] for f in table["findings"]])
+
+
+def test_of_several_names_the_number_of_the_file_decides(tmp_path: Path) -> None:
+    """Where a disk has both, and finds one of them under a third spelling."""
+    for name in ("äB", "ÄB"):
+        (tmp_path / name).write_text(name)
+    if len(os.listdir(tmp_path)) == 1:
+        pytest.skip("this disk takes both for one file")
+    for name in ("äB", "ÄB"):
+        assert Spelling()._listed(str(tmp_path), "Äb", os.lstat(tmp_path / name)) == name
+
+
+def test_a_folder_without_end_is_listed_to_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Names beyond it stay as they were given."""
+    monkeypatch.setattr("silo.platform._LISTED_AT_MOST", 3)
+    for number in range(9):
+        (tmp_path / f"part {number}").touch()
+    assert sum(map(len, Spelling()._listing(str(tmp_path)).values())) == 3

@@ -400,3 +400,24 @@ def test_events_of_one_connection_can_be_iterated(
         list(client.events())
     with pytest.raises(UnreachableError):
         list(client.events())
+
+
+def test_what_was_received_ends_the_count_of_failures(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """Pauses begin anew after a connection that brought something, and grow after one that only greeted."""
+    server.on(
+        EVENTS,
+        *(
+            answer(drop=True),
+            answer(drop=True),
+            stream(frame(1)),
+            answer(drop=True),
+            stream(),
+            answer(drop=True),
+        ),
+        stream(frame(2), stay=True),
+    )
+    with Watch(client) as watch:
+        assert [watch.event().id for _ in range(2)] == ["1", "2"]
+    assert watch.pauses == [1.0, 2.0, 1.0, 2.0, 4.0, 8.0]

@@ -670,3 +670,137 @@ def test_a_folder_that_takes_nothing_is_listed_truthfully(
     store.path.write_bytes(b"damaged")
     with pytest.raises(OutboxError, match="2 commits in "):
         Store(store.path).entries()
+
+
+def test_an_older_entry_that_arrives_late_undoes_nothing(store: Store, document: Path) -> None:
+    """What is newer than an arrived one stays newer, in whatever order people let them go."""
+    first, second, third = (store.add(commit(document)) for _ in range(3))
+    store.arrived(third, "file")
+    store.arrived(first, "file")
+    assert [entry.superseded for entry in store.entries() if entry.id == second.id] == [True]
+    bom = replace(first, id=first.id, file_left=False)
+    store.arrived(bom, "bom")
+    fourth = store.add(commit(document))
+    assert (store.by_key(fourth.key) or fourth).superseded is False
+
+
+def test_a_disk_error_of_one_entry_stops_no_other(tmp_path: Path, document: Path) -> None:
+    """It waits with its reason; the next one is sent."""
+    silo = FakeSilo()
+    other = document.with_name("Other.FCStd")
+    other.write_bytes(b"other")
+    numbers = [silo.create_item("kindred-rd", "M01", name).part_number for name in ("Top", "Other")]
+
+    class OneBad(Store):
+        def verified(self, entry: Entry) -> Path:
+            if entry.part_number == numbers[0]:
+                raise OSError(errno.EIO, os.strerror(errno.EIO))
+            return super().verified(entry)
+
+    store = OneBad(tmp_path / "outbox.sqlite3")
+    for path, number in zip((document, other), numbers, strict=True):
+        store.add(Commit(str(path), 1.0, part_number=number, file=path))
+    report = send_all(store, silo)
+    assert ([sent.part_number for sent in report.sent], report.stopped_by) == ([numbers[1]], None)
+    (left,) = store.entries()
+    assert (left.part_number, left.state, os.strerror(errno.EIO) in left.reason) == (
+        numbers[0],
+        State.WAITING,
+        True,
+    )
+    assert store.pause(silo.base_url) is None
+
+
+def test_a_file_that_was_saved_and_then_committed_is_its_own_origin(store: Store, document: Path) -> None:
+    """Also while it waits; what was saved and not committed is made from what came before it."""
+    saved = hashlib.sha256(b"first").hexdigest()
+    store.derived(saved, "before")
+    assert store.origin_of(saved) == "before"
+    entry = store.add(commit(document))
+    assert (entry.sha256, store.origin_of(saved)) == (saved, saved)
+    store.discard(entry.id)
+    assert store.origin_of(saved) == "before"
+
+
+def numbered_by_name(path: Path | str | int) -> tuple[int, int, int] | None:
+    """As a disk that gives each name of a file a number of its own."""
+    name = os.readlink(f"/proc/self/fd/{path}") if isinstance(path, int) else str(path)
+    found = stamp_of(path)
+    return found and (*found[:2], found[2] + ("-held" in name))
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="the name of an open file is known on Linux")
+def test_a_second_name_with_another_number_is_no_other_file(
+    store: Store, document: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same without FUSE: the file is copied to the promise, and not refused as written since."""
+    monkeypatch.setattr("silo.outbox.store.stamp_of", numbered_by_name)
+    key, stamp = new_key(), numbered_by_name(document)
+    held = store.hold(str(document), key)
+    document.write_bytes(b"second")
+    entry = store.add(replace(commit(document, key, held), stamp=stamp))
+    assert (entry.state, (store.copies / entry.copy).read_bytes()) == (State.WAITING, b"first")
+
+
+# -- a disk without hard links ---------------------------------------------------------------------
+
+
+@pytest.fixture(name="no_links", params=[errno.EPERM, errno.EXDEV, errno.ENOTSUP, errno.EMLINK])
+def _no_links(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """exFAT, another disk, a share, too many names."""
+
+    def refuse(source: object, target: object, **_: object) -> None:
+        raise OSError(request.param, os.strerror(request.param), source)
+
+    monkeypatch.setattr(os, "link", refuse)
+
+
+@pytest.mark.usefixtures("no_links")
+def test_without_hard_links_a_quick_second_save_drops_nothing(store: Store, document: Path) -> None:
+    """Each commit has the content that it was made of, written in place or by a new file."""
+    keys, contents = [new_key(), new_key()], (b"first", b"second")
+    helds = []
+    for key, content in zip(keys, contents, strict=True):
+        document.write_bytes(content)
+        helds.append(store.hold(str(document), key))
+        store.stage(replace(commit(document, key, helds[-1]), stamp=stamp_of(document)))
+    document.write_bytes(b"third")
+    for key, held in zip(keys, helds, strict=True):
+        store.finish(key, held)
+    assert [(store.copies / entry.copy).read_bytes() for entry in store.entries()] == [*contents]
+    assert [entry.state for entry in store.entries()] == [State.WAITING] * 2
+    assert not [path for path in store.path.parent.glob("*-held/*/*") if path.is_file()]
+
+
+@pytest.mark.usefixtures("no_links")
+@pytest.mark.parametrize("promised", [True, False], ids=["with a copy", "with the document alone"])
+def test_without_hard_links_a_second_freecad_leaves_the_commit_of_the_first(
+    store: Store, document: Path, promised: bool
+) -> None:
+    """It sees that the first one is about to copy; or it copies what was promised itself."""
+    silo, key = FakeSilo(), new_key()
+    held = store.hold(str(document), key) if promised else None
+    store.stage(commit(document, key, held))
+    second = Store(store.path)
+    send_all(second, silo)
+    (entry,) = second.entries()
+    assert (entry.state is State.HELD, "not copied in time" in entry.reason) == (False, False)
+    store.finish(key, held or document)
+    (entry,) = second.entries()
+    assert (entry.state, (second.copies / entry.copy).read_bytes()) == (State.WAITING, b"first")
+
+
+@pytest.mark.usefixtures("no_links")
+def test_a_promise_that_was_cut_off_is_no_content(store: Store, document: Path) -> None:
+    """Killed while the disk was copying: half a file is never sent."""
+    key = new_key()
+    held = store.hold(str(document), key)
+    assert held is not None
+    half = held.with_name(f".{held.name}.x.part")
+    held.rename(half)
+    store.stage(commit(document, key, held))
+    died(store)
+    after = Store(store.path)
+    send_all(after, FakeSilo())
+    (entry,) = after.entries()
+    assert (entry.state, entry.sha256) == (State.HELD, "")
