@@ -421,3 +421,16 @@ def test_what_was_received_ends_the_count_of_failures(
     with Watch(client) as watch:
         assert [watch.event().id for _ in range(2)] == ["1", "2"]
     assert watch.pauses == [1.0, 2.0, 1.0, 2.0, 4.0, 8.0]
+
+
+def test_a_connection_that_broke_after_an_event_is_the_first_failure(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """However many failed before it."""
+    cut = answer(200, headers={**SSE, "Content-Length": "9999"}, chunks=[frame(1)])
+    server.on(
+        EVENTS, answer(drop=True), answer(drop=True), cut, answer(drop=True), stream(frame(2), stay=True)
+    )
+    with Watch(client) as watch:
+        assert [watch.event().id for _ in range(2)] == ["1", "2"]
+    assert watch.pauses == [1.0, 2.0, 1.0, 2.0]

@@ -7,6 +7,7 @@ Whatever happens, and however often a plain user repeats a command, the server h
 from __future__ import annotations
 
 import argparse
+import hashlib
 import multiprocessing
 import os
 import queue
@@ -29,12 +30,12 @@ from silo.api.client import SiloClient
 from silo.api.events import Connection, ConnectionState, EventListener, ServerEvent
 from silo.api.policy import Retries
 from silo.batch import Options, TopResult, sync_top
-from silo.bom.errors import BusyError, InputError, ServerFaultError, SiloError
+from silo.bom.errors import AuthError, BusyError, InputError, ServerFaultError, SiloError
 from silo.bom_sync import Status, compare, resolve
 from silo.cli.common import client_of, read_assembly
 from silo.inertia.output.push import PushItem, PushPlan, push
 from silo.outbox.entry import Commit, State, pause_text
-from silo.outbox.send import send_all
+from silo.outbox.send import Report, send_all
 from silo.outbox.store import Store
 from silo.registering.on_disk import proposals_for, register_all
 from silo.vault.project import commits, find_project, keep, name_documents, read_project
@@ -704,3 +705,89 @@ def test_a_date_in_2099_is_not_waited_for_and_no_number_of_minutes(tmp_path: Pat
             r"Nothing is sent to 127.0.0.1:\d+ for (59|60) min: .*in \d+ days",
             pause_text(pause, silo.url, now),
         )
+
+
+# -- what comes back -------------------------------------------------------------------------------
+
+
+def committed(desk: Desk, *, label: str = "Top Assembly") -> Commit:
+    """A commit of the top assembly as it is: its file and its BOM."""
+    extraction = read_assembly(str(desk.top))
+    identity = extraction.assembly.silo_uuid or ""
+    commit = Commit(
+        str(desk.top), 0.0, label=label, identity=identity, file=desk.top, extraction=extraction, comment="c"
+    )
+    desk.outbox.add(commit, desk.silo.url)
+    return commit
+
+
+def sent(desk: Desk, token: str = TOKEN) -> Report:
+    """What a sending that a person asked for did."""
+    retries = Retries(tries=2, sleep=lambda _s: None)
+    with SiloClient(desk.silo.url, token, timeout=60, retries=retries) as client:
+        return send_all(desk.outbox, client, force=True)
+
+
+@pytest.mark.parametrize("upload", ["multipart", "presigned"])
+@pytest.mark.parametrize("storage", ["down", "none"])
+def test_a_storage_that_is_down_keeps_files_back_and_no_bom(
+    tmp_path: Path, storage: str, upload: str
+) -> None:
+    """The BOM arrives at once, the file when the storage is back, each once."""
+    with real_silo() as silo:
+        desk = registered(tmp_path, silo)
+        committed(desk)
+        silo.moods = Moods(storage=storage, upload=upload)
+        top = silo.named("Top Assembly")
+        for _ in range(3):
+            sent(desk)
+        assert (len(top.lines), top.files, len(desk.outbox.entries())) == (5, {}, 1)
+        merges = sum("merge" in one for one in silo.seen)
+        assert merges == 1
+        silo.moods = Moods(upload=upload)
+        for entry in desk.outbox.entries():
+            desk.outbox.retry(entry.id)
+        sent(desk)
+        assert (desk.outbox.entries(), [*top.files.values()]) == ((), [desk.top.read_bytes()])
+        assert sum("merge" in one for one in silo.seen) == merges
+
+
+def test_a_token_that_expires_in_between_loses_and_doubles_nothing(tmp_path: Path) -> None:
+    """Nothing is asked of the server before a person acts; a new token sends all."""
+    with real_silo() as silo:
+        desk = registered(tmp_path, silo)
+        committed(desk)
+        silo.token = "silo_renewed"
+        assert isinstance(sent(desk).stopped_by, AuthError)
+        asked = len(silo.seen)
+        with desk.client() as client:
+            report = send_all(desk.outbox, client)
+        assert (report.sent, len(silo.seen), report.pause is not None) == ([], asked, True)
+        assert [entry.state for entry in desk.outbox.entries()] == [State.WAITING]
+        assert len(sent(desk, silo.token).sent) == 1
+        top = silo.named("Top Assembly")
+        assert (desk.outbox.entries(), len(top.files), len(top.lines)) == ((), 1, 5)
+
+
+def test_a_restored_backup_gets_again_what_it_lost(tmp_path: Path) -> None:
+    """The second commit was made from a revision that the server lost: one press sends it all the same."""
+    with real_silo() as silo:
+        desk = registered(tmp_path, silo)
+        committed(desk)
+        sent(desk)
+        backup, housing = silo.backup(), silo.named("Housing")
+        path = next(desk.top.parent.rglob("Housing.FCStd"))
+        first = path.read_bytes()
+        for content, origin in ((first, ""), (first + b" ", hashlib.sha256(first).hexdigest())):
+            path.write_bytes(content)
+            identity, number = housing.id, housing.part_number
+            commit = Commit(str(path), 0.0, identity=identity, part_number=number, file=path, origin=origin)
+            desk.outbox.add(commit, silo.url)
+            if not origin:
+                assert len(sent(desk).sent) == 1
+                silo.restore(backup)
+        for _ in range(2):
+            sent(desk)
+        assert desk.outbox.entries() == ()
+        assert [*silo.named("Housing").files.values()] == [first + b" "]
+        check_held_once(desk)

@@ -7,6 +7,7 @@ wrong. The store is looked at directly: what a test asserts is what the server h
 
 from __future__ import annotations
 
+import copy
 import email
 import email.policy
 import hashlib
@@ -52,6 +53,7 @@ class Moods:
     checksums: bool = True
     sizes: bool = True
     upload: str = "multipart"  # or "presigned", or "missing"
+    storage: str = "up"  # of files: "down" (503 without a name), "none" (501), "gone" (its files are lost)
     schemas: tuple[str, ...] = ("kindred-rd",)
     errors: str = "code"  # {"error": code, "message"}, or "text": {"error": text}, or "bare"
     event: str = "bom.merged"  # or "bom_merge"
@@ -111,6 +113,7 @@ class RealSilo(ThreadingHTTPServer):
     def __init__(self, moods: Moods) -> None:
         super().__init__(("127.0.0.1", 0), _Handler)
         self.moods = moods
+        self.token = TOKEN  # a new one: those that were given out have expired
         self.items: dict[str, Item] = {}
         self.uploads: dict[str, bytes] = {}
         self.events: list[tuple[str, dict[str, Any]]] = []
@@ -149,6 +152,22 @@ class RealSilo(ThreadingHTTPServer):
             counts[item.description] = counts.get(item.description, 0) + 1
         return counts
 
+    def backup(self) -> dict[str, Item]:
+        """All that it holds, for a later :meth:`restore`."""
+        with self.lock:
+            return copy.deepcopy(self.items)
+
+    def restore(self, items: dict[str, Item]) -> None:
+        """Hold what it held then: whatever came since is lost, and its numbers are given anew."""
+        with self.lock:
+            self.items = copy.deepcopy(items)
+
+    def check_storage(self) -> None:
+        if self.moods.storage == "down":
+            raise Refused(503, "", "")
+        if self.moods.storage == "none":
+            raise Refused(501, "not_implemented", "no file storage is configured")
+
     def named(self, description: str) -> Item:
         return next(item for item in self.items.values() if item.description == description)
 
@@ -175,7 +194,7 @@ class RealSilo(ThreadingHTTPServer):
         raise PlainError("404 page not found")
 
     def _check_caller(self, method: str, head: Any) -> None:
-        if head.get("Authorization") != f"Bearer {TOKEN}":
+        if head.get("Authorization") != f"Bearer {self.token}":
             raise Refused(401, "unauthorized")
         if method != "GET" and self.moods.role == "viewer":
             raise Refused(403, "forbidden", "requires editor")
@@ -342,6 +361,7 @@ def _upload(silo: RealSilo, _query: dict[str, str], body: Any, number: str) -> A
     item = silo.one(number)
     if silo.moods.upload == "missing":
         raise PlainError("404 page not found")
+    silo.check_storage()
     if isinstance(body, dict):  # associate what was uploaded to the store before
         content = silo.uploads.pop(body["object_key"])
         return 201, silo.revise(item, body.get("comment", ""), body.get("properties"), content)
@@ -361,7 +381,8 @@ def _attach(silo: RealSilo, _query: dict[str, str], body: Any, number: str) -> A
 
 
 def _download(silo: RealSilo, _query: dict[str, str], _body: Any, number: str, revision: str = "") -> Answer:
-    files = silo.one(number).files
+    silo.check_storage()
+    files = {} if silo.moods.storage == "gone" else silo.one(number).files
     content = files.get(int(revision)) if revision else files.get(max(files, default=0))
     if content is None:
         raise Refused(404, "not_found")
@@ -371,6 +392,7 @@ def _download(silo: RealSilo, _query: dict[str, str], _body: Any, number: str, r
 def _presign(silo: RealSilo, _query: dict[str, str], body: Any) -> Answer:
     if silo.moods.upload == "missing":
         raise PlainError("404 page not found")
+    silo.check_storage()
     if silo.moods.upload != "presigned":
         raise Refused(501, "not_implemented")
     key = f"uploads/tmp/{uuid.uuid4()}/{body['filename']}"
@@ -616,7 +638,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.flush()
 
     def _stream(self) -> None:
-        if self.headers.get("Authorization") != f"Bearer {TOKEN}":
+        if self.headers.get("Authorization") != f"Bearer {self.server.token}":
             return self._write(401, {"error": "unauthorized"}, {})
         self.send_response(200)
         self.send_header("Content-Type", "text/event-stream")
