@@ -17,6 +17,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum, auto
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
@@ -263,6 +264,11 @@ _KEPT = frozenset(
 )
 
 
+# Thousands of screws have the same few lists of sizes. Equal bytes, equal value.
+_OFTEN_ALIKE = 8192
+_parsed = lru_cache(maxsize=128)(xmltext.parse_value)
+
+
 class Shape(NamedTuple):
     """A list of property names that many objects share. Piece 0 is what stands before the first property."""
 
@@ -384,8 +390,9 @@ class Properties:
         if not self._careful:
             end = piece.find(_CLOSING)
             piece = _CUT + (piece[: end + len(_CLOSING)] if end >= 0 else piece)
+        parse = _parsed if len(piece) < _OFTEN_ALIKE else xmltext.parse_value
         try:
-            return xmltext.parse_value(piece, self._xml.limits.depth)
+            return parse(piece, self._xml.limits.depth)
         except Malformed as error:
             raise self._xml.malformed(error) from error
 
