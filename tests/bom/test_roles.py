@@ -331,3 +331,14 @@ def test_the_mass_has_the_pieces_of_the_bom(top: Any) -> None:
         assert not contents.counts
     else:
         assert weighed == +counted
+
+
+def test_a_screw_that_no_assembly_gets_is_reported() -> None:
+    """Of two assemblies none gets it, also where it lies in a plain folder; one for later is a spare."""
+    doc = Doc("/v/top.FCStd")
+    first = doc.assembly(doc.link("L", bolt()), name="First")
+    doc.assembly(doc.link("K", bolt()), name="Second")
+    doc.folder("Bought", doc.screw("Loose"), doc.screw("Stored", Visibility=False))
+    doc.folder("Parts", doc.screw("Spare"))
+    (finding,) = extract(first).findings_of(FindingCode.BESIDE_ASSEMBLY)
+    assert [place.obj for place in finding.where] == ["Loose"]

@@ -24,6 +24,7 @@ from silo.bom.walk.kinds import (
     elements,
     is_assembly3,
     is_named_assembly,
+    kind_of,
     left_out_by,
     survey_of,
 )
@@ -93,12 +94,11 @@ class _Lying:
             self._inner[name] = any(kind in _CONTAINERS for _, kind in self.around(name))
         return self._inner[name]
 
-    def in_folder(self, name: str) -> bool:
-        return any(self._holders[upper][1] is Kind.FOLDER for upper in self._above.get(name, ()))
-
-    def is_spare(self, name: str) -> bool:
-        """True for what Assembly4 keeps for later."""
-        return any(object_name(obj).rstrip("0123456789") in _SPARES for obj, _ in self.around(name))
+    def is_spare(self, obj: Any) -> bool:
+        """True for what a folder keeps for later; of visible standard parts only Assembly4's folders do."""
+        around = {object_name(one).rstrip("0123456789") for one, _ in self.around(object_name(obj))}
+        bought = kind_of(obj) is Kind.STANDARD and self.is_visible(obj)
+        return bool(around.intersection(_SPARES) if bought else around)
 
     def is_visible(self, obj: Any) -> bool:
         """True for what is visible itself and lies in visible containers."""
@@ -181,7 +181,7 @@ def _candidates(lying: _Lying) -> _Candidates:
         if (rank := _rank(obj, reader)) is None:
             continue
         # People sort assemblies into folders too; a plain part in a folder is a spare.
-        in_folder = lying.in_folder(object_name(obj))
+        in_folder = any(lying.around(object_name(obj)))
         if not in_folder or rank < 2:
             found.append(((rank, in_folder), obj))
     return sorted(found, key=lambda candidate: candidate[0])
@@ -284,11 +284,6 @@ def as_it_is(document: Any) -> Any:
     return document
 
 
-def _sources_of(top: Any, reader: Reader, survey: Survey) -> set[str]:
-    """Names of the objects that others of the document show."""
-    return {name for _, name in Reading(reader, top).shown_by(survey.of(SHOWING))}
-
-
 def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> list[Any]:
     """Visible standard parts beside an assembly, which can only belong to it: it is the one of its file.
 
@@ -301,18 +296,37 @@ def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> l
     if not survey.has_python():
         return []
     lying = _Lying(survey)
-    loose = [
-        obj
-        for obj in lying.loose(frozenset({Kind.STANDARD}))
-        if lying.is_visible(obj) and not lying.is_spare(object_name(obj)) and not left_out_by(obj)
-    ]
-    if not loose:
+    visible = [obj for obj in lying.loose(frozenset({Kind.STANDARD})) if lying.is_visible(obj)]
+    roles = _roles_beside(container, reader, lying, visible, {}) if visible else ()
+    if not (loose := [obj for obj, role in roles if role is Role.LOOSE]):
         return []
-    aside = _sources_of(container, reader, survey)
-    aside.update(consumed([obj for obj, _ in survey.of(_LOCAL)], object_name))
-    loose = [obj for obj in loose if object_name(obj) not in aside]
     likely = _likely(_candidates(lying))
     return loose if list(map(object_name, likely)) == [object_name(container)] else []
+
+
+def _roles_beside(
+    top: Any, reader: Reader, lying: _Lying, objects: Iterable[Any], known: Mapping[str, Role | None]
+) -> Iterator[tuple[Any, Role]]:
+    """The role of each of some objects that lie in no container, for the assembly ``top``."""
+    survey = lying.survey
+    shown = {name for _, name in Reading(reader, top).shown_by(survey.of(SHOWING))}
+    eaten = consumed([obj for obj, _ in survey.of(_LOCAL)], object_name)
+    for obj in objects:
+        name = object_name(obj)
+        if name in eaten:
+            role = Role.OPERAND
+        elif name in shown or (
+            not lying.is_visible(obj)  # a visible array shows its elements once more
+            and any(known.get(object_name(one)) is Role.COMPONENT for one in elements(obj))
+        ):
+            role = Role.SOURCE
+        elif left_out_by(obj):
+            role = Role.LEFT_OUT
+        elif lying.is_spare(obj):
+            role = Role.SPARE
+        else:
+            role = Role.LOOSE
+        yield obj, role
 
 
 def beside(top: Any, fates: Mapping[str, Role | None]) -> list[Any]:
@@ -356,25 +370,9 @@ def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, Role | None
             found[name] = _inside(lying, name, found)
         else:
             beside.append(obj)
-    if not beside:
-        return found
-    shown = _sources_of(top, reader, survey)
-    eaten = consumed([obj for obj, _ in survey.of(_LOCAL)], object_name)
-    for obj in beside:
-        name = object_name(obj)
-        if name in eaten:
-            found[name] = Role.OPERAND
-        elif name in shown or (
-            not lying.is_visible(obj)  # a visible array shows its elements once more
-            and any(found.get(object_name(one)) is Role.COMPONENT for one in elements(obj))
-        ):
-            found[name] = Role.SOURCE
-        elif left_out_by(obj):
-            found[name] = Role.LEFT_OUT
-        elif lying.in_folder(name):
-            found[name] = Role.SPARE
-        else:
-            found[name] = Role.LOOSE if reader.brings(obj) else Role.CONSTRUCTION
+    for obj, role in _roles_beside(top, reader, lying, beside, found) if beside else ():
+        is_nothing = role is Role.LOOSE and not reader.brings(obj)
+        found[object_name(obj)] = Role.CONSTRUCTION if is_nothing else role
     return found
 
 
