@@ -178,7 +178,7 @@ def obeys_the_laws(top: Any) -> None:
     assert all(roles[name] is Role.COMPONENT for name in counted)
     for count in (*contents.counts, *contents.own):
         pieces = 0
-        for way in chains(count, contents.tree, reader.key):
+        for way in chains(count, contents.tree):
             times = 1
             for _, one in way:
                 times *= one

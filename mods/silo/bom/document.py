@@ -54,6 +54,21 @@ class ObjectLike(Protocol):
     def isDerivedFrom(self, type_name: str, /) -> bool: ...
 
 
+class DocumentRoot:
+    """The document itself as a container, for links that lie in no assembly and no part; or as a place."""
+
+    is_document_root = True
+
+    def __init__(self, document: Any, group: Sequence[Any] = ()) -> None:
+        self.Document = document
+        self.Name = ""
+        self.Label = getattr(document, "Label", "") or getattr(document, "FileName", "")
+        self.Group = tuple(group)
+
+    def isDerivedFrom(self, _type_name: str, /) -> bool:
+        return False
+
+
 def saved_by(program: str | None) -> tuple[int, ...]:
     """The version of the FreeCAD that saved a file, such as (1, 0), by its ``ProgramVersion``; () for none.
 

@@ -156,7 +156,7 @@ def why(
     InputError if the assembly itself has none of them.
     """
     walker = _Walker(inspect, canonical, whole, hardware, below=False)
-    contents, key = walker.reader.contents(assembly_obj), walker.reader.key
+    contents = walker.reader.contents(assembly_obj)
     total, known, lines = 0, set[str](), list[str]()
     for count in (*contents.counts, *contents.own):
         entry = walker.entry_for(count.target)
@@ -166,7 +166,7 @@ def why(
             continue
         part = meant[0] if isinstance(meant[0], str) else entry.standard or display_name(entry)
         total += count.quantity
-        for way in chains(count, contents.tree, key):
+        for way in chains(count, contents.tree):
             steps = [f"{label_of(obj)} × {times}" if times > 1 else label_of(obj) for obj, times in way]
             lines.append(" → ".join(["beside the assembly"] * count.beside + steps))
     if not lines:
@@ -367,14 +367,17 @@ class _Walker:
         self.notes.own_parts(container, found)
         return tuple(found)
 
-    def _is_free(self, link: Any, container: Any) -> bool:
-        """True for a link that no joint holds, so that an array would do."""
-        if (key := self.reader.key(container)) not in self._held:
+    def _free(self, links: list[Count], container: Any) -> list[Count]:
+        """The links that no joint holds, so that an array would do."""
+        if len(links) < 2:
+            return []
+        if (key := self.component(container)) not in self._held:
             tree = self.reader.contents(container).tree
             inner = tree.members.values() if tree is not None else ()
             inline = (obj for obj, kind in inner if kind in (Kind.NOTHING, Kind.CONTAINER))
             self._held[key] = held_by_joints([container, *inline])
-        return object_name(link) not in self._held[key] and not is_attached(link)
+        held = self._held[key]
+        return [one for one in links if one.shown.key[1] not in held and not is_attached(one.shown.obj)]
 
     def _entry(
         self, container: Any, counts: list[Count], level: int, children: tuple[BomEntry, ...], **more: Any
@@ -382,16 +385,15 @@ class _Walker:
         target = counts[0].target
         entry = self.entry_for(target)
         links = [count for count in counts if count.link]
-        free = [one for one in links if len(links) > 1 and self._is_free(one.shown.obj, container)]
         found = {
             "level": level,
             "quantity": sum([count.quantity for count in counts]),
             "children": children,
             "is_assembly": entry.is_assembly or self._is_assembly(target),
-            "consolidation_warning": len(free) > 1,
+            "consolidation_warning": len(self._free(links, container)) > 1,
             "individual_links": sum([not link.array for link in links]),
             "link_objects": len(links),
-            "instances": tuple([object_name(count.shown.obj) for count in counts]),
+            "instances": tuple([count.shown.key[1] for count in counts]),
             **more,
         }
         return BomEntry(**(vars(entry) | found))  # dataclasses.replace() takes twice as long

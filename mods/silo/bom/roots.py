@@ -9,10 +9,10 @@ lies at its root: of several equals none is taken because it came first. Folders
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from silo.bom.document import derived, first_of, label_of, object_name, own, same_document
+from silo.bom.document import DocumentRoot, derived, first_of, label_of, object_name, own, same_document
 from silo.bom.errors import InputError, SeveralAssembliesError
 from silo.bom.walk.kinds import (
     COMPONENTS,
@@ -50,21 +50,6 @@ _FOLDERS = frozenset({Kind.FOLDER})
 _RANKED = frozenset({Kind.CONTAINER, Kind.DRAFT_ARRAY, Kind.FOREIGN})
 _LOCAL = frozenset({Kind.LOCAL})
 _SPARES = ("Parts", "Source_shapes")
-
-
-class DocumentRoot:
-    """The document itself as a container, for links that lie in no assembly and no part."""
-
-    is_document_root = True
-
-    def __init__(self, document: Any, group: Sequence[Any]) -> None:
-        self.Document = document
-        self.Name = ""
-        self.Label = getattr(document, "Label", "") or getattr(document, "FileName", "")
-        self.Group = tuple(group)
-
-    def isDerivedFrom(self, _type_name: str, /) -> bool:
-        return False
 
 
 class _Lying:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from silo.bom.document import LinkProblem, label_of, object_name, saved_by
+from silo.bom.document import DocumentRoot, LinkProblem, label_of, object_name, saved_by
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry
@@ -60,16 +60,6 @@ class _Note:
             names = _names(list(dict.fromkeys(self.users[place] for place in where)))
             message = f"{message}; {self.tail.format(users=names)}."
         return Finding(code, self.severity, message, tuple(where), self.file)
-
-
-class _Whole:
-    """A document as the place of a finding."""
-
-    def __init__(self, document: Any) -> None:
-        self.Document = document
-        self.Name = ""
-        self.Label = getattr(document, "Label", "") or getattr(document, "FileName", "")
-        self.is_document_root = True
 
 
 class Notes:
@@ -303,7 +293,7 @@ class Notes:
                 "",
                 Severity.INFO,
                 f"Saved by FreeCAD {texts[0]}, newer than {texts[1]}, the newest tested",
-                _Whole(document),
+                DocumentRoot(document),
                 "the files: {users}",
             )
 

@@ -183,6 +183,7 @@ class Reading:
         self._identity = (identity_of(container) or "").lower()
         self._is_root = getattr(container, "is_document_root", False)
         self._nodes: dict[Key, Shown] = {}
+        self._mine: dict[int, tuple[Any, bool]] = {}
         self._trees: dict[Key, Tree] = {}
         self._ones: dict[Key, Worth] = {}
         self._links: set[Key] = set()
@@ -220,7 +221,7 @@ class Reading:
                 self._notes.two_roles(obj)
         loose = [obj for obj in beside if self._key(obj) not in self._shown]
         nodes = [node for obj in loose if (node := self._node(self._key(obj), obj, kind_of(obj))) is not None]
-        self._roles.update({self._key(node.obj): Role.COMPONENT for node in nodes})
+        self._roles.update({node.key: Role.COMPONENT for node in nodes})
         self._notes.beside_counted(container, loose)
         counts += self._split([(node, 1) for node in nodes], beside=True)[0]
         is_part = self._is_root and not self._holds_components and self._is_one_part(counts or mine)
@@ -230,7 +231,7 @@ class Reading:
         for key in self._shown:
             self._roles.setdefault(key, Role.SOURCE)
         for one in (*counts, *mine):
-            if self._roles.get(self._key(one.shown.obj)) is not Role.COMPONENT:
+            if self._roles.get(one.shown.key) is not Role.COMPONENT:
                 self._notes.two_roles(one.shown.obj)
         holds = self._holds_components or bool(counts)
         return Contents(counts, mine, self._roles, holds, is_part, self._hidden, tree)
@@ -272,9 +273,12 @@ class Reading:
         """True for an object of this file; FreeCAD makes two documents of one that it opened by two paths."""
         if isinstance(target, Lost):
             return False
-        return same_document(target.Document, self._document) or bool(
-            self._path and self._key(target)[0] == self._path
-        )
+        document = target.Document
+        known = self._mine.get(id(document))
+        if known is None or known[0] is not document:
+            is_here = bool(self._path) and self._key(target)[0] == self._path
+            known = self._mine[id(document)] = (document, is_here or same_document(document, self._document))
+        return known[1]
 
     def _is_own(self, target: Any) -> bool:
         """True for geometry of this file that nobody declared."""
@@ -419,7 +423,7 @@ class Reading:
         }
         if not left:
             return Role.OPERAND, None
-        return Role.COMPONENT, Shown(node.obj, node.kind, left, node.below, node.tree)
+        return Role.COMPONENT, Shown(name, node.obj, node.kind, left, node.below, node.tree)
 
     @staticmethod
     def _is_hardware(node: Shown) -> bool:
@@ -432,15 +436,15 @@ class Reading:
 
         hidden = set()
         for node, _ in leaves:
-            if node.kind not in DECLARABLE or tree.visible(name := self._key(node.obj)):
+            if node.kind not in DECLARABLE or tree.visible(node.key):
                 continue
             if all(key[0] == self._path and self._is_own(target) for key, (target, _) in node.worth.items()):
-                hidden.add(name)
+                hidden.add(node.key)
         if not hidden or len(hidden) == len(leaves):
             return leaves
         self._roles.update(dict.fromkeys(hidden, Role.CONSTRUCTION))
         self._hidden += [tree.members[name][0] for name in hidden]
-        return [leaf for leaf in leaves if self._key(leaf[0].obj) not in hidden]
+        return [leaf for leaf in leaves if leaf[0].key not in hidden]
 
     def _split(
         self, leaves: Iterable[tuple[Shown, int]], *, beside: bool = False
@@ -449,7 +453,7 @@ class Reading:
         counts: list[Count] = []
         mine: list[Count] = []
         for node, times in leaves:
-            link = self._key(node.obj) in self._links
+            link = node.key in self._links
             for key, (target, quantity) in node.worth.items():
                 count = Count(node, key, quantity * times, link, link and is_array(node.obj), beside)
                 is_mine = key[0] == self._path and self._is_own(target)
@@ -503,20 +507,20 @@ class Reading:
         if kind in COMPONENTS or kind is Kind.ELEMENT:
             return self._link(key, obj, kind)
         if kind is Kind.STANDARD:
-            return Shown(obj, kind, self._standard(obj))
+            return Shown(key, obj, kind, self._standard(obj))
         if kind is Kind.LOCAL or self._is_closed(obj, kind) or key in self._wholes:
-            return Shown(obj, kind, {key: (obj, 1)})
+            return Shown(key, obj, kind, {key: (obj, 1)})
         if kind is Kind.FOREIGN:
-            return Shown(obj, kind, self._imported(key, obj))
+            return Shown(key, obj, kind, self._imported(key, obj))
         if kind in REPEATERS:
             return self._repeater(key, obj, kind)
         if kind not in INLINE:
-            return Shown(obj, kind, {})
+            return Shown(key, obj, kind, {})
         tree = self._tree(key, obj)
         if key in self._wholes:
-            return Shown(obj, kind, {key: (obj, 1)})
+            return Shown(key, obj, kind, {key: (obj, 1)})
         leaves = self._leaves(tree)
-        return Shown(obj, kind, self._sum(leaves), tuple(leaves), tree=tree)
+        return Shown(key, obj, kind, self._sum(leaves), tuple(leaves), tree=tree)
 
     @staticmethod
     def _sum(leaves: Iterable[tuple[Shown, int]]) -> Worth:
@@ -559,16 +563,16 @@ class Reading:
         worth = self._sum(below)
         one_piece = kind is Kind.COMPOUND and bool(worth) and self._is_geometry(obj, kind)
         if not listed or (one_piece and all(self._is_own(target) for target, _ in worth.values())):
-            return Shown(obj, kind, {key: (obj, 1)})
+            return Shown(key, obj, kind, {key: (obj, 1)})
         if not worth or kind is not Kind.DRAFT_ARRAY:
-            return Shown(obj, kind, worth, tuple(below))
+            return Shown(key, obj, kind, worth, tuple(below))
         count = draft_count(obj)
         if count is None:
             self._notes.unknown_array(obj, shown[0])
         elif not all(self._is_own(target) for target, _ in worth.values()):
             self._notes.draft_array(obj, shown[0], count)
         below = [(node, count or 1) for node, _ in below]
-        return Shown(obj, kind, self._sum(below), tuple(below))
+        return Shown(key, obj, kind, self._sum(below), tuple(below))
 
     def _is_left_out(self, obj: Any) -> bool:
         """True for an object that is left out; says so."""
@@ -580,7 +584,7 @@ class Reading:
         return bool(mark)
 
     def _link(self, key: Key, link: Any, kind: Kind) -> Shown:
-        nothing = Shown(link, kind, {})
+        nothing = Shown(key, link, kind, {})
         if self._is_left_out(link):
             self._holds_components = True
             return nothing
@@ -590,7 +594,7 @@ class Reading:
         if target.obj is None:
             self._holds_components = True
             self._notes.broken(link, target.problem)
-            return Shown(link, kind, self._lost_by(link, target))
+            return Shown(key, link, kind, self._lost_by(link, target))
         if target.element:
             self._notes.sub_element(link, target.element)
         elif target.excluded:
@@ -613,11 +617,11 @@ class Reading:
 
     def _whole_object(self, key: Key, link: Any, kind: Kind, target: Target) -> Shown:
         if self._is_mine(target.obj):
-            return self._in_document(link, kind, target)
+            return self._in_document(key, link, kind, target)
         name = self._key(target.obj)
         if words := self._reader.no_component(name, target.obj):
             self._notes.no_component(link, target.obj, words)
-            return Shown(link, kind, {})
+            return Shown(key, link, kind, {})
         # An object of another file is a component, whatever it is.
         text, _ = self._reader.standard(target.obj, name)
         if text:
@@ -625,7 +629,7 @@ class Reading:
         else:
             worth = self._ones.setdefault(name, {name: (target.obj, 1)})
         if not worth:
-            return Shown(link, kind, worth)
+            return Shown(key, link, kind, worth)
         if is_link(link):
             self._links.add(key)
             self._notes.link_type(link)
@@ -633,27 +637,27 @@ class Reading:
         if target.instances != 1:
             worth = {brought: (obj, count * target.instances) for brought, (obj, count) in worth.items()}
         if not is_assembly_link(link):
-            return Shown(link, kind, worth)
+            return Shown(key, link, kind, worth)
         parts = own_parts(link, target.obj, self._key)
         nodes = [self._node(self._key(part), part, kind_of(part)) for part in parts]
         below = [(node, 1) for node in nodes if node is not None]
         worth = dict(worth)
         add(worth, self._sum(below))
-        return Shown(link, kind, worth, tuple(below))
+        return Shown(key, link, kind, worth, tuple(below))
 
-    def _in_document(self, link: Any, kind: Kind, target: Target) -> Shown:
+    def _in_document(self, key: Key, link: Any, kind: Kind, target: Target) -> Shown:
         """A link within the file brings what its target brings, which may be nothing."""
         obj = target.obj
         node = self._node(self._key(obj), obj, kind_of(obj))
         below = ((node, target.instances),) if node is not None and node.worth else ()
         if not below:
-            if not any(self._key(link) in ring for ring in self._rings):
+            if not any(key in ring for ring in self._rings):
                 self._notes.in_document(link, obj)
         elif target.mirrored:
             self._notes.mirrored(link, obj)
         if below and target.variant is not None:
             self._notes.variant(link, obj)
-        return Shown(link, kind, self._sum(below), below)
+        return Shown(key, link, kind, self._sum(below), below)
 
     def _remarks(self, link: Any, target: Target) -> None:
         if target.mirrored:

@@ -56,12 +56,15 @@ class Lost:
 class Shown:
     """What one object brings, and through what.
 
+    key
+        of the object in its document.
     below
         what it shows within its own file, and how often each time that it is shown itself.
     tree
         of a container that something else shows: where in it ``below`` lies.
     """
 
+    key: Key
     obj: Any
     kind: Kind
     worth: Worth
@@ -257,24 +260,24 @@ class Tree:
 # --- the way to a component ---
 
 
-def chains(count: Count, tree: Tree | None, key: KeyOf) -> Iterator[tuple[tuple[Any, int], ...]]:
+def chains(count: Count, tree: Tree | None) -> Iterator[tuple[tuple[Any, int], ...]]:
     """Each way from the assembly to the component: the objects on it, and how often each shows the next."""
     starts: Iterable[tuple[Any, ...]] = [()]
     if tree is not None and not count.beside:
-        starts = tree.paths(key(count.shown.obj))
+        starts = tree.paths(count.shown.key)
     for holders in starts:
-        for rest in _below(count.shown, count.key, key):
+        for rest in _below(count.shown, count.key):
             yield (*((holder, 1) for holder in holders), *rest)
 
 
-def _below(node: Shown, wanted: Key, key: KeyOf) -> Iterator[tuple[tuple[Any, int], ...]]:
+def _below(node: Shown, wanted: Key) -> Iterator[tuple[tuple[Any, int], ...]]:
     within = [(inner, times) for inner, times in node.below if wanted in inner.worth]
     if not within or (node.kind is Kind.ASSEMBLY_LINK and wanted == next(iter(node.worth))):
         yield ((node.obj, node.worth[wanted][1]),)
         return
     for inner, times in within:
-        paths = node.tree.paths(key(inner.obj)) if node.tree is not None else [()]
+        paths = node.tree.paths(inner.key) if node.tree is not None else [()]
         for holders in paths:
-            for rest in _below(inner, wanted, key):
+            for rest in _below(inner, wanted):
                 shown = 1 if node.tree is not None else times
                 yield ((node.obj, shown), *((holder, 1) for holder in holders), *rest)

@@ -186,7 +186,7 @@ class _Witness:
         """The component; for one that is not open in FreeCAD, what stands for it in the assembly."""
         if host.is_object(host.real(count.target)):
             return count.target
-        return next(chains(count, tree, self._reader.key))[-1][0]
+        return next(chains(count, tree))[-1][0]
 
     def _component(self, target: Any) -> Key:
         path, name = target.key if isinstance(target, Lost) else self._reader.component(target)

@@ -331,7 +331,7 @@ class Walk:
         if contents.tree is None:
             yield from self._placed(shown, count.key, False)
             return
-        paths = [()] if count.beside else contents.tree.paths(self._reader.key(shown.obj))
+        paths = [()] if count.beside else contents.tree.paths(shown.key)
         for path in paths:
             around = np.linalg.inv(self.facts.placement(container)) if count.beside else np.eye(4)
             first = moved.get(object_name((*path, shown.obj)[0]))
@@ -361,7 +361,7 @@ class Walk:
             yield node.worth[key][0], None, outer
         elif node.tree is not None:
             for inner in below:
-                for path in node.tree.paths(self._reader.key(inner.obj)):
+                for path in node.tree.paths(inner.key):
                     around = outer
                     for holder in path:
                         around = around @ self.facts.placement(holder)
