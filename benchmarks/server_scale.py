@@ -9,18 +9,26 @@ over HTTP, and the CPU seconds of this process (server and caller) and of Postgr
 of three. Growth is the cost at the larger size by that at the smaller. ``--plans`` prints how the database
 looks things up. Ends with an error where a request takes more than 0.5 s, or a plan reads a large table from
 end to end to answer it.
+
+Then a server in a process of its own exports a product of some 194 000 lines in each form: CPU, and by how
+much its memory grows. Last, ten viewers export at once for a minute, while another one reads: the time of
+these reads by the clock (p50, p99).
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 import random
 import re
 import sys
 import tempfile
+import threading
 import time
+import urllib.error
+import urllib.request
 import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,13 +39,14 @@ from sqlalchemy import event, select, text
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 
-from server_testing import Api, Databases, bom, merge_body, postgres
+from server_testing import Api, Databases, ServerProcess, bom, merge_body, postgres
 
 from silo_server.db import tables
 from silo_server.db.engine import Database, insert_rows
 from silo_server.operation.backup import back_up, restore
 from silo_server.run import prepare, running_server, spare_the_collector
-from silo_server.services.bom.summary import keep_summaries
+from silo_server.services.bom.summary import keep_summaries, summary_of
+from silo_server.services.items import get_item
 from silo_server.settings import Settings
 
 TOKEN = "silo_scale_0123456789abcdef"
@@ -74,6 +83,8 @@ def main() -> None:
                     move(vault, settings, Path(folder) / f"backup-{size}")
                 show = args.plans and size == sizes[-1]
                 results.setdefault(kind, {})[size] = measure(settings, size, bad, show)
+                if size == sizes[-1]:
+                    export(settings, kind)
         databases.close()
     for kind, by_size in results.items():
         print(f"\n{kind:28}" + "".join(f"{size:>12}" for size in by_size) + "      growth")
@@ -289,6 +300,74 @@ def measure(settings: Settings, size: int, bad: list[str], show: bool) -> dict[s
             for line in scans(settings, list(asked), show and name):
                 bad.append(f"{engine.dialect.name}: {name} reads a table from end to end: {line}")
     return costs
+
+
+def export(settings: Settings, kind: str) -> None:
+    """Print what exports of the large product cost: the server, and those who read beside them."""
+    with (
+        ServerProcess(settings.database_url, settings.storage, TOKEN) as server,
+        Api(server.base_url, TOKEN) as api,
+    ):
+        # Assemblies without others below: each line is one row of the export.
+        large = api.item("LARGE-" + uuid.uuid4().hex[:8])
+        inside = [f"A-{n:06}" for n in range(1000, 4650)]
+        api.good("POST", bom(large, "merge"), merge_body(dict.fromkeys(inside, 1)))
+        db = Database(settings)
+        with db.read() as tx:
+            summary_of(tx, get_item(tx, large))
+        keep_summaries(db)
+        db.close()
+        process = Path(f"/proc/{server.pid}")
+
+        def memory(name: str) -> int:
+            return int(re.search(rf"{name}:\s+(\d+)", (process / "status").read_text())[1]) // 1024  # type: ignore[index]
+
+        def spent() -> float:
+            fields = (process / "stat").read_text().rpartition(")")[2].split()
+            return (
+                (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") + cpu() - time.process_time()
+            )
+
+        for form in ("csv", "json", "xlsx"):
+            (process / "clear_refs").write_text("5")  # the peak begins anew
+            before, begun = memory("VmRSS"), spent()
+            size = download(server.base_url, large, form)
+            took, peak = spent() - begun, memory("VmHWM")
+            told = f"{took:.1f} s of CPU, {peak - before} MB more, in all {peak} MB"
+            print(f"{kind}: {form.upper()} of the large product, {size / 1e6:.0f} MB: {told}", flush=True)
+        end, counts, times = time.monotonic() + 60, list[int](), list[float]()
+
+        def view(number: int) -> None:
+            while time.monotonic() < end:
+                counts.append(download(server.base_url, large, ("csv", "json", "xlsx")[number % 3]))
+
+        viewers = [threading.Thread(target=view, args=(number,), daemon=True) for number in range(10)]
+        for viewer in viewers:
+            viewer.start()
+        paths = ["/api/items/TOP", "/api/items?limit=50", bom("A-000100"), bom(large, "summary"), "/health"]
+        for number in itertools.count():
+            if time.monotonic() > end:
+                break
+            begun = time.monotonic()
+            api.get(paths[number % len(paths)])
+            times.append(time.monotonic() - begun)
+        times.sort()
+        p50, p99 = (times[int(len(times) * part)] * 1000 for part in (0.5, 0.99))
+        print(f"{kind}: beside ten viewers who export ({len(counts)} done), {len(times)} reads: ", end="")
+        print(f"p50 {p50:.0f} ms, p99 {p99:.0f} ms, longest {times[-1] * 1000:.0f} ms", flush=True)
+
+
+def download(address: str, number: str, form: str) -> int:
+    """Read an export to its end, without keeping it; its bytes, 0 if the server sends it away or ends."""
+    url = f"{address}{bom(number, f'export.{form}')}?view=indented"
+    request = urllib.request.Request(url, headers={"Authorization": f"Bearer {TOKEN}"})
+    try:
+        with urllib.request.urlopen(request) as answer:
+            return sum(len(part) for part in iter(lambda: answer.read(1 << 20), b""))
+    except urllib.error.HTTPError as error:
+        if error.code < 500:  # sent away, or the server ends
+            raise
+        return 0
 
 
 def requests(api: Api, size: int) -> list[tuple[str, Callable[[], Any]]]:

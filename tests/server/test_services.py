@@ -22,7 +22,9 @@ from silo_server.db.tables import answers, items, users
 from silo_server.services.access.accounts import create_user
 from silo_server.services.access.credentials import (
     Token,
+    actor_by_token,
     create_own_token,
+    create_token,
     revoke_token,
     secret_of_form,
 )
@@ -280,14 +282,17 @@ def test_sessions_and_links_end(db: Database) -> None:
             tx.conn.execute(update(users).where(users.c.username == "ann").values(active=active))
 
     with db.write(SYSTEM) as tx:
-        create_user(tx, "ann", Role.EDITOR)
+        ann = create_user(tx, "ann", Role.EDITOR)
+        _, token = create_token(tx, ann.id, "laptop")
     session = use_login_link(db, link("ann"), "here")
     early, late = link("ann"), link("ann")
     actor = actor_by_session(db, session.secret, "here")
     assert actor is not None
     assert (actor.username, actor.by_link) == ("ann", True)
+    assert actor_by_token(db, token, "here") is not None
     lock_out(False)
     assert actor_by_session(db, session.secret, "here") is None
+    assert actor_by_token(db, token, "here") is None
     with pytest.raises(AuthError):
         use_login_link(db, early, "here")
     lock_out(True)

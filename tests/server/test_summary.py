@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from datetime import timedelta
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -19,12 +21,15 @@ from server_testing import Databases, merge_body
 
 from silo.bom.errors import BusyError, SiloError
 from silo.cli.main import main
+from silo_server import events
 from silo_server.db.engine import Database, Tx
 from silo_server.db.tables import product_summaries
 from silo_server.run import prepare
-from silo_server.services.bom import history, review, tree
+from silo_server.services.bom import history, review, transfer, tree
 from silo_server.services.bom.merge import merge_bom, read_merge_order, remember_refusal
 from silo_server.services.bom.summary import (
+    LONGEST_CHANGE,
+    MOST_NAMED,
     Summary,
     below,
     keep_all,
@@ -318,3 +323,93 @@ def test_a_list_marks_what_is_open_in_products(db: Database, monkeypatch: pytest
     assert marks() == {}
     keep_summaries(db)
     assert marks() == told
+
+
+def one_level(db: Database) -> tuple[str, str]:
+    """An assembly with two of a part; a look at it is not kept yet."""
+    top, *_, part = seed(db)
+    with db.write() as tx:
+        merge_bom(tx, top, read_merge_order(merge_body({part: 2}), 100), None)
+    with db.read() as tx:
+        summary_of(tx, get_item(tx, top))
+    return top, part
+
+
+def test_a_refusal_that_began_before_the_look_is_not_forgotten(db: Database) -> None:
+    """It has no event, and its time is that of its beginning; the look may be from in between."""
+    top, _ = one_level(db)
+    with db.write() as tx:
+        tx.at -= timedelta(seconds=LONGEST_CHANGE - 10)
+        remember_refusal(tx, get_item(tx, top), "no such part")
+    keep_summaries(db)
+    assert kept_ids(db) == set()
+
+
+def test_what_changed_behind_a_trimmed_log_is_not_kept(db: Database) -> None:
+    """If the log no longer goes back to the look, nobody knows what changed since."""
+    _, part = one_level(db)
+    with db.write() as tx:
+        patch_properties(tx, part, {"mass_kg": 2})
+    with db.write() as tx:
+        events.trim(tx, 0)
+    keep_summaries(db)
+    assert kept_ids(db) == set()
+
+
+def test_who_made_the_bom_what_it_is_is_named(db: Database) -> None:
+    """A sync that changes nothing is no change of the product."""
+    top, part = one_level(db)
+    for name, quantity in (("ann", 3), ("bob", 3)):
+        with db.write(Actor(name, Role.EDITOR)) as tx:
+            merge_bom(tx, top, read_merge_order(merge_body({part: quantity}), 100), None)
+    with db.read() as tx:
+        assert summary_of(tx, get_item(tx, top)).changed[1:] == ("ann", top)
+
+
+def test_a_deep_product_with_many_unknown_masses(db: Database) -> None:
+    """So many levels as a tree shows, all its parts, and the first names of those without a mass."""
+    with db.write() as tx:
+        depth, many = tree.MAX_DEPTH + 3, MOST_NAMED + 3
+        chain = [create_item(tx, NewItem(category="A01", name="a"))[0].part_number for _ in range(depth)]
+        parts = [create_item(tx, NewItem(category="F01", name="p"))[0].part_number for _ in range(many)]
+        for above, below_it in itertools.pairwise(chain):
+            merge_bom(tx, above, read_merge_order(merge_body({below_it: 1}), 100), None)
+        merge_bom(tx, chain[-1], read_merge_order(merge_body(dict.fromkeys(parts, 1)), 100), None)
+    assert keep_all(db) == depth
+    with db.read() as tx:
+        told = summary_of(tx, get_item(tx, chain[0]))
+    assert (len(told.levels), told.parts, told.no_mass) == (tree.MAX_DEPTH, many, many)
+    assert list(told.mass_missing) == sorted(parts)[:MOST_NAMED]
+
+
+@pytest.mark.parametrize("view", list(transfer.View))
+def test_an_export_reads_its_parts_some_at_a_time(
+    db: Database, monkeypatch: pytest.MonkeyPatch, view: transfer.View
+) -> None:
+    """However many at a time, the rows are the same: with a filter, and with what the syncs left out."""
+    top, sub, *_, first, second = seed(db)
+    with db.write() as tx:
+        body = {**merge_body({first: 2, second: 3}), "left_out": [GAP]}
+        merge_bom(tx, sub, read_merge_order(body, 100), None)
+        merge_bom(tx, top, read_merge_order(merge_body({sub: 2, second: 1}), 100), None)
+        patch_properties(tx, first, {"mass_kg": 0.5, "supplier": "Misumi"})
+
+    def rows(words: str) -> list[dict[str, Any]]:
+        with db.read() as tx:
+            return list(transfer.export(tx, top, view, 2, words).rows)
+
+    whole, found = rows(""), rows("misumi")
+    numbers = [row.get("Part number") for row in whole]
+    deep = {
+        transfer.View.SINGLE: [sub, second],
+        transfer.View.INDENTED: [sub, first, second, second, None],
+        transfer.View.FLAT: [second, first, None],
+    }
+    assert numbers == deep[view]
+    assert [row["Part number"] for row in found] == {
+        transfer.View.SINGLE: [sub],
+        transfer.View.INDENTED: [sub, first],
+        transfer.View.FLAT: [first],
+    }[view]
+    monkeypatch.setattr(tree, "PORTION", 1)
+    assert (rows(""), rows("misumi")) == (whole, found)

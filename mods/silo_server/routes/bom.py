@@ -834,9 +834,8 @@ def _file(
     # On the disk where it is large: an export must not take the memory of a whole file.
     out = cast(IO[bytes], SpooledTemporaryFile(max_size=SPOOL_BYTES))  # noqa: SIM115 - the answer closes it
     try:
-        with call.server.large_reads.enter():
-            with call.read() as tx:
-                made = make(tx)
+        with call.server.large_reads.enter(), call.read() as tx:
+            made = make(tx)
             write(made, out)
     except BaseException:
         out.close()

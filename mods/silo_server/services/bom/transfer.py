@@ -22,12 +22,12 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import chain, islice
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 from sqlalchemy import select
 
@@ -46,7 +46,7 @@ from silo.bom.numbers import Mark, as_decimal, common_mark, parse_number, plain,
 from silo.bom.resolve import with_allowed_characters
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import items
-from silo_server.services.bom.frozen import Product, frozen_product
+from silo_server.services.bom.frozen import frozen_product
 from silo_server.services.bom.history import moment, what_changed
 from silo_server.services.bom.lines import (
     ChangeKind,
@@ -61,17 +61,19 @@ from silo_server.services.bom.lines import (
 )
 from silo_server.services.bom.merge import in_sentences, last_syncs
 from silo_server.services.bom.review import check_state, edited_state
-from silo_server.services.bom.summary import Worth, below, summary_of
+from silo_server.services.bom.summary import OpenBom, Worth, own_worth, summaries, summary_of
 from silo_server.services.bom.tree import (
     MAX_DEPTH,
     Exact,
-    Graph,
     Occurrence,
+    Part,
     expand,
     flatten,
+    found_below,
     leading_to,
     load_graph,
-    parts_of,
+    portions,
+    some_parts,
     sought,
 )
 from silo_server.services.items import get_item
@@ -106,11 +108,6 @@ _WIDTHS = {
     "Open": 24,
     "Supplier": 20,
 }
-# What a line says of itself; the flat list has none of it.
-OF_A_LINE = (
-    *("Relation type", "Source", "Reference designators", "Find number", "Notes", "Revision"),
-    "Unreferenced since",
-)
 MOST_TOLD = 20
 _SIGNS = re.compile(r"[^a-z0-9]+")
 PROPERTIES = {
@@ -127,7 +124,11 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """A BOM to be written. ``notes`` stand on top; ``rows``, by column name, are made one by one."""
+    """A BOM to be written. ``notes`` stand on top.
+
+    rows
+        by column name, made one by one: in the transaction, which reads what they show.
+    """
 
     root: Item
     view: View
@@ -155,12 +156,18 @@ def export(
     """
     root = get_item(tx, part_number, include_archived=bool(release))
     of = get_release(tx, root, release) if release else None
-    shown = frozen_product(tx, root, of) if of else _present(tx, root)
-    root, graph, parts, known, still = shown.graph.root, shown.graph, shown.parts, shown.worths, shown.open
+    frozen = frozen_product(tx, root, of) if of else None
+    graph = frozen.graph if frozen else load_graph(tx, root, bare=True)
+    root, still = graph.root, frozen.open if frozen else summary_of(tx, root).open
+    summed = {} if frozen else summaries(tx, graph.lines.keys() - {root.id})
     filtered = bool(words or item_type)
     # What a sync left out has no number, supplier or type: a filter finds none of it.
-    gaps = [] if filtered or of else _gap_rows(tx, graph, view)
-    fitting = sought(words, item_type, parts)
+    gaps = [] if filtered or of else _gap_rows(tx, root, still, view)
+    fitting: Callable[[Line], bool] = lambda _line: True  # noqa: E731 - as what a filter gives
+    if filtered and frozen:
+        fitting = sought(words, item_type, frozen.parts)
+    elif filtered:
+        fitting = found_below(tx, graph, words, item_type)
     notes = [f"Revision {of.label}, {of.status}, frozen at {wire(of.frozen_at)}"] if of else []
     notes += [f"For {pieces} pieces of {root.part_number} {root.name}"] if pieces > 1 else []
     if filtered:
@@ -173,39 +180,45 @@ def export(
             more = f"; and {len(said) - MOST_TOLD} more" if len(said) > MOST_TOLD else ""
             notes.append(f"{head}: {'; '.join(said[:MOST_TOLD])}{more}")
 
-    def row(
-        line: Line, item: str, level: int, quantity: Exact | float, total: Exact, doubts: Sequence[str]
-    ) -> Row:
-        amount = total * pieces
-        part, worth = parts[line.child_id], known[line.child_id]
-        values = _row(line, part.properties, item, level, plain(quantity), plain(amount))
-        child = still.get(line.child_id)
-        told = {"Incomplete": child.incomplete or None if child else None, "Open": ", ".join(doubts) or None}
-        return values | _values(worth, amount) | told
+    def dressed(bare: Iterable[_Bare]) -> Iterator[Row]:
+        for some in portions(bare):
+            parts = frozen.parts if frozen else some_parts(tx, {one.line.child_id for one in some})
+            for one in some:
+                child, amount = one.line.child_id, one.total * pieces
+                part, known, said = parts[child], summed.get(child), still.get(child)
+                worth = known.as_part if known else own_worth(part.properties)
+                worth = frozen.worths[child] if frozen else worth
+                told = {"Incomplete": said.incomplete or None if said else None}
+                told["Open"] = ", ".join(one.doubts) or None
+                yield _row(one, part, amount, of_a_line=view is not View.FLAT) | _values(worth, amount) | told
 
-    rows: Iterator[Row]
+    bare: Iterator[_Bare]
     if view is View.FLAT:
-        # Not those of a line: a part may be in the tree on several.
-        rows = (
-            row(one.line, str(place), 1, one.total * pieces, one.total, one.doubts(pieces))
-            | dict.fromkeys(OF_A_LINE)
-            for place, one in enumerate((one for one in flatten(graph) if fitting(one.line)), start=1)
+        flat = enumerate((one for one in flatten(graph) if fitting(one.line)), start=1)
+        bare = (
+            _Bare(one.line, str(place), 1, one.total * pieces, one.total, one.doubts(pieces))
+            for place, one in flat
         )
     else:
         depth = 1 if view is View.SINGLE else MAX_DEPTH
-        hit = leading_to(graph, fitting) if filtered else lambda _line: True
-        rows = (
-            row(one.line, item, one.depth, one.line.state.quantity, one.total, graph.doubts(one.line))
+        hit = leading_to(graph, fitting) if filtered else fitting
+        bare = (
+            _Bare(one.line, item, one.depth, one.line.state.quantity, one.total, graph.doubts(one.line))
             for one, item in _numbered(expand(graph, depth, tx.settings.max_expanded_rows))
             if hit(one.line)
         )
-    return Export(root, view, chain(rows, gaps), notes, pieces)
+    return Export(root, view, chain(dressed(bare), gaps), notes, pieces)
 
 
-def _present(tx: Tx, root: Item) -> Product:
-    graph = load_graph(tx, root)
-    parts = parts_of(tx, graph)
-    return Product(graph, parts, below(tx, graph, parts).worths, summary_of(tx, root).open)
+class _Bare(NamedTuple):
+    """A row before it has what it shows of its part: the line, its place, and what is open about it."""
+
+    line: Line
+    item: str
+    level: int
+    quantity: Exact | float
+    total: Exact
+    doubts: Sequence[str]
 
 
 _CHANGES = {"what": "What", "within": "In", "part_number": "Part number", "name": "Name"}
@@ -234,15 +247,15 @@ def _values(worth: Worth, amount: Exact) -> Row:
     return row
 
 
-def _gap_rows(tx: Tx, graph: Graph, view: View) -> list[Row]:
+def _gap_rows(tx: Tx, root: Item, open_ones: Mapping[int, OpenBom], view: View) -> list[Row]:
     """What the last syncs left out: rows without a part number, after all others; missing is a line too."""
-    names = graph.names()
-    ids = [graph.root.id] if view is View.SINGLE else list(names)
+    shown = {root.id} if view is View.SINGLE else open_ones.keys()
+    ids = [one for one, said in open_ones.items() if said.incomplete and one in shown]
     return [
         {
             "Name": gap.get("name") or gap.get("object"),
             "Quantity": gap.get("quantity"),
-            "Incomplete": f"{names[one]}: {sentence}",
+            "Incomplete": f"{open_ones[one].part_number}: {sentence}",
         }
         for one, last in last_syncs(tx, ids).items()
         for gap, sentence in zip(last.gaps, in_sentences(last.gaps), strict=True)
@@ -328,33 +341,30 @@ def to_json(made: Export, out: IO[bytes]) -> None:
     out.write(b"]}")
 
 
-def _row(
-    line: Line,
-    properties: Mapping[str, Any],
-    item: str,
-    level: int,
-    quantity: float | None,
-    total: float | None,
-) -> Row:
-    state = line.state
+def _row(one: _Bare, part: Part, amount: Exact, *, of_a_line: bool) -> Row:
+    """A row's cells; ``of_a_line`` False: not those of a line, as a part may be in the tree on several."""
+    line, state, properties = one.line, one.line.state, part.properties
     row: Row = {
-        "Item": item,
-        "Level": level,
-        "Part number": line.child_part_number,
-        "Name": line.child_name,
-        "Description": line.child_description,
+        "Item": one.item,
+        "Level": one.level,
+        "Part number": part.part_number,
+        "Name": part.name,
+        "Description": part.description,
         "Item type": line.child_item_type,
-        "Relation type": state.rel_type,
-        "Quantity": quantity,
+        "Quantity": plain(one.quantity),
         "Unit": state.unit,
-        "Total quantity": total,
-        "Source": state.source,
-        "Reference designators": " ".join(state.reference_designators) or None,
-        "Find number": state.find_number,
-        "Notes": state.notes,
-        "Revision": state.child_revision,
-        "Unreferenced since": wire(state.unreferenced_since),
+        "Total quantity": plain(amount),
     }
+    if of_a_line:
+        row |= {
+            "Relation type": state.rel_type,
+            "Source": state.source,
+            "Reference designators": " ".join(state.reference_designators) or None,
+            "Find number": state.find_number,
+            "Notes": state.notes,
+            "Revision": state.child_revision,
+            "Unreferenced since": wire(state.unreferenced_since),
+        }
     for column, name in PROPERTIES.items():
         value = properties.get(name)
         row[column] = (

@@ -11,11 +11,12 @@ Cost and mass of an assembly part by part, with everything that is missing named
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cache
-from typing import Any, NamedTuple
+from itertools import islice
+from typing import Any, NamedTuple, TypeVar
 
 from sqlalchemy import ColumnElement, Select, func, literal, select
 
@@ -35,6 +36,9 @@ MAX_DEPTH = 20
 SOUGHT = ("supplier", "supplier_part_number", "manufacturer")
 # What quantities multiply and add up to, at most: exact as a JSON number, and more than anybody orders.
 MAX_TOTAL = 10**15
+# So many rows get what they show of their parts at once.
+PORTION = 1000
+R = TypeVar("R")
 # Totals are exact: counts as they are, lengths and masses as decimals.
 Exact = int | Decimal
 
@@ -120,9 +124,11 @@ class Usage:
     depth: int
 
 
-def load_graph(tx: Tx, root: Item, depth: int | None = None) -> Graph:
+def load_graph(tx: Tx, root: Item, depth: int | None = None, *, bare: bool = False) -> Graph:
     """All lines below ``root``, each once; of the first ``depth`` levels only, where that is given.
 
+    bare
+        without UUID, name and description of the children, for who reads them with what is shown.
     TooLargeError where there are more than ``max_expanded_rows``: they would fill the memory.
     """
     query = select_lines().order_by(bom_lines.c.parent_id, bom_lines.c.position)
@@ -142,6 +148,8 @@ def load_graph(tx: Tx, root: Item, depth: int | None = None) -> Graph:
                     "its sub-assemblies, or for less with depth="
                 )
             line = to_line(row)
+            if bare:
+                line = line._replace(child_uuid="", child_name="", child_description="")
             child = names.setdefault(line.child_id, line[4:11])
             lines.setdefault(line.parent_id, []).append(Line._make((*line[:4], *child, line.state)))
     return Graph(root, lines, conflicts_in(tx, lines))
@@ -183,6 +191,23 @@ def sought(words: str, item_type: str, parts: Mapping[int, Part]) -> Callable[[L
         return test(*(str(text) for text in (*part[:3], *map(part.properties.get, SOUGHT)) if text))
 
     return lambda line: fitting(line.child_id, line.child_item_type)
+
+
+def found_below(tx: Tx, graph: Graph, words: str, item_type: str) -> Callable[[Line], bool]:
+    """As :func:`sought` in all of a graph, whose parts are read some at a time and not kept."""
+    lines = {line.child_id: line for below in graph.lines.values() for line in below}
+    found: set[int] = set()
+    for some in portions(lines.values()):
+        test = sought(words, item_type, some_parts(tx, [line.child_id for line in some]))
+        found.update(line.child_id for line in some if test(line))
+    return lambda line: line.child_id in found
+
+
+def portions(rows: Iterable[R]) -> Iterator[list[R]]:
+    """The rows, :data:`PORTION` at a time."""
+    left = iter(rows)
+    while some := list(islice(left, PORTION)):
+        yield some
 
 
 def leading_to(graph: Graph, fitting: Callable[[Line], bool]) -> Callable[[Line], bool]:
@@ -361,7 +386,6 @@ def _uses(tx: Tx, of_level: ColumnElement[bool], depth: int, limit: int, offset:
 
 def order_of(graph: Graph) -> list[int]:
     """The assemblies (internal ids), parents before their children; CycleError where there is a ring."""
-    names = graph.names()
     done: list[int] = []
     state: dict[int, bool] = {graph.root.id: False}  # False = being walked, True = done
     stack = [(graph.root.id, iter(graph.components(graph.root.id)))]
@@ -377,7 +401,7 @@ def order_of(graph: Graph) -> list[int]:
         if child not in graph.lines or state.get(child) is True:
             continue
         if state.get(child) is False:
-            ring = [entry[0] for entry in stack]
+            ring, names = [entry[0] for entry in stack], graph.names()
             raise CycleError([names[i] for i in [*ring[ring.index(child) :], child]])
         state[child] = False
         stack.append((child, iter(graph.components(child))))
