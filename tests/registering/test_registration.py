@@ -33,6 +33,7 @@ from silo.bom.errors import (
 from silo.bom.model import BomEntry
 from silo.bom.resolve import propose
 from silo.fcstd import Library, stamp
+from silo.platform import hold_lock
 from silo.registering.items import REGISTRATION_PROPERTY, Registration, component_key, register
 from silo.registering.journal import Journal
 
@@ -552,3 +553,45 @@ def test_who_waits_for_another_computer_says_so(tmp_path: Path, monkeypatch: pyt
     assert (clock.now, [at for at, _ in told]) == (130.0, [5.0, 65.0, 125.0])
     assert {text for _, text in told} == {str(raised.value)}
     assert f"is being registered by process {os.getpid()} of" in str(raised.value)
+
+
+def test_who_finds_the_item_of_another_computer_has_it_written(tmp_path: Path) -> None:
+    """An open document lacks the identity that the file on disk has by now; its next save would lose it."""
+    shared, files = Shared(tmp_path, lockable=True), Files()
+    made = shared.api.create_item(
+        "s", "M01", "Bracket", idempotency_key="11111111-2222-4333-8444-999999999999"
+    )
+    stamp(shared.path, str(made["id"]))
+    done = register(shared.proposal, shared.api, shared.journal("first"), files.stamp)
+    assert (done.item_id, done.found) == (made["id"], True)
+    assert files.identity == {component_key(shared.proposal.entry): made["id"]}
+
+
+def test_an_intent_is_not_that_of_a_file_with_another_identity(tmp_path: Path) -> None:
+    """A file that was registered elsewhere lies where an interrupted run had begun; its identity stays."""
+    shared = Shared(tmp_path, lockable=True)
+    shared.api.before = UnreachableError("gone")
+    shared.register("first")
+    shared.api.before = None
+    known = "aaaaaaaa-2222-4333-8444-555555555555"
+    stamp(shared.path, known)
+    shared.proposal = replace(shared.proposal, entry=replace(shared.proposal.entry, silo_uuid=known))
+    assert (shared.register("first").item_id, list(shared.api.items)) == (known, [known])
+
+
+def test_a_lock_whose_file_was_deleted_meanwhile_is_taken_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its last holder removes the file; who waited has a file that nobody else will ever open."""
+    tries: list[str] = []
+
+    def slow(path: str) -> Any:
+        held = hold_lock(path)
+        if not tries:
+            os.unlink(path)
+        tries.append(path)
+        return held
+
+    monkeypatch.setattr("silo.files.hold_lock", slow)
+    with Journal(tmp_path / "one").turn(str(tmp_path / "a.FCStd")):
+        assert (len(tries), os.path.exists(tries[0])) == (2, True)

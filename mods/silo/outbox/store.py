@@ -34,7 +34,7 @@ from typing import Any, BinaryIO
 from silo.api.config import Pause, canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError, counted
 from silo.bom.report import to_plain
-from silo.files import content_hash, seen_as
+from silo.files import content_hash, folder_lock, seen_as
 from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
 from silo.platform import (
     data_folder,
@@ -217,7 +217,7 @@ class Database:
         try:
             self.copies.mkdir(mode=0o700, parents=True, exist_ok=True)
             # Made for its owner only before SQLite opens it; the -wal and -shm files take over its mode.
-            for path in (self.path, self.path.with_suffix(".lock"), self.path.with_suffix(".making")):
+            for path in (self.path, self.path.with_suffix(".lock")):
                 private_file(path)
             sync_folder(self.path.parent)
         except OSError as error:
@@ -230,7 +230,10 @@ class Database:
             ) from error
         with self._translated():
             if not self._is_whole():
-                with self._alone():
+                # Two processes may begin in the same moment.
+                with folder_lock(
+                    str(self.path.parent), f"{self.path.stem}.making", "made ready", _PATIENCE_S
+                ):
                     if not self._is_whole():  # another process was quicker
                         self._make_anew()
 
@@ -256,17 +259,6 @@ class Database:
                 if isinstance(error, sqlite3.OperationalError) and "no such" not in str(error):
                     raise
                 return False
-
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Held while the database is made: two processes may begin in the same moment."""
-        until = time.monotonic() + _PATIENCE_S
-        while (lock := hold_lock(self.path.with_suffix(".making"))) is None:
-            if time.monotonic() > until:
-                raise OutboxError(f"{self.path}: another program makes this outbox and does not end")
-            time.sleep(0.02)
-        with lock:
-            yield
 
     def _make_anew(self) -> None:
         """Make the database from the descriptions and what can be read of the old file, which is kept."""
