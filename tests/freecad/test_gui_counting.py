@@ -47,6 +47,13 @@ def test_what_is_no_part_is_one_press_and_another_takes_it_back(said: dict[str, 
     assert said["asked_again"]
 
 
+def test_a_missing_part_has_both_ways_out_in_the_pane(said: dict[str, Any]) -> None:
+    """The BOM waits; a person syncs it without the part, or has the link mended."""
+    assert "[Relink…] [Sync without it]" in said["waits"]
+    assert "Incomplete: 1 component is missing" in said["without"]
+    assert said["relinked"] == "moved/Bolt.FCStd"
+
+
 def test_a_moved_part_is_found_and_its_live_links_are_mended(said: dict[str, Any]) -> None:
     assert said["can_mend"]
     assert said["mended"] == "moved/Bolt.FCStd"

@@ -43,6 +43,12 @@ class Buttons:
             Do.DETAILS: self._details,
             Do.STOP: lambda _action: addon.session.cancel(),
             Do.PREVIEW: lambda action: self._with_document(action.document, addon.previews.start),
+            Do.MEND: lambda action: self._with_document(
+                action.document, lambda doc: addon.previews.start(doc, mend=True)
+            ),
+            Do.SYNC_WITHOUT: lambda action: self._with_document(
+                action.document, lambda doc: addon.commits.sync_only(doc, allow_missing=True)
+            ),
             Do.SAME: self._same_part,
             Do.REGISTER: lambda action: self.register(action.document),
             Do.DECIDE: lambda action: self.register(action.document),

@@ -17,7 +17,9 @@ from inside import (
     Gui,
     addon,
     assembly,
+    button_texts,
     close_all,
+    pane,
     part,
     run,
     settled,
@@ -25,6 +27,7 @@ from inside import (
     unmark,
     wait,
 )
+from inside import press as press_button
 
 BUTTON, NO_PART = 6, 7
 
@@ -120,6 +123,7 @@ def declare(one: Any, doc: Any) -> None:
 def moved_part(one: Any) -> None:
     (VAULT / "moved").mkdir()
     os.replace(VAULT / "Bolt.FCStd", VAULT / "moved" / "Bolt.FCStd")
+    from_the_pane(one)
     top = App.openDocument(str(VAULT / "Top.FCStd"))
     Gui.runCommand("Silo_BOM")
     window = wait(lambda: next(iter(one.previews._open.values()), None))
@@ -148,6 +152,31 @@ def moved_part(one: Any) -> None:
     tell(differs=window._view_text.text(), selection=[obj.Name for obj in Gui.Selection.getSelection()])
     photograph(window, "differs")
     window.close()
+
+
+def from_the_pane(one: Any) -> None:
+    """A commit of the assembly: its BOM waits, and the box has both ways out."""
+    top = App.openDocument(str(VAULT / "Top.FCStd"))
+    top.getObject("Motor").Length = 8
+    top.recompute()
+    Gui.runCommand("Origin_Commit")
+    wait(lambda: any("The BOM waits" in box for box in pane()))
+    wait(settled)
+    one.dock.show_and_raise()
+    wait(lambda: "Sync without it" in button_texts(one.dock))
+    photograph(one.dock, "blocked")
+    tell(waits=pane()[0])
+    press_button(one.dock, "Sync without it")
+    wait(lambda: settled() and "Incomplete" in pane()[0])
+    tell(without=pane()[0])
+    press_button(one.dock, "Relink…")
+    window = wait(lambda: next(iter(one.previews._open.values()), None))
+    wait(lambda: top.getObject("First").LinkedObject is not None)
+    wait(lambda: window._preview is not None and settled())
+    tell(relinked=os.path.relpath(top.getObject("First").LinkedObject.Document.FileName, VAULT))
+    window.close()
+    wait(lambda: not one.previews._open)
+    close_all()  # the link is mended in this session only
 
 
 def photograph(widget: Any, name: str) -> None:

@@ -84,6 +84,21 @@ def test_pane_and_command_line_count_in_the_same_words(lists: dict[str, Any]) ->
             words.use(english)
 
 
+def test_a_missing_component_has_two_ways_out(vault: Vault) -> None:
+    """On the first BOM too: mend the link, or sync without it. Where none is missing, neither is offered."""
+    gone = replace(vault.part("Bolt", 2), missing=True)
+    vault.commit(vault.snapshot(gone, broken=True))
+    vault.send()
+    (line,) = (line for line in box(vault).lines if "waits until" in line.text)
+    assert [(action.do, action.text, action.document) for action in line.actions] == [
+        (Do.MEND, "Relink…", str(vault.top)),
+        (Do.SYNC_WITHOUT, "Sync without it", str(vault.top)),
+    ]
+    vault.commit(vault.snapshot(broken=True), content=b"other")
+    vault.send()
+    assert not [line.actions for line in box(vault).lines if "waits until" in line.text and line.actions]
+
+
 def test_however_much_is_broken_registering_stays_within_reach(vault: Vault) -> None:
     """A thousand broken links must not push the button out of the box."""
     snapshot = vault.snapshot(vault.part("Cover", identity="no-item"), broken=True)

@@ -222,6 +222,19 @@ def test_broken_links_are_mended_where_one_file_fits(
     assert len(window.filled) == 2
 
 
+def test_the_pane_s_button_mends_once(
+    office: Office, flow: PreviewFlow, top: Document, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The links are mended when the comparison is there; a later comparison leaves them alone."""
+    mended: list[str] = []
+    monkeypatch.setattr(flow, "relink", lambda preview: mended.append(preview.snapshot.path))
+    flow.start(top, mend=True)
+    office.settle()
+    flow.again(top.FileName)
+    office.settle()
+    assert mended == [top.FileName]
+
+
 def test_a_line_says_why_it_counts_so_many(office: Office, flow: PreviewFlow, top: Document) -> None:
     """By the keys of the line, in the assembly that holds it; also of a line without a part number."""
     top.parts[office.document("Loose", registered=False)] = 2

@@ -637,14 +637,16 @@ class CommitFlow:
         while self._turns:
             self._step()
 
-    def sync_only(self, doc: Any, *, by_fork: bool = False) -> None:
+    def sync_only(self, doc: Any, *, by_fork: bool = False, allow_missing: bool = False) -> None:
         """Sync the BOM of a document whose file is committed already: its parts were registered, or a
-        question about them was answered. ``by_fork``: a fork's ``Origin_Commit`` did it, in its own way."""
+        question about them was answered. ``by_fork``: a fork's ``Origin_Commit`` did it, in its own way.
+        ``allow_missing``: a person wants it without the components that are missing."""
         try:
             taken = self.snapshot(doc)
             commit = self._commit_of(taken, new_key()) if taken.identity and taken.is_assembly else None
             if commit is None:
                 return
+            commit = replace(commit, allow_missing=commit.allow_missing or allow_missing)
             if not by_fork:
                 commit = self.made_from(commit, doc)
                 if not commit.sha256:

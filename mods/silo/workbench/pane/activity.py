@@ -47,6 +47,8 @@ class Do(StrEnum):
     SHOW = "show"  # select the instances in the 3D view and the tree
     REGISTER = "register"  # open the Register Parts dialog
     PREVIEW = "preview"  # open the BOM preview
+    MEND = "mend"  # lead broken links to the files that were meant, in the preview
+    SYNC_WITHOUT = "sync without"  # sync a BOM although components are missing
     SAME = "same"  # these files are the same part, on purpose
     DECIDE = "decide"  # a new part: opens the Register Parts dialog
     RETRY = "retry"  # send what waits in the outbox

@@ -175,8 +175,19 @@ def _status_lines(sent: Sent) -> tuple[Line, ...]:
         lines.append(Line(counted(missing, one, many), Tone.WARNING))
     if sent.status is Status.BLOCKED:
         text = translate("Silo", "The file is in Silo. The BOM waits until these are mended:")
-        lines.append(Line(text, Tone.ERROR))
+        lines.append(Line(text, Tone.ERROR, _blocked_actions(sent.entry.path, missing)))
     return tuple(lines)
+
+
+def _blocked_actions(path: str, missing: int) -> tuple[Action, ...]:
+    """What a person can do about components that are missing; nothing else is left out of a BOM."""
+    if not missing:
+        return ()
+    one, many = translate("Silo", "Sync without it"), translate("Silo", "Sync without them")
+    return (
+        Action(Do.MEND, translate("Silo", "Relink…"), document=path),
+        Action(Do.SYNC_WITHOUT, counted(missing, one, many), document=path),
+    )
 
 
 def _resolved_lines(sent: Sent) -> tuple[Line, ...]:

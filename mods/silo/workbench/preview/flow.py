@@ -472,9 +472,11 @@ class PreviewFlow:
         self._session, self._commits, self._desk = session, commits, desk
         self.register, self.show, self.view, self._known = register, show, view, known
         self._open: dict[str, Window] = {}
+        self._to_mend: set[str] = set()
 
-    def start(self, doc: Any) -> None:
-        """Compare a document's assembly with the server."""
+    def start(self, doc: Any, *, mend: bool = False) -> None:
+        """Compare a document's assembly with the server; ``mend``: its broken links first, where a file
+        fits."""
         taken = self._take(doc)
         if taken is None:
             return
@@ -483,6 +485,8 @@ class PreviewFlow:
             self._desk.warn(translate("Silo", "BOM in Silo"), text.replace("{name}", taken.label))
             return
         self._dialog(taken, doc.Name)
+        if mend:
+            self._to_mend.add(taken.path)
         self._ask(taken)
 
     def again(self, path: str) -> None:
@@ -519,6 +523,7 @@ class PreviewFlow:
     def closed(self, path: str) -> None:
         """The window of this document is gone."""
         self._open.pop(path, None)
+        self._to_mend.discard(path)
 
     def _ask(self, taken: Snapshot, note: str = "") -> None:
         self._with_dialog(taken.path, lambda dialog: dialog.busy())
@@ -534,6 +539,9 @@ class PreviewFlow:
         path = preview.snapshot.path
         self._known(path, preview.top.resolved.entries)
         self._with_dialog(path, lambda dialog: dialog.fill(preview))
+        if path in self._to_mend:
+            self._to_mend.discard(path)
+            self.relink(preview)
 
     def _with_dialog(self, path: str, call: Callable[[Window], None]) -> None:
         # The window may have been closed while the server was thinking.

@@ -772,6 +772,21 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
+            <source>Sync without it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Sync without them</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Relink…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
             <source>Show all…</source>
             <translation type="unfinished" />
         </message>
