@@ -65,7 +65,6 @@ def test_what_is_broken_holds_the_bom_back(hostile: Told) -> None:
     assert "components have no Silo part number [Register Parts…]" in box
 
 
-@pytest.mark.xfail(strict=False, reason="not tried since sub-assemblies go along")
 def test_with_consent_it_is_synced(hostile: Told) -> None:
     """The lines that have a number arrive, once each."""
     added = f"+{hostile_vault.REGISTERED} added"

@@ -117,6 +117,7 @@ def story() -> None:
         press(one.dock, "Try again")
     wait(lambda: len(boxes("BOM Updated: " + numbers["Top"])) > before and settled())
     wait(lambda: not one.session.shown.waiting)
+    wait(lambda: one.session.shown.connection == "online")
     tell(after=pane()[0], connection=one.session.shown.connection)
     preview(one, docs["top"])
 
