@@ -134,6 +134,7 @@ def _meant(top: str) -> list[str]:
 
 PROJECT_FILE = ".silo-project.json"
 _PATIENCE_S = 10.0
+_TRIES = 100  # of a lock whose file was deleted by its last holder
 
 
 @dataclass(frozen=True)
@@ -283,15 +284,16 @@ def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[s
     """Return the locked file. Raises InputError where another process has it, OSError where nobody can."""
     if os.path.islink(path):  # somebody else's file may be behind it
         raise OSError(errno.ELOOP, f"{path} is a symbolic link")
-    now = time.monotonic()
+    now, deleted = time.monotonic(), 0
     until, due = now + patience, now + 5
-    while True:
+    while deleted < _TRIES:
         if (held := hold_lock(path)) is not None:
             # Its last holder may have deleted the file while we waited for the lock.
             with suppress(OSError):
                 if os.path.samestat(os.fstat(held.fileno()), os.lstat(path)):
                     return held
             held.close()
+            deleted += 1
         elif (now := time.monotonic()) >= min(until, due):
             try:
                 who = Path(path).read_text(encoding="utf-8", errors="replace").strip()
@@ -303,6 +305,7 @@ def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[s
             tell(text)
             due = now + 60
         time.sleep(0.02 if patience else 0)
+    raise OSError(errno.ESTALE, "its disk shows another file each time")
 
 
 def job_text(env: Mapping[str, str]) -> str | None:

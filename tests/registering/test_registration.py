@@ -595,3 +595,22 @@ def test_a_lock_whose_file_was_deleted_meanwhile_is_taken_anew(
     monkeypatch.setattr("silo.files.hold_lock", slow)
     with Journal(tmp_path / "one").turn(str(tmp_path / "a.FCStd")):
         assert (len(tries), os.path.exists(tries[0])) == (2, True)
+
+
+def test_a_disk_that_shows_another_file_each_time_is_no_endless_wait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As some network disks do: the lock is one of this computer alone then, and whoever asked knows that."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    numbers = iter(range(10**6))
+    real = os.lstat
+
+    def numbered(path: Any, **how: Any) -> Any:
+        found = real(path, **how)
+        inside = str(path).startswith(str(tmp_path / "shared"))
+        return os.stat_result((found[0], next(numbers), *found[2:])) if inside else found
+
+    (tmp_path / "shared").mkdir()
+    monkeypatch.setattr(os, "lstat", numbered)
+    with Journal(tmp_path / "one").turn(str(tmp_path / "shared" / "a.FCStd")) as unseen:
+        assert unseen == "its disk shows another file each time"
