@@ -104,6 +104,16 @@ def test_angles_are_in_the_unit_of_the_file(tmp_path: Path, read_in: ReadIn) -> 
     assert not complaint(made, only(read_in(path)))
 
 
+def test_a_body_without_volume_is_named(tmp_path: Path, read_in: ReadIn) -> None:
+    """A cylinder of no radius: the kernel makes a solid of it that nothing can be in."""
+    path = tmp_path / "part.step"
+    made = begun(path)
+    made.item(f"RIGHT_CIRCULAR_CYLINDER('c',#{made.axis(50.0)},3.,0.)", 0.0)
+    part = only(read_in(made.write(path)))
+    assert part.volume_m3 == pytest.approx(1e-6)
+    assert any("no volume that can be computed" in problem.message for problem in part.problems)
+
+
 def test_a_mapped_body_that_is_not_read_is_named(tmp_path: Path, read_in: ReadIn, codes_of: Any) -> None:
     """Its numbers say another place than it stands in, so it is not made from them."""
     path = tmp_path / "part.step"
