@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from uuid import uuid4
 
@@ -30,22 +31,41 @@ from silo.testing import FakeSilo
 Silo = SiloClient | FakeSilo
 
 
+@contextmanager
+def served(kind: str, folder: Path) -> Iterator[SiloClient]:
+    run = pytest.importorskip("silo_server.run", reason="the embedded server needs the extra 'server'")
+    from server_testing import Databases
+
+    databases = Databases(folder)
+    try:
+        with (
+            run.running_server(
+                databases.new(kind), token="silo_contract", files_dir=folder / "files"
+            ) as server,
+            SiloClient(server.base_url, server.token) as client,
+        ):
+            yield client
+    finally:
+        databases.close()
+
+
 @pytest.fixture(scope="module")
 def server_client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SiloClient]:
-    run = pytest.importorskip("silo_server.run", reason="the embedded server needs the extra 'server'")
-    database = f"sqlite:///{tmp_path_factory.mktemp('silo') / 'silo.db'}"
-    with (
-        run.running_server(database, token="silo_contract") as server,
-        SiloClient(server.base_url, server.token) as client,
-    ):
+    with served("sqlite", tmp_path_factory.mktemp("silo")) as client:
         yield client
 
 
-@pytest.fixture(params=["fake", "server"])
+@pytest.fixture(scope="module")
+def postgres_client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SiloClient]:
+    with served("postgres", tmp_path_factory.mktemp("silo")) as client:
+        yield client
+
+
+@pytest.fixture(params=["fake", "server", pytest.param("postgres", marks=pytest.mark.postgres)])
 def silo(request: pytest.FixtureRequest) -> Silo:
     if request.param == "fake":
         return FakeSilo()
-    client: SiloClient = request.getfixturevalue("server_client")
+    client: SiloClient = request.getfixturevalue(f"{request.param}_client")
     return client
 
 

@@ -40,6 +40,19 @@ def fill(api: Api) -> str:
     return parent
 
 
+# The file of several parts; the backup has its rows and its content.
+BOTH = "0b1e7a52-6c1f-4d0c-9d57-2f1c1b6a9e10"
+
+
+def send_document(api: Api, holds: str, content: bytes) -> None:
+    """Upload a file that is no item's own."""
+    held = [{"item": api.get(f"/api/items/{holds}")["id"], "object": "Part1"}]
+    fields = {"file": ("both.FCStd", content), "path": "parts/both.FCStd", "items": json.dumps(held)}
+    body, headers = form_body(fields)
+    answer = api.call("POST", f"/api/documents/{BOTH}/file", body=body, headers=headers)
+    assert answer.status == 201, answer.body
+
+
 def upload(api: Api, item: str, content: bytes) -> None:
     """Upload a file as a new revision."""
     body, headers = form_body({"file": ("part.FCStd", content), "comment": "c"})
@@ -70,6 +83,7 @@ def test_what_was_saved_comes_back_on_either_database(
         Api(server.base_url, TOKEN) as api,
     ):
         parent = fill(api)
+        send_document(api, parent, b"of two parts")
         backup.back_up(settings, tmp_path / "saved")
         lines, history = api.get(bom(parent)), api.get(bom(parent, "history"))
         before = tables(url, tmp_path)
@@ -87,6 +101,12 @@ def test_what_was_saved_comes_back_on_either_database(
         assert api.get(bom(parent)) == lines
         assert api.get(bom(parent, "history")) == history
         assert api.call("GET", f"/api/items/{parent}/file").body == b"first"
+        assert api.call("GET", f"/api/documents/{BOTH}/file").body == b"of two parts"
+        told = api.get(f"/api/documents/{BOTH}")
+        assert (told["file_path"], [one["part_number"] for one in told["holds"]]) == (
+            "parts/both.FCStd",
+            [parent],
+        )
         assert api.get(f"/api/items?search={parent}")[0]["part_number"] == parent
         # Ids count on where they were, so that a new change follows the old ones.
         api.merge(parent, {})
