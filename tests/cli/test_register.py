@@ -440,6 +440,7 @@ def test_an_item_that_no_file_names_is_named(run: Any, silo: Any, tmp_path: Path
     assert (f"M01-0001  Bracket  {paths[0]}#" in text, "Cover" in text) == (True, False)
     assert len(run("register", paths[0], "--orphans", "archive", "--json").json()["archived"]) == 1
     assert [item.name for item in silo.client.search_items()] == ["Cover"]
+    assert not any("Bracket" in component for component in Journal().pending())
     assert run("register", paths[1], "--yes").code == 0
     assert run("register", tmp_path, "--orphans", "list", "--json").json()["orphans"] == []
     assert len(silo.client.search_items()) == 1

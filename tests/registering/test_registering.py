@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,7 +14,7 @@ import pytest
 from silo.bom.errors import ServerFaultError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.resolve import Categories
+from silo.bom.resolve import Categories, Proposal
 from silo.registering.offer import Candidate, Offer, Seen, State, offer
 from silo.testing import FakeSilo
 from silo.workbench.register.flow import EditedRow
@@ -233,3 +234,14 @@ def _file(path: Path, content: bytes) -> Path:
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
+
+
+def test_a_part_of_another_server_is_not_checked_to_begin_with() -> None:
+    """A person says that the identity comes along."""
+    entry = BomEntry("/v/bracket.FCStd", object_name="Body", label="Bracket", document_label="Bracket")
+    known = replace(entry, silo_uuid="aaaaaaaa-2222-4333-8444-555555555555")
+    here, elsewhere = (
+        Candidate(Proposal(one, "Bracket", "part", "M01"), State.READY) for one in (entry, known)
+    )
+    assert (here.foreign, here.wanted, elsewhere.foreign, elsewhere.wanted) == (False, True, True, False)
+    assert not replace(elsewhere, same_as="M01-0001").foreign
