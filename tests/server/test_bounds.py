@@ -298,6 +298,16 @@ def test_what_waits_is_listed_and_counted_without_reading_all_lines(db: Database
             merge_bom(tx, top, read_merge_order(body, 9), None)
         remember_refusal(tx, get_item(tx, "T2"), "no such part")
         archive_item(tx, "T3")
+        # Settled: the one by a person's edit, the other by a decision.
+        for child in ("C2", "C3"):
+            create_item(tx, NewItem(part_number=child, name="Part"))
+            review.add_line(tx, "T4", child, LineState(3.0, "manual"))
+        cad = merge_body({**dict.fromkeys(parts, 2), "C2": 5, "C3": 5})
+        merge_bom(tx, "T4", read_merge_order(cad, 9), None)
+        assert [one.conflicts for one in review.waiting(tx) if one.part_number == "T4"] == [2]
+        review.change_line(tx, "T4", "C2", {"quantity": 5.0})
+        assert [one.conflicts for one in review.waiting(tx) if one.part_number == "T4"] == [1]
+        review.resolve(tx, "T4", [review.Decision("C3", review.Action.KEEP_SILO)])
     with db.read() as tx:
 
         def note(_conn: Any, _cursor: Any, sql: str, values: Any, *_: Any) -> None:

@@ -306,6 +306,9 @@ def test_a_list_marks_what_is_open_in_products(db: Database, monkeypatch: pytest
         body = {**merge_body(dict.fromkeys(parts, 2)), "left_out": [GAP]}
         merge_bom(tx, sub, read_merge_order(body, 100), None)
         merge_bom(tx, top, read_merge_order(merge_body({sub: 1}), 100), None)
+        welded = create_item(tx, NewItem(category="F01", name="A part with a BOM"))[0].part_number
+        merge_bom(tx, welded, read_merge_order(body, 100), None)
+        numbers.append(welded)
 
     def marks() -> dict[str, list[str]]:
         with db.read() as tx:
@@ -315,7 +318,7 @@ def test_a_list_marks_what_is_open_in_products(db: Database, monkeypatch: pytest
 
     told = marks()
     assert told[top] == ["open in 1 BOM below"]
-    assert told[sub] == ["incomplete: 1 missing"]
+    assert told[sub] == told[welded] == ["incomplete: 1 missing"]
     assert told[numbers[2]] == ["never synced"]
     assert parts[0] not in told
     db.built.clear()

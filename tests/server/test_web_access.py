@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
 import zlib
 from collections.abc import Iterator
@@ -13,11 +14,12 @@ from urllib.parse import unquote, urlencode
 import pytest
 from fastapi.routing import APIRoute
 from server_testing import Api
+from starlette.datastructures import FormData
 from web_visitor import FORM, HTML, ROLES, Visitor, enter, link_of
 
 from silo_server.run import running_server
 from silo_server.settings import Settings
-from silo_server.web.forms import Kept, unpacked
+from silo_server.web.forms import Kept, kept_form, unpacked
 from silo_server.web.pages import ROUTERS
 
 TOKEN = "silo_pages"
@@ -239,6 +241,11 @@ def test_an_old_form_of_ours_is_shown_and_not_carried_out(visitors: dict[str, Vi
     assert "Send it now" in answer.body.decode()
     assert "another session" not in answer.body.decode()
     assert api.lines(parent) == {}
+    for other in ({}, {"Sec-Fetch-Site": "cross-site"}, {"Origin": "https://elsewhere.example"}):
+        headers = {"Cookie": visitor.cookie, **FORM, **HTML, **other}
+        answer = visitor.api.call("POST", f"/items/{parent}/bom/lines", body=body, headers=headers)
+        assert answer.status == 403
+        assert "Send it now" not in answer.body.decode()
 
 
 @pytest.mark.parametrize(
@@ -260,6 +267,29 @@ def test_a_kept_form_that_was_tampered_with(api: Api, packed: str) -> None:
     answer = browser.call("POST", "/login", body=body, headers={**FORM, **HTML})
     assert answer.status in (401, 429)
     assert unpacked(packed) is None
+
+
+@pytest.mark.parametrize("name", ["password", "again", "current"])
+def test_a_form_with_a_password_is_not_kept(name: str) -> None:
+    """It goes nowhere but where it was typed for, not even packed into the login form."""
+    assert kept_form("/x", FormData([("notes", "a"), (name, "correct horse")])) is None
+    kept = kept_form("/x", FormData([("notes", "a"), ("csrf_token", "secret")]))
+    assert kept is not None
+    assert list(kept.fields) == [("notes", "a")]
+
+
+def test_a_new_secret_is_shown_once(visitors: dict[str, Visitor]) -> None:
+    """The page that shows it takes the cookie away in which it came."""
+    visitor = visitors[VIEWER]
+    made = visitor.post("/account/tokens", key="once", name="shown once", days="30", scope="read")
+    cookie = made.headers["set-cookie"].partition(";")[0]
+    _, secret = json.loads(unquote(cookie.partition("=")[2]))
+    headers = {"Cookie": f"{visitor.cookie}; {cookie}", **HTML}
+    page = visitor.api.call("GET", "/account", headers=headers)
+    assert secret in page.body.decode()
+    gone, *attributes = page.headers["set-cookie"].split("; ")
+    assert gone.partition("=")[::2] == (cookie.partition("=")[0], '""')
+    assert {"Max-Age=0", "Path=/account"} <= set(attributes)
 
 
 def test_a_kept_form_leads_nowhere_else() -> None:

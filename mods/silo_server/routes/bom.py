@@ -810,7 +810,7 @@ def _exported(
     call: Call,
     part_number: str,
     wanted: Wanted,
-    write: Callable[[transfer.Export, IO[bytes]], None],
+    write: Callable[[transfer.Export, IO[bytes]], Callable[[], None] | None],
     media_type: str,
     suffix: str,
 ) -> Response:
@@ -827,16 +827,19 @@ def _exported(
 def _file(
     call: Call,
     make: Callable[[Tx], transfer.Export],
-    write: Callable[[transfer.Export, IO[bytes]], None],
+    write: Callable[[transfer.Export, IO[bytes]], Callable[[], None] | None],
     media_type: str,
     name: str,
 ) -> Response:
     # On the disk where it is large: an export must not take the memory of a whole file.
     out = cast(IO[bytes], SpooledTemporaryFile(max_size=SPOOL_BYTES))  # noqa: SIM115 - the answer closes it
     try:
-        with call.server.large_reads.enter(), call.read() as tx:
-            made = make(tx)
-            write(made, out)
+        with call.server.large_reads.enter():
+            with call.read() as tx:
+                made = make(tx)
+                pack = write(made, out)
+            if pack:
+                pack()
     except BaseException:
         out.close()
         raise

@@ -284,8 +284,11 @@ def _csv_cell(value: Any, semicolons: bool) -> Any:
     return safe_cell(value)
 
 
-def to_xlsx(made: Export, out: IO[bytes]) -> None:
-    """Write a workbook with one sheet; texts are texts, whatever they begin with."""
+def to_xlsx(made: Export, out: IO[bytes]) -> Callable[[], None]:
+    """Write a workbook with one sheet; texts are texts, whatever they begin with.
+
+    Returns what packs it once all rows are read: that takes seconds, in which no transaction should wait.
+    """
     from xlsxwriter import Workbook
 
     # Each row goes to the disk when the next one begins.
@@ -320,7 +323,11 @@ def to_xlsx(made: Export, out: IO[bytes]) -> None:
             ((row.get(c), None if isinstance(row.get(c), str) else formats.get(c)) for c in made.columns),
         )
     sheet.autofilter(head, 0, last, len(made.columns) - 1)
-    book.close()
+
+    def pack() -> None:
+        book.close()
+
+    return pack
 
 
 def to_json(made: Export, out: IO[bytes]) -> None:
