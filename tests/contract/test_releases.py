@@ -164,7 +164,7 @@ def test_a_sync_of_a_released_product_says_which_draft_it_begins(
     assert api.merge(top, {sub: 3, screw: 1})["draft"] == {"label": "B", "released": "A"}
 
 
-@pytest.mark.parametrize("label", ["a b", "-x", "x" * 17, "ä"])
+@pytest.mark.parametrize("label", ["a b", "-x", "x" * 17, "ä", "3", "1e3"])
 def test_a_label_that_cannot_be_one(api: Api, product: tuple[str, str, str], label: str) -> None:
     """The message says what a label is."""
     assert "label: wanted" in api.bad(400, "POST", releases(product[0]), {"label": label})["message"]

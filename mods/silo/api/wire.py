@@ -448,6 +448,10 @@ class FrozenFile(Record):
     size: int = 0
 
 
+# A whole number is no label: it means a revision of a file.
+RELEASE_LABEL = r"[A-Za-z][A-Za-z0-9._-]{0,15}|[0-9]{1,7}\.[0-9]{1,7}"
+
+
 class Release(Record):
     """A revision of a product that was submitted for release; ``record`` names what was frozen of it.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import threading
 import time
@@ -226,7 +227,13 @@ def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> 
 
 
 def _revision(text: str) -> int | str:
-    return common.above_zero(text) if text.isdigit() else text
+    from silo.api.wire import RELEASE_LABEL
+
+    if re.fullmatch(RELEASE_LABEL, text, re.ASCII):
+        return text
+    if not text.isdigit():
+        raise argparse.ArgumentTypeError(f"{text[:50]!r} is neither a number above 0 nor a label such as B")
+    return common.above_zero(text)
 
 
 def add_pull(parser: argparse.ArgumentParser) -> None:

@@ -18,7 +18,7 @@ from silo_server.routes.models import Body, Text
 from silo_server.services import releases
 from silo_server.services.bom import frozen
 from silo_server.services.items import get_item
-from silo_server.services.releases import LABEL_FORM, Release
+from silo_server.services.releases import Release
 from silo_server.values import Item, Role, to_wire
 
 router = APIRouter(prefix="/api/items/{part_number}/releases", tags=["releases"])
@@ -29,7 +29,7 @@ class SubmitBody(Body):
 
     comment: Text = ""
     label: Annotated[
-        str, WithJsonSchema({"type": "string", "pattern": f"^({LABEL_FORM.pattern})?$", "default": ""})
+        str, WithJsonSchema({"type": "string", "pattern": f"^({wire.RELEASE_LABEL})?$", "default": ""})
     ] = ""
     with_parts: bool = False
 

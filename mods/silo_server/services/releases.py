@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import insert, select, update
 
+from silo.api.wire import RELEASE_LABEL
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
 from silo_server import events
 from silo_server.db.engine import Tx, insert_rows, one_of
@@ -36,7 +37,6 @@ from silo_server.services.items import get_item
 from silo_server.settings import TooLargeError
 from silo_server.values import Item, Scope, dumps, from_row
 
-LABEL_FORM = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,15}")
 # Letters that are read as digits are left out.
 _LETTERS = "ABCDEFGHJKLMNPQRSTUVWXYZ"
 NUMBERED = ("review", "released", "obsolete")
@@ -196,8 +196,11 @@ def submit(
         )
     taken = [one.label for one in before if one.status in NUMBERED]
     label = label.strip() or next_label(taken, tx.settings.release_labels)
-    if not LABEL_FORM.fullmatch(label):
-        raise RejectedError(f"label: wanted 1 to 16 letters, digits or . _ -, got {label[:40]!r}")
+    if not re.fullmatch(RELEASE_LABEL, label, re.ASCII):
+        raise RejectedError(
+            f"label: wanted a letter and up to 15 letters, digits or . _ -, or a number such as 1.0, got "
+            f"{label[:40]!r}"
+        )
     if label.casefold() in map(str.casefold, taken):
         raise ConflictError(f"{item.part_number} has a revision {label}; leave the label to the server")
     _keep(tx, frozen.records)
