@@ -16,6 +16,7 @@ import re
 import shutil
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ import pytest
 from fcstd_writer import Doc, Raw, locals_
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from real_silo import FAULTS, TOKEN, Moods, RealSilo, real_silo
+from real_silo import FAULTS, TOKEN, Moods, RealSilo, real_silo, register_elsewhere
 
 from silo.api.client import SiloClient
 from silo.api.events import Connection, ConnectionState, EventListener, ServerEvent
@@ -507,16 +508,6 @@ def test_a_silo_without_documents_gets_each_file_where_it_can(tmp_path: Path) ->
 # -- one folder, two computers ---------------------------------------------------------------------
 
 
-def register_elsewhere(top: str, url: str, home: str) -> int:
-    """Register a project as another computer does, with data of its own; how many errors it reports."""
-    for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME"):
-        os.environ[name] = home
-    extraction = read_assembly(top)
-    with SiloClient(url, TOKEN, timeout=60) as client:
-        proposals = proposals_for(extraction, client, client.find_schema("kindred-rd"))
-        return sum(r.error is not None for r in register_all(proposals, client, schema="kindred-rd"))
-
-
 @pytest.mark.parametrize("moods", [Moods(), Moods(own_ids=False)], ids=["its own ids", "our ids"])
 @pytest.mark.parametrize("locks", [True, False], ids=["locks", "no locks"])
 def test_two_computers_register_one_folder_once(
@@ -527,8 +518,9 @@ def test_two_computers_register_one_folder_once(
         desk = Desk(tmp_path, silo)
         jobs = [(str(desk.top), silo.url, str(tmp_path / f"computer {n}")) for n in range(2)]
         if locks:
-            with multiprocessing.get_context("spawn").Pool(2) as pool:
-                assert pool.starmap(register_elsewhere, jobs) == [0, 0]
+            # An executor reports a process that cannot start; a Pool would start it for ever.
+            with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+                assert list(pool.map(register_elsewhere, *zip(*jobs, strict=True))) == [0, 0]
         else:
             for folder in {path.parent for path in desk.top.parent.rglob("*.FCStd")}:
                 (folder / ".silo-register.lock").mkdir()

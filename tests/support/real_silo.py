@@ -12,6 +12,7 @@ import email
 import email.policy
 import hashlib
 import json
+import os
 import re
 import threading
 import uuid
@@ -666,3 +667,17 @@ def real_silo(moods: Moods | None = None) -> Iterator[RealSilo]:
         yield running
     finally:
         running.end()
+
+
+def register_elsewhere(top: str, url: str, home: str) -> int:
+    """Register a project as another computer does, with data of its own; how many errors it reports."""
+    from silo.api.client import SiloClient
+    from silo.cli.common import read_assembly
+    from silo.registering.on_disk import proposals_for, register_all
+
+    for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME"):
+        os.environ[name] = home
+    extraction = read_assembly(top)
+    with SiloClient(url, TOKEN, timeout=60) as client:
+        proposals = proposals_for(extraction, client, client.find_schema("kindred-rd"))
+        return sum(r.error is not None for r in register_all(proposals, client, schema="kindred-rd"))
