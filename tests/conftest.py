@@ -7,12 +7,15 @@ import importlib.util
 import os
 import shutil
 import signal
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 from sharing import scheduler
+
+from silo.standard_items import Memory
 
 # Time is measured in benchmarks; a test on a busy machine is not wrong for being slow. The examples are the
 # same in each run, so that no landing fails by chance; SILO_LONG=1 hunts with new ones, and more of them.
@@ -42,6 +45,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """``-n 2 --dist loadscope`` keeps tests together by what they share, and not by their files."""
     return scheduler(config, log) if config.getoption("dist") == "loadscope" else None
+
+
+@pytest.fixture(autouse=True)
+def _nothing_told(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test knows what another one told a server at the same address about unreferenced lines."""
+    monkeypatch.setattr(
+        "silo.bom_sync._told", cache(lambda: Memory(tmp_path_factory.mktemp("told") / "told.json"))
+    )
 
 
 def _needs(what: str, there: bool) -> None:

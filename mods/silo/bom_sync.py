@@ -294,7 +294,7 @@ def _told() -> Memory:
 
 
 def _is_told(resolved: Resolved, plan: MergePlan, server: str) -> bool:
-    if resolved.assembly.silo_uuid in resolved.last_syncs or replace(plan, flag=()).news:
+    if not server or resolved.assembly.silo_uuid in resolved.last_syncs or replace(plan, flag=()).news:
         return False
     told = _told().known(server).get(resolved.assembly.part_number or "", "")
     return bool(plan.flag) and set(plan.flag) <= set(told.split("\n"))
@@ -302,7 +302,7 @@ def _is_told(resolved: Resolved, plan: MergePlan, server: str) -> bool:
 
 def merged(resolved: Resolved, plan: MergePlan, server: str) -> None:
     """Remember what a merge has told a server that does not show which lines are unreferenced."""
-    if plan.flag and resolved.assembly.silo_uuid not in resolved.last_syncs:
+    if plan.flag and server and resolved.assembly.silo_uuid not in resolved.last_syncs:
         _told().remember(server, {resolved.assembly.part_number or "": "\n".join(plan.flag)})
 
 

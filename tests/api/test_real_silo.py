@@ -196,8 +196,8 @@ MOODS = {
     "no numbers": Moods(numbers=False),
     "pages of 2, counted": Moods(page=2, total="header", oldest_first=True),
     "pages of 2, counted in the body": Moods(page=2, total="body", oldest_first=True, batch=200),
-    "pages of 2, next": Moods(page=2, total="next", oldest_first=True),
-    "pages of 2, linked": Moods(page=2, total="link"),
+    "pages of 2, next": Moods(page=2, total="next", oldest_first=True, batch=200),
+    "pages of 2, linked": Moods(page=2, total="link", batch=200),
 }
 
 

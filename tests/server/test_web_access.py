@@ -74,6 +74,12 @@ TABLE = {
     ("GET", "/system"): ADMIN,
     ("GET", "/items/{part_number}/changes"): VIEWER,
     ("GET", "/documents/{uuid}"): VIEWER,
+    ("GET", "/items/{part_number}/releases"): VIEWER,
+    ("POST", "/items/{part_number}/releases"): EDITOR,
+    ("GET", "/items/{part_number}/releases/{label}"): VIEWER,
+    # These two need the right to approve, whatever the role.
+    ("POST", "/items/{part_number}/releases/{label}/approval"): VIEWER,
+    ("POST", "/items/{part_number}/releases/{label}/end"): VIEWER,
 }
 CHANGING = [path for (method, path), role in TABLE.items() if method == "POST" and role != PUBLIC]
 

@@ -165,8 +165,9 @@ class ItemCalls(FileCalls):
                 # Go's empty list, or no answer. Read as "not registered" it would have all registered again.
                 raise RejectedError(f"{len(some)} items: the answer is null")
             known = {_written(item.id): item for item in reply.models(Item, *LISTS)}
-            if reply.total > len(known):
-                raise RejectedError(f"{len(some)} items: the answer has {len(known)} of {reply.total}")
+            if reply.next or reply.total > len(known):
+                # Read as "not registered", the items of the other pages would be made once more.
+                raise RejectedError(f"{len(some)} items: the answer has {len(known)}, and is not the whole")
             return {uuid: known[_written(uuid)] for uuid in some if _written(uuid) in known}
 
         wanted = [uuid for uuid in uuids if uuid]

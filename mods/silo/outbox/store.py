@@ -222,7 +222,7 @@ class Database:
             sync_folder(self.path.parent)
         except OSError as error:
             waiting = len([*self.copies.glob("*.json")])
-            told = "Nothing was kept for sending"
+            told = "No commit was kept for sending"
             told = f"{counted(waiting, 'commit')} in {self.copies} cannot be sent" if waiting else told
             raise _ClosedError(
                 f"{self.path}: the outbox cannot be written ({error.strerror or error}). {told}; make room "

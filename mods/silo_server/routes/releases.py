@@ -12,7 +12,6 @@ from starlette.responses import Response
 from silo.api import wire
 from silo.bom.errors import ForbiddenError
 from silo_server.db.engine import Tx
-from silo_server.routes import context
 from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Call, Editor, Viewer, json_answer
 from silo_server.routes.models import Body, Text
 from silo_server.services import releases
@@ -78,13 +77,7 @@ def list_releases(call: Viewer, part_number: str) -> Response:
     return json_answer(told)
 
 
-@router.post(
-    "",
-    status_code=201,
-    response_model=wire.Release,
-    responses=WRITE_ERRORS,
-    openapi_extra=context.refused("the label is taken, or nothing is there to freeze"),
-)
+@router.post("", status_code=201, response_model=wire.Release, responses=WRITE_ERRORS)
 def submit(call: Editor, part_number: str, body: SubmitBody) -> Response:
     """Freeze a product as it is now and put it up for review."""
     made = frozen_now(call, part_number)

@@ -195,7 +195,7 @@ def submit(
             "release, reject or withdraw it first"
         )
     taken = [one.label for one in before if one.status in NUMBERED]
-    label = label.strip() or next_label(taken, tx.settings.release_labels)
+    label = label or next_label(taken, tx.settings.release_labels)
     if not re.fullmatch(RELEASE_LABEL, label, re.ASCII):
         raise RejectedError(
             f"label: wanted a letter and up to 15 letters, digits or . _ -, or a number such as 1.0, got "
