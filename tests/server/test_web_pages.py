@@ -354,6 +354,36 @@ def test_a_file_that_is_no_bom(visitors: dict[str, Visitor], api: Api) -> None:
     assert visitor.post(f"/items/{parent}/import/check").status == 400
 
 
+def test_the_head_of_a_product_counts_lines_of_an_older_revision(
+    visitors: dict[str, Visitor], api: Api
+) -> None:
+    """On all levels, each line once, however often its assembly is used."""
+    top, one, other, screw = api.items(4)
+    for _ in range(2):
+        api.good("POST", f"/api/items/{screw}/revisions", {"comment": "newer"})
+    for parent in (one, other, top):
+        api.good("POST", bom(parent), {"child_part_number": screw, "quantity": 2})
+    for child in (one, other):
+        api.good("POST", bom(top), {"child_part_number": child, "quantity": 3})
+    assert "of an older revision" not in visitors["viewer"].get(f"/items/{top}").body.decode()
+    for parent, revision in ((one, 1), (top, 1), (other, 2)):
+        api.good("PUT", bom(parent, screw), {"child_revision": revision})
+    assert "(2 of an older revision)" in visitors["viewer"].get(f"/items/{top}").body.decode()
+    assert "of an older revision" not in visitors["viewer"].get(f"/items/{other}").body.decode()
+
+
+@pytest.mark.parametrize("secure", [True, False])
+def test_a_secret_travels_over_tls_only_where_there_is_tls(tmp_path: Path, *, secure: bool) -> None:
+    """The cookie with a new login link, like that of a session."""
+    url = f"sqlite:///{tmp_path / 'silo.db'}"
+    settings = Settings(database_url=url, files_dir=tmp_path, secure_cookies=secure)
+    with running_server(url, token=TOKEN, settings=settings) as server, Api(server.base_url, TOKEN) as api:
+        api.good("POST", "/api/users", {"username": "ann"})
+        made = enter(api, "admin").post("/users/ann/login-link")
+        assert made.status == 303
+        assert ("secure" in made.headers["set-cookie"].lower()) is secure
+
+
 def test_activity_gives_only_what_is_new(visitors: dict[str, Visitor], api: Api) -> None:
     """With ``after`` the page holds the later events only, and says up to where it knows."""
     api.item()
