@@ -222,11 +222,12 @@ class Database:
             sync_folder(self.path.parent)
         except OSError as error:
             waiting = len([*self.copies.glob("*.json")])
-            told = "No commit was kept for sending"
-            told = f"{counted(waiting, 'commit')} in {self.copies} cannot be sent" if waiting else told
+            told, again = "Nothing was kept for sending", "commit again"
+            if waiting:
+                told, again = f"{counted(waiting, 'commit')} in {self.copies} cannot be sent", "try again"
             raise _ClosedError(
                 f"{self.path}: the outbox cannot be written ({error.strerror or error}). {told}; make room "
-                "or mend the permissions, then try again"
+                f"or mend the permissions, then {again}"
             ) from error
         with self._translated():
             if not self._is_whole():
