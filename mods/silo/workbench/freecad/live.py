@@ -146,6 +146,8 @@ class WholeDocuments:
 
     def __call__(self, document: Any) -> Any:
         real = getattr(document, "real", document)
+        if not hasattr(real, "getProgramVersion"):
+            return document  # read from its file, so whole: the target of an import by A2plus
         if not getattr(real, "Partial", False) and not saving.lost_objects(real):
             return document
         from silo.fcstd import Library
