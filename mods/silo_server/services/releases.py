@@ -35,7 +35,7 @@ from silo_server.db.tables import (
 from silo_server.services.access import audit
 from silo_server.services.items import get_item
 from silo_server.settings import TooLargeError
-from silo_server.values import Item, Scope, dumps, from_row
+from silo_server.values import Item, Role, Scope, dumps, from_row
 
 # Letters that are read as digits are left out.
 _LETTERS = "ABCDEFGHJKLMNPQRSTUVWXYZ"
@@ -296,6 +296,8 @@ def _release_parts(tx: Tx, release: Release, comment: str) -> None:
 
 def end(tx: Tx, part_number: str, label: str, status: str, note: str) -> Release:
     """Reject or withdraw what is in review, or call a released revision obsolete, with a comment."""
+    if status == "withdrawn" and not tx.actor.role.covers(Role.EDITOR):
+        raise ForbiddenError(f"{tx.actor.username} is {tx.actor.role}, this needs editor")
     if status == "obsolete":
         item = get_item(tx, part_number, include_archived=True, lock=True)
         release = get_release(tx, item, label)
