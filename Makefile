@@ -47,6 +47,12 @@ demo: $(SERVER)
 test: setup
 	$(BIN)/python -m pytest $(SPREAD) --dist worksteal -m "not freecad and not browser"
 
+# Of the suites that read and write files, what neither looks a name up nor replaces a file; `make test` runs these.
+NOT_ON_FILES = $(addprefix --ignore=tests/,fcstd/test_fuzz.py fcstd/test_xmltext.py outbox/test_laws.py \
+	outbox/test_pauses.py $(addprefix cli/test_,agreed.py conflicts.py log.py login.py \
+	night_report.py output.py piped.py serve.py server_commands.py workflows.py))
+SINGLE = $(filter-out tests/test_docs.py,$(wildcard tests/test_*.py))
+
 # The suites that read and write files, with files as Windows has them; PostgreSQL's test library is POSIX only. Of
 # client and server those whose subject is files: nothing else of them replaces or deletes. Servers that fail are no
 # matter of files, nor are crashes one of names.
@@ -56,14 +62,15 @@ ON_FILES = $(addprefix tests/api/test_,caller.py config.py files.py revisions.py
 test-windows-files: setup
 	PYTHONPATH=tests/support $(BIN)/python -m pytest -p windows_files $(SPREAD) --dist worksteal \
 		-k "not postgres and not one_item_in_trouble" \
-		-m "not freecad and not browser" tests/cli tests/fcstd tests/outbox tests/vault tests/workbench \
-		tests/test_*.py $(ON_FILES)
+		-m "not freecad and not browser" $(NOT_ON_FILES) tests/cli tests/fcstd tests/outbox tests/vault \
+		tests/workbench $(SINGLE) $(ON_FILES)
 
 # The suites that name files, on a mounted disk that finds a name in any case and normal form.
 test-other-disk: setup
 	PYTHONPATH=tests/support $(BIN)/python -m pytest -p other_disk_tests $(SPREAD) --dist worksteal \
 		-k "not postgres and not one_item_in_trouble and not test_crash" \
-		-m "not freecad and not browser" tests/cli tests/fcstd tests/outbox tests/vault tests/workbench tests/test_*.py
+		-m "not freecad and not browser" $(NOT_ON_FILES) tests/cli tests/fcstd tests/outbox tests/vault tests/workbench \
+		$(SINGLE)
 
 test-machine: setup
 	$(BIN)/python -m pytest $(SPREAD) --dist loadscope -m "freecad or browser"
