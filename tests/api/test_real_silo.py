@@ -38,6 +38,7 @@ from silo.inertia.output.push import PushItem, PushPlan, push
 from silo.outbox.entry import Commit, State, pause_text
 from silo.outbox.send import Report, send_all
 from silo.outbox.store import Store
+from silo.registering.journal import RESERVED
 from silo.registering.on_disk import proposals_for, register_all
 from silo.vault.project import commits, find_project, keep, name_documents, read_project
 from silo.vault.project import compare as compare_project
@@ -530,6 +531,26 @@ def test_two_computers_register_one_folder_once(
         assert desk.register() == []
         with desk.client() as client:
             assert resolve(read_assembly(str(desk.top)), client).unresolved == ()
+
+
+@pytest.mark.parametrize("moods", [Moods(), Moods(own_ids=False)], ids=["its own ids", "our ids"])
+def test_what_one_computer_began_another_one_ends(
+    tmp_path: Path, moods: Moods, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From any creation on no answer reaches the first computer: neither to that nor to what it asks then."""
+    monkeypatch.setattr(os, "environ", dict(os.environ))
+    for number in range(NAMES):
+        with real_silo(moods) as silo:
+            folder = tmp_path / str(number)
+            desk = Desk(folder, silo)
+            silo.answered_creations = number
+            assert register_elsewhere(str(desk.top), silo.url, str(folder / "first")) > 0
+            assert len(silo.items) == number + 1
+            silo.answered_creations = None
+            assert register_elsewhere(str(desk.top), silo.url, str(folder / "second")) == 0
+            assert register_elsewhere(str(desk.top), silo.url, str(folder / "first")) == 0
+            assert (len(silo.items), set(silo.holds().values())) == (NAMES, {1})
+            assert list(desk.top.parent.rglob(RESERVED)) == []
 
 
 @pytest.mark.parametrize("moods", [Moods(), Moods(own_ids=False)], ids=["its own ids", "our ids"])

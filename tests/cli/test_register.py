@@ -22,7 +22,7 @@ from silo.bom.resolve import Proposal
 from silo.cli.common import read_assembly
 from silo.cli.register import Dialog
 from silo.fcstd import open_document
-from silo.registering.items import component_key
+from silo.registering.items import component_key, on_disk
 from silo.registering.journal import Journal
 from silo.registering.offer import Candidate, Offer, Similar, State
 from silo.registering.on_disk import carry_out_on_disk, proposals_for
@@ -444,6 +444,24 @@ def test_an_item_that_no_file_names_is_named(run: Any, silo: Any, tmp_path: Path
     assert run("register", paths[1], "--yes").code == 0
     assert run("register", tmp_path, "--orphans", "list", "--json").json()["orphans"] == []
     assert len(silo.client.search_items()) == 1
+
+
+def test_what_another_computer_finished_is_no_orphan(
+    run: Any, silo: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its file names the item: --orphans archive would put a part in use out of use."""
+    path = part("Bracket", "Body").save(tmp_path / "Bracket.FCStd")
+    entry = read_assembly(str(path)).assembly
+    with Journal().turn(str(path), component_key(entry)) as turn:
+        intent, _ = turn.begin("", on_disk(entry)[0])
+    silo.client.create_item("kindred-rd", "M01", "Bracket", idempotency_key=intent.wanted)
+    with monkeypatch.context() as patch:
+        patch.setenv("XDG_DATA_HOME", str(tmp_path / "another computer"))
+        (row,) = run("register", path, "--yes", "--json").json()["registered"]
+    assert (row["found"], len(silo.client.search_items())) == (True, 1)
+    assert run("register", tmp_path, "--orphans", "archive", "--json").json() == {"archived": []}
+    assert [item.name for item in silo.client.search_items()] == ["Bracket"]
+    assert Journal().pending() == {}
 
 
 def test_a_project_of_another_server_is_taken_over_when_a_person_says_so(

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import errno
+import json
 import multiprocessing
 import os
 import time
@@ -34,8 +36,8 @@ from silo.bom.model import BomEntry
 from silo.bom.resolve import propose
 from silo.fcstd import Library, stamp
 from silo.platform import hold_lock
-from silo.registering.items import REGISTRATION_PROPERTY, Registration, component_key, register
-from silo.registering.journal import Journal
+from silo.registering.items import REGISTRATION_PROPERTY, Registration, component_key, finished, register
+from silo.registering.journal import RESERVED, Journal
 
 ENTRY = BomEntry(doc_path="/v/bracket.FCStd", object_name="Body", document_label="Bracket")
 PROPOSAL = propose(ENTRY, {"A01": "Mechanical assembly", "M01": "Machined parts"})
@@ -54,6 +56,8 @@ class Items:
         where it shows properties: in "lists" and everywhere else, in the "item" alone, or nowhere ("").
     trouble
         raised after an item was made, once each.
+    silent
+        nothing that asks for items is answered.
     """
 
     def __init__(self, *, own_ids: bool = False, shows: str = "lists") -> None:
@@ -62,9 +66,12 @@ class Items:
         self.trouble: list[BaseException] = []
         self.before: SiloError | None = None
         self.searches = True
+        self.silent = False
         self.asked: list[str] = []
 
     def get_item_by_uuid(self, uuid: str) -> Mapping[str, Any] | None:
+        if self.silent:
+            raise UnreachableError("no answer")
         return self._shown(self.items[uuid]) if uuid in self.items else None
 
     def get_properties(self, part_number: str) -> Mapping[str, Any]:
@@ -74,6 +81,8 @@ class Items:
         return next(i["properties"] for i in self.items.values() if i["part_number"] == part_number)
 
     def search_items(self, query: str = "", *, limit: int = 50, offset: int = 0) -> list[Mapping[str, Any]]:
+        if self.silent:
+            raise UnreachableError("no answer")
         if query and not self.searches:
             return []
         found = [self._shown(item) for item in self.items.values() if query in item["description"]]
@@ -351,11 +360,11 @@ def test_a_turn_that_never_ends_is_reported(tmp_path: Path) -> None:
     one, other = (Journal(tmp_path / name, patience=0.0) for name in ("one", "another computer"))
     (tmp_path / "slow").mkdir()
     (tmp_path / "healthy").mkdir()
-    with one.turn(str(tmp_path / "slow" / "a.FCStd")) as unseen:
-        assert unseen == ""
-        with other.turn(str(tmp_path / "healthy" / "a.FCStd")):
+    with one.turn(str(tmp_path / "slow" / "a.FCStd"), "a") as turn:
+        assert turn.unseen == ""
+        with other.turn(str(tmp_path / "healthy" / "a.FCStd"), "a"):
             pass
-        busy = other.turn(str(tmp_path / "slow" / "b.FCStd"))
+        busy = other.turn(str(tmp_path / "slow" / "b.FCStd"), "b")
         with pytest.raises(InputError, match="slow is being registered by process"), busy:
             pass
     assert list((tmp_path / "slow").iterdir()) == []
@@ -474,6 +483,101 @@ def test_a_folder_that_another_computer_registers_is_left_alone(tmp_path: Path) 
     assert (shared.register("second").item_id, len(shared.api.items)) == (first.item_id, 1)
 
 
+@pytest.fixture
+def interrupted(tmp_path: Path, request: pytest.FixtureRequest) -> Shared:
+    """The first computer's request made the item, and its answer and all that asked for it were lost."""
+    shared = Shared(tmp_path, own_ids=getattr(request, "param", False), lockable=True)
+    shared.api.trouble.append(UnreachableError("the answer was lost"))
+    shared.api.silent = True
+    # Another request than the creation asks first; that one still arrives.
+    assert isinstance(shared.register("first").error, UnreachableError)
+    shared.api.silent = False
+    assert (len(shared.api.items), shared.identity) == (1, None)
+    return shared
+
+
+def reserved(shared: Shared) -> Path:
+    return shared.path.parent / RESERVED
+
+
+@pytest.mark.parametrize("interrupted", [False, True], indirect=True, ids=["its ids", "ids of the server"])
+def test_another_computer_continues_what_was_interrupted(interrupted: Shared) -> None:
+    """It finds the item; the first one then has nothing to do, and the folder is as it was. No item is an
+    orphan then: the file names it, or its server knows no item of the journal's UUID."""
+    done = interrupted.register("second")
+    assert (done.found, len(interrupted.api.items), interrupted.identity) == (True, 1, done.item_id)
+    assert not reserved(interrupted).exists()
+    again = interrupted.register("first")
+    assert (again.item_id, len(interrupted.api.items)) == (done.item_id, 1)
+    (record,) = interrupted.journal("first").unfinished()
+    ended = finished(record, interrupted.journal("first"))
+    assert ended == (done.item_id == record.item_id) == (record.item_id in interrupted.api.items)
+    assert len(interrupted.journal("first").unfinished()) == (0 if ended else 1)
+
+
+def test_another_document_of_the_same_name_continues_nothing(interrupted: Shared) -> None:
+    """A file that took its place is another part; the journal of the first computer names the spare item."""
+    simple_document(interrupted.path, uid="99999999-2222-4333-8444-555555555555")
+    done = interrupted.register("second")
+    assert (done.found, len(interrupted.api.items)) == (False, 2)
+    (record,) = interrupted.journal("first").unfinished()
+    assert not finished(record, interrupted.journal("first"))
+    assert record.item_id != done.item_id
+
+
+def test_what_is_begun_with_other_parts_stays(interrupted: Shared) -> None:
+    """One file for the folder: each computer changes its own entry."""
+    interrupted.api.before = RejectedError("no")
+    other = interrupted.path.parent / "other.FCStd"
+    simple_document(other)
+    elsewhere = replace(interrupted.proposal, entry=replace(ENTRY, doc_path=str(other)))
+    before = reserved(interrupted).read_bytes()
+    assert register(elsewhere, interrupted.api, interrupted.journal("second"), Shared.write).error is not None
+    assert reserved(interrupted).read_bytes() == before
+    interrupted.api.before = None
+    interrupted.api.silent = True
+    interrupted.api.trouble.append(UnreachableError("lost"))
+    register(elsewhere, interrupted.api, interrupted.journal("second"), Shared.write)
+    assert set(json.loads(reserved(interrupted).read_text())) == {"bracket.FCStd#Body", "other.FCStd#Body"}
+    interrupted.api.silent = False
+    assert interrupted.register("third").found
+    assert set(json.loads(reserved(interrupted).read_text())) == {"other.FCStd#Body"}
+
+
+@pytest.mark.parametrize(
+    "damage",
+    ["{", "[]", '{"bracket.FCStd#Body": {"wanted": "x"}}', '{"bracket.FCStd#Body": 3}'],
+    ids=["cut off", "a list", "no UUID", "a number"],
+)
+def test_what_cannot_be_read_is_not_taken_for_nothing(interrupted: Shared, damage: str) -> None:
+    """An item may have been made: nothing is asked of the server before a person has looked."""
+    reserved(interrupted).write_text(damage)
+    failed = interrupted.register("second")
+    assert isinstance(failed.error, InputError)
+    assert "may then be made a second time" in str(failed.error)
+    assert (len(interrupted.api.items), interrupted.identity) == (1, None)
+
+
+def test_if_the_folder_cannot_say_what_is_begun_the_file_does(tmp_path: Path) -> None:
+    """It has the identity before the item is made."""
+    shared = Shared(tmp_path, lockable=True)
+    create, seen = shared.api.create_item, list[str | None]()
+
+    def between(*args: Any, **more: Any) -> Mapping[str, Any]:
+        seen.append(shared.identity)
+        return create(*args, **more)
+
+    shared.api.create_item = between  # type: ignore[method-assign]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("silo.registering.journal.replacing", refused)
+        done = shared.register("first")
+    assert (done.error, seen) == (None, [done.item_id])
+
+
+def refused(*_path: Any, **_how: Any) -> Any:
+    raise OSError(errno.EACCES, "Permission denied")
+
+
 @pytest.mark.parametrize("own_ids", [False, True])
 def test_an_identity_of_another_server_becomes_that_of_the_item(tmp_path: Path, own_ids: bool) -> None:
     """The file is written only where the server chose another one. A server that refuses leaves no intent."""
@@ -543,10 +647,10 @@ def test_who_waits_for_another_computer_says_so(tmp_path: Path, monkeypatch: pyt
 
     clock, told = Clock(), list[tuple[float, str]]()
     path = str(tmp_path / "a.FCStd")
-    with Journal(tmp_path / "one").turn(path):
+    with Journal(tmp_path / "one").turn(path, "a"):
         monkeypatch.setattr("silo.files.time", clock)
         waiting = Journal(tmp_path / "two", patience=130.0).turn(
-            path, lambda text: told.append((clock.now, text))
+            path, "a", lambda text: told.append((clock.now, text))
         )
         with pytest.raises(InputError) as raised, waiting:
             pass
@@ -593,7 +697,7 @@ def test_a_lock_whose_file_was_deleted_meanwhile_is_taken_anew(
         return held
 
     monkeypatch.setattr("silo.files.hold_lock", slow)
-    with Journal(tmp_path / "one").turn(str(tmp_path / "a.FCStd")):
+    with Journal(tmp_path / "one").turn(str(tmp_path / "a.FCStd"), "a"):
         assert (len(tries), os.path.exists(tries[0])) == (2, True)
 
 
@@ -612,5 +716,5 @@ def test_a_disk_that_shows_another_file_each_time_is_no_endless_wait(
 
     (tmp_path / "shared").mkdir()
     monkeypatch.setattr(os, "lstat", numbered)
-    with Journal(tmp_path / "one").turn(str(tmp_path / "shared" / "a.FCStd")) as unseen:
-        assert unseen == "its disk shows another file each time"
+    with Journal(tmp_path / "one").turn(str(tmp_path / "shared" / "a.FCStd"), "a") as turn:
+        assert turn.unseen == "its disk shows another file each time"

@@ -106,7 +106,11 @@ class PlainError(Exception):
 
 
 class RealSilo(ThreadingHTTPServer):
-    """The server; ``seen`` lists the requests, ``faults`` maps a request's number (from 0) to a fault."""
+    """The server; ``seen`` lists the requests, ``faults`` maps a request's number (from 0) to a fault.
+
+    answered_creations
+        after so many items were made no answer arrives any more; None for no such end.
+    """
 
     daemon_threads = True
     allow_reuse_address = True
@@ -121,6 +125,7 @@ class RealSilo(ThreadingHTTPServer):
         self.news = threading.Condition()
         self.seen: list[str] = []
         self.faults: dict[int, str] = {}
+        self.answered_creations: int | None = None
         self.lock = threading.RLock()
         self.ending = threading.Event()
         threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
@@ -142,6 +147,10 @@ class RealSilo(ThreadingHTTPServer):
     def next_fault(self, method: str, path: str) -> str:
         with self.lock:
             self.seen.append(f"{method} {path}")
+            if self.answered_creations is not None:
+                self.answered_creations -= (method, path) == ("POST", "/api/items")
+                if self.answered_creations < 0:
+                    return "drop after"
             return self.faults.pop(len(self.seen) - 1, "")
 
     # -- what is held -------------------------------------------------------------------------------------
@@ -672,12 +681,14 @@ def real_silo(moods: Moods | None = None) -> Iterator[RealSilo]:
 def register_elsewhere(top: str, url: str, home: str) -> int:
     """Register a project as another computer does, with data of its own; how many errors it reports."""
     from silo.api.client import SiloClient
+    from silo.api.policy import Retries
     from silo.cli.common import read_assembly
     from silo.registering.on_disk import proposals_for, register_all
 
     for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME"):
         os.environ[name] = home
     extraction = read_assembly(top)
-    with SiloClient(url, TOKEN, timeout=60) as client:
+    retries = Retries(tries=2, sleep=lambda _s: None)
+    with SiloClient(url, TOKEN, timeout=60, retries=retries) as client:
         proposals = proposals_for(extraction, client, client.find_schema("kindred-rd"))
         return sum(r.error is not None for r in register_all(proposals, client, schema="kindred-rd"))

@@ -30,7 +30,7 @@ from silo.cli import common
 from silo.cli.show import plain
 from silo.files import check_writable
 from silo.freecads import open_in_any
-from silo.registering.items import Ask, Registration, unclear
+from silo.registering.items import Ask, Registration, finished, unclear
 from silo.registering.journal import Journal
 from silo.registering.modelled import chosen, modelled
 from silo.registering.offer import ITEM_TYPES, Candidate, Contents, Offer, State, offer
@@ -535,7 +535,7 @@ def _orphans(args: argparse.Namespace) -> int:
             if not os.path.join(record.component.rpartition("#")[0], "").startswith(base):
                 continue
             found = filter(None, map(client.get_item_by_uuid, {record.item_id, record.wanted}))
-            if (item := next(found, None)) is None:
+            if (item := next(found, None)) is None or finished(record, journal):
                 continue
             if done:
                 client.archive_item(item.part_number)

@@ -8,8 +8,9 @@ by its UUID, by the property that carries it, and, where a server shows neither,
 description that were made since. Where that leaves a doubt, a person is asked.
 
 All of that happens under the lock of the file's folder, and with the identity that the file has then:
-another computer may have registered it. Where others do not see that lock, the file itself carries the
-identity before the server is asked.
+another computer may have registered it. What is begun stands in that folder, so that another computer
+continues it. Where others do not see the lock, the file itself carries the identity before the server is
+asked.
 
 A file may carry an identity that the server does not know, from another server or from another computer's
 run. Its item gets that identity; what brings such a file here has asked a person.
@@ -36,7 +37,7 @@ from silo.bom.errors import (
 )
 from silo.bom.model import BomEntry, document_identity, own_identity
 from silo.bom.resolve import Proposal
-from silo.registering.journal import Journal, Record
+from silo.registering.journal import Journal, Record, Turn
 from silo.standard_items import Memory, by_description, server_of
 
 # Servers that give UUIDs of their own still keep properties: this one finds an item made before a crash.
@@ -114,6 +115,17 @@ def on_disk(entry: BomEntry, *, shares_file: bool = False) -> tuple[str, str]:
         return "", ""
 
 
+def finished(record: Record, journal: Journal) -> bool:
+    """Return whether the component's file names its item by now, which another computer may have written; the
+    journal knows it then."""
+    path, _, name = record.component.rpartition("#")
+    uid, identity = on_disk(BomEntry(path, object_name=name))
+    if identity.lower() not in (record.item_id.lower(), record.wanted.lower()):
+        return False
+    journal.done(record.component, uid)
+    return True
+
+
 def unclear(proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """The answer where nobody can be asked: an error that names the items."""
     numbers = ", ".join(str(item["part_number"]) for item in found)
@@ -148,8 +160,8 @@ def register(
         gets who else registers in the file's folder, while that is waited for.
     """
     try:
-        with journal.turn(proposal.entry.doc_path, tell) as unseen:
-            run = _Run(proposal, api, journal, stamp, schema, properties or {}, ask, unseen)
+        with journal.turn(proposal.entry.doc_path, component_key(proposal.entry), tell) as turn:
+            run = _Run(proposal, api, turn, stamp, schema, properties or {}, ask)
             item, found = run.item(check, copy)
     except SiloError as error:
         return Registration(proposal, error=error)
@@ -158,24 +170,15 @@ def register(
 
 @dataclass(frozen=True)
 class _Run:
-    """The registration of one component, while nobody else registers anything in its folder.
-
-    unseen
-        why other computers do not see that; "" where they do.
-    """
+    """The steps of one component's registration."""
 
     proposal: Proposal
     api: RegistrationApi
-    journal: Journal
+    turn: Turn
     stamp: Stamp
     schema: str
     properties: Mapping[str, Any]
     ask: Ask
-    unseen: str
-
-    @property
-    def component(self) -> str:
-        return component_key(self.proposal.entry)
 
     def item(self, check: Check, copy: bool) -> tuple[Mapping[str, Any], bool]:
         """The component's item, which its file names, and whether it was there already."""
@@ -188,24 +191,24 @@ class _Run:
         item = None if copy or carried else self._lost(uid)
         if item is not None:
             self.stamp(entry, str(item["id"]))
-            self.journal.done(self.component, uid)
+            self.turn.done(uid)
             return item, True
         wanted = "" if copy else _as_uuid(carried)
-        intent, begun = self.journal.begin(self.component, wanted)
-        if self.unseen and not wanted:
+        intent, begun = self.turn.begin(wanted, uid)
+        if self.turn.unseen and not wanted:
             # Where others see the file alone, it has the identity before the item is made.
             wanted = intent.wanted
             self.stamp(entry, wanted)
             _, now = on_disk(entry, shares_file=self.proposal.shares_file)
             if now and now.lower() != wanted:
-                self.journal.forget(self.component)
+                self.turn.forget()
                 return self._registered_meanwhile(now), True
             entry = replace(entry, silo_uuid=wanted)
         item, found = self._made(intent, begun, wanted)
         item_id = str(item["id"])
         if item_id.lower() != wanted:
             self.stamp(entry, item_id)
-        self.journal.done(self.component, uid or on_disk(entry)[0])
+        self.turn.done(uid or on_disk(entry)[0])
         return item, found
 
     def _registered_meanwhile(self, identity: str) -> Mapping[str, Any]:
@@ -224,7 +227,7 @@ class _Run:
     def _lost(self, uid: str) -> Mapping[str, Any] | None:
         """The item of a document that was registered before and lost its identity, if a person says so:
         FreeCAD saved over it, or a copy lies in its place, which has the same UUID."""
-        record = self.journal.find(self.component)
+        record = self.turn.journal.find(self.turn.component)
         if record is None or not record.finished or not uid or record.document_uid != uid:
             return None
         item = self.api.get_item_by_uuid(record.item_id)
@@ -248,12 +251,12 @@ class _Run:
                 )
             except SiloError as error:
                 if not _may_have_arrived(error):
-                    if not begun and not (self.unseen and intent.wanted != proposal.entry.silo_uuid):
-                        self.journal.forget(self.component)
+                    if not begun and not (self.turn.unseen and intent.wanted != proposal.entry.silo_uuid):
+                        self.turn.forget()
                     raise
                 item = self._after_a_lost_answer(intent, error)
         if str(item["id"]) != intent.item_id:
-            self.journal.replace(self.component, str(item["id"]))
+            self.turn.replace(str(item["id"]))
         return item, found
 
     def _after_a_lost_answer(self, intent: Record, error: SiloError) -> Mapping[str, Any]:
@@ -276,7 +279,7 @@ class _Run:
                 return item
         if getattr(api, "keeps_item_ids", False):
             return None  # This server gives an item the UUID that we ask for, so there is none.
-        others = self.journal.item_ids() - {intent.item_id}
+        others = self.turn.journal.item_ids() - {intent.item_id}
         doubtful: dict[str, Mapping[str, Any]] = {}
         for item in _of_the_same_name(self.proposal, api, intent.begun_at):
             mark = _mark(api, item)

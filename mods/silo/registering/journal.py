@@ -4,22 +4,30 @@
 An intent is on disk before the server is asked, and stays until the component's file names its item. What is
 finished stays too: a FreeCAD that had the file open may save its own copy over the identity, and the item
 must be found again then.
+
+What is begun stands in the component's folder too until it is finished, so that another computer continues
+it instead of making a second item.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import sqlite3
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, closing, contextmanager
-from dataclasses import dataclass
+from contextlib import closing, contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from silo.bom.errors import InputError
 from silo.files import folder_lock
-from silo.platform import data_folder, private_file, private_folder
+from silo.platform import data_folder, private_file, private_folder, remove_patiently, replacing
+
+RESERVED = ".silo-registering.json"
+"""In a component's folder: what is begun there and not finished, for other computers."""
 
 _TABLE = """
 CREATE TABLE IF NOT EXISTS registrations (
@@ -83,22 +91,28 @@ class Journal:
         """What is known of a component."""
         return next(iter(self._records("component = ?", component)), None)
 
-    def begin(self, component: str, carried: str = "") -> tuple[Record, bool]:
+    def begin(self, component: str, carried: str = "", beside: Record | None = None) -> tuple[Record, bool]:
         """The intent for a component's item, and whether an earlier run had already begun with it.
 
         carried
             the identity that its file has from elsewhere, and that the item shall have.
+        beside
+            what another computer has begun (:func:`begun_beside`). It comes before what this one began.
         """
-        known = self.find(component)
-        if known is not None and not known.finished and carried in ("", known.wanted, known.item_id):
-            return known, True
+        for known in (beside, self.find(component)):
+            if known is not None and not known.finished and carried in ("", known.wanted, known.item_id):
+                self._keep(known)
+                return known, True
         wanted = carried or str(uuid.uuid4())
         record = Record(component, wanted, wanted, "", self._clock(), None)
+        self._keep(record)
+        return record, False
+
+    def _keep(self, record: Record) -> None:
         self._write(
             f"REPLACE INTO registrations ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?)",  # noqa: S608
             *vars(record).values(),
         )
-        return record, False
 
     def replace(self, component: str, item_id: str) -> None:
         """Remember the UUID that the server chose itself."""
@@ -117,16 +131,18 @@ class Journal:
         """The items of all components that are known here."""
         return frozenset(record.item_id for record in self._records("TRUE"))
 
+    @contextmanager
     def turn(
-        self, path: str, tell: Callable[[str], object] = lambda _text: None
-    ) -> AbstractContextManager[str]:
-        """Hold a file's folder while one component of it is registered, on whichever computer: two processes
-        never make an item for the same one, and nobody waits for another project's server.
+        self, path: str, component: str, tell: Callable[[str], object] = lambda _text: None
+    ) -> Iterator[Turn]:
+        """Hold the folder of a component's file while the component is registered, on whichever computer: two
+        processes never make an item for the same one, and nobody waits for another project's server.
 
-        Gives why other computers do not see that, "" where they do. ``tell`` gets who else does it, if that
-        takes long. Raises InputError.
+        ``tell`` gets who else does it, if that takes long. Raises InputError.
         """
-        return folder_lock(os.path.dirname(path), ".silo-register.lock", "registered", self._patience, tell)
+        folder = os.path.dirname(path)
+        with folder_lock(folder, ".silo-register.lock", "registered", self._patience, tell) as unseen:
+            yield Turn(self, path, component, unseen)
 
     def _records(self, where: str, *values: str) -> list[Record]:
         with self._open() as db:
@@ -156,3 +172,96 @@ class Journal:
         private_folder(self.path.parent)
         private_file(self.path)  # before SQLite opens it
         return sqlite3.connect(self.path, timeout=20.0, isolation_level=None)
+
+
+class Turn:
+    """The registration of one component, while nobody else registers anything in its folder.
+
+    unseen
+        why other computers see nothing of it but the component's file; "" if they do.
+    """
+
+    def __init__(self, journal: Journal, path: str, component: str, unseen: str) -> None:
+        self.journal, self.component, self.unseen = journal, component, unseen
+        self._path = path
+
+    def begin(self, carried: str, document_uid: str) -> tuple[Record, bool]:
+        """Begin, or continue what this or another computer began with the same document
+        (:meth:`Journal.begin`). Raises InputError."""
+        beside = begun_beside(self._path, self.component, document_uid)
+        record, begun = self.journal.begin(self.component, carried, beside)
+        if not self.unseen:
+            try:
+                self._reserve(replace(record, document_uid=document_uid))
+            except FileNotFoundError:  # no such folder: nobody else is in it
+                pass
+            except OSError as error:
+                self.unseen = error.strerror or str(error)
+        return record, begun
+
+    def replace(self, item_id: str) -> None:
+        """Remember the UUID that the server chose itself."""
+        self.journal.replace(self.component, item_id)
+
+    def done(self, document_uid: str) -> None:
+        """The component's file names its item."""
+        self.journal.done(self.component, document_uid)
+        self._release()
+
+    def forget(self) -> None:
+        """The server certainly made no item for it."""
+        self.journal.forget(self.component)
+        self._release()
+
+    def _release(self) -> None:
+        with suppress(OSError):  # what stays is found in the file first, or continued by the same document
+            self._reserve(None)
+
+    def _reserve(self, record: Record | None) -> None:
+        path, name = _beside(self._path), os.path.basename(self.component)
+        others = {key: value for key, value in _reserved(path).items() if key != name}
+        if record is not None:
+            others[name] = {k: v for k, v in asdict(record).items() if k not in ("component", "finished_at")}
+        if others:
+            with replacing(path, mode=0o666) as file:  # the next one may be another user
+                file.write(json.dumps(others, indent=1).encode())
+        elif os.path.lexists(path):
+            remove_patiently(path)
+
+
+def begun_beside(path: str, component: str, document_uid: str) -> Record | None:
+    """What a computer has begun with a component, and says so in the folder of its file.
+
+    document_uid
+        FreeCAD's own UUID of the file as it is now: another file of the same name continues nothing.
+
+    Raises InputError.
+    """
+    found = _reserved(_beside(path)).get(os.path.basename(component))
+    if found is None or not document_uid or found["document_uid"] != document_uid:
+        return None
+    return Record(component, found["wanted"], found["item_id"], "", float(found["begun_at"]), None)
+
+
+def _beside(path: str) -> str:
+    return os.path.join(os.path.dirname(path), RESERVED)
+
+
+def _reserved(path: str) -> dict[str, dict[str, Any]]:
+    """What is begun in a folder, by ``file#object``."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            found = json.load(file)
+        for one in found.values():
+            uuid.UUID(one["wanted"])
+            float(one["begun_at"])
+            if not isinstance(one["item_id"], str) or not isinstance(one["document_uid"], str):
+                raise TypeError("UUIDs are texts")
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(
+            f"{path}: what another computer began to register here cannot be read ({error!r}). Register on "
+            "that computer, or delete this file: an item that was begun may then be made a second time."
+        ) from error
+    return dict(found)

@@ -16,7 +16,7 @@ from silo.bom_sync import resolve
 from silo.fcstd import check_stampable, stamp
 from silo.freecads import OpenInFreecad, open_in_any
 from silo.registering.items import Ask, Registration, component_key, on_disk, unclear
-from silo.registering.journal import Journal
+from silo.registering.journal import Journal, begun_beside
 from silo.registering.offer import Candidate, Control, Seen, State
 from silo.registering.orders import Order, carry_out
 
@@ -84,12 +84,14 @@ def _state(path: str, opened: OpenInFreecad | None) -> State:
 
 def is_own(candidate: Candidate) -> bool:
     """True where the look-alike is its own item, made by a run that was interrupted or undone."""
-    record = Journal().find(component_key(candidate.entry))
+    entry, component = candidate.entry, component_key(candidate.entry)
+    uid = on_disk(entry)[0]
+    record = Journal().find(component) or begun_beside(entry.doc_path, component, uid)
     if record is None:
         return False
     if candidate.foreign:
         return not record.finished and candidate.entry.silo_uuid in (record.wanted, record.item_id)
-    return not record.finished or record.document_uid == on_disk(candidate.entry)[0]
+    return not record.finished or record.document_uid == uid
 
 
 def carry_out_on_disk(
