@@ -25,7 +25,7 @@ import pytest
 from fcstd_writer import Doc, Raw, locals_
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from real_silo import FAULTS, TOKEN, Moods, RealSilo, real_silo, register_elsewhere
+from real_silo import FAULTS, HOMES, TOKEN, Moods, RealSilo, real_silo, register_elsewhere
 
 from silo.api.client import SiloClient
 from silo.api.events import Connection, ConnectionState, EventListener, ServerEvent
@@ -509,6 +509,12 @@ def test_a_silo_without_documents_gets_each_file_where_it_can(tmp_path: Path) ->
 # -- one folder, two computers ---------------------------------------------------------------------
 
 
+def keep_homes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Undo at the end what :func:`register_elsewhere` changes in this process."""
+    for name in HOMES:
+        monkeypatch.setenv(name, "/nowhere")
+
+
 @pytest.mark.parametrize("moods", [Moods(), Moods(own_ids=False)], ids=["its own ids", "our ids"])
 @pytest.mark.parametrize("locks", [True, False], ids=["locks", "no locks"])
 def test_two_computers_register_one_folder_once(
@@ -525,7 +531,7 @@ def test_two_computers_register_one_folder_once(
         else:
             for folder in {path.parent for path in desk.top.parent.rglob("*.FCStd")}:
                 (folder / ".silo-register.lock").mkdir()
-            monkeypatch.setattr(os, "environ", dict(os.environ))
+            keep_homes(monkeypatch)
             assert [register_elsewhere(*job) for job in jobs] == [0, 0]
         assert (len(silo.items), set(silo.holds().values())) == (NAMES, {1})
         assert desk.register() == []
@@ -538,7 +544,7 @@ def test_what_one_computer_began_another_one_ends(
     tmp_path: Path, moods: Moods, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From any creation on no answer reaches the first computer: neither to that nor to what it asks then."""
-    monkeypatch.setattr(os, "environ", dict(os.environ))
+    keep_homes(monkeypatch)
     for number in range(NAMES):
         with real_silo(moods) as silo:
             folder = tmp_path / str(number)

@@ -678,6 +678,9 @@ def real_silo(moods: Moods | None = None) -> Iterator[RealSilo]:
         running.end()
 
 
+HOMES = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME")
+
+
 def register_elsewhere(top: str, url: str, home: str) -> int:
     """Register a project as another computer does, with data of its own; how many errors it reports."""
     from silo.api.client import SiloClient
@@ -685,7 +688,7 @@ def register_elsewhere(top: str, url: str, home: str) -> int:
     from silo.cli.common import read_assembly
     from silo.registering.on_disk import proposals_for, register_all
 
-    for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME"):
+    for name in HOMES:
         os.environ[name] = home
     extraction = read_assembly(top)
     retries = Retries(tries=2, sleep=lambda _s: None)
