@@ -31,10 +31,10 @@ from silo_server.services.bom.summary import (
     LONGEST_CHANGE,
     MOST_NAMED,
     Summary,
-    below,
     keep_all,
     keep_summaries,
     marks_of,
+    standing_alone,
     summaries,
     summary_of,
 )
@@ -153,7 +153,7 @@ def check_by_rows(tx: Tx, item: Any, told: Summary) -> None:
     graph = tree.load_graph(tx, item)
     parts = tree.parts_of(tx, graph)
     cost = tree.roll_up_cost(graph, parts)
-    mass = tree.roll_up_mass(graph, parts, below(tx, graph, parts).standing_alone)
+    mass = tree.roll_up_mass(graph, parts, standing_alone(tx, graph))
     flat = {row.line.child_part_number for row in tree.flatten(graph)}
     rows = list(tree.expand(graph, tree.MAX_DEPTH, 10**6))
     assert told.parts == len(flat)

@@ -18,9 +18,10 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Protocol
 
-from silo.bom.errors import InputError, listed
+from silo.bom.errors import InputError, counted, listed
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, walk_entries
 
@@ -89,6 +90,12 @@ def clean_name(text: str) -> str:
     return " ".join(printable.replace("_", " ").split())[:200]
 
 
+@cache
+def _unaccented(character: str) -> str:
+    # Asked once for each character: whole products are searched.
+    return "" if unicodedata.combining(character) else character
+
+
 def folded(text: str) -> str:
     """Return a text as searches compare it: without case and accents, and with one way to write a size.
 
@@ -96,8 +103,8 @@ def folded(text: str) -> str:
     """
     plain = text.casefold()
     if not plain.isascii():
-        parted = unicodedata.normalize("NFKD", plain)
-        plain = "".join(c for c in parted if not unicodedata.combining(c)).casefold().translate(_SIGNS)
+        plain = "".join(map(_unaccented, unicodedata.normalize("NFKD", plain)))
+        plain = plain.casefold().translate(_SIGNS)
     return _COMMA.sub(".", _TIMES.sub("x", plain))
 
 
@@ -555,10 +562,9 @@ def consolidation_message(entry: BomEntry) -> str:
     """The spec's console warning (§6), with the count of individual links."""
     who = entry.part_number or display_name(entry) or entry.object_name or entry.doc_path
     count = entry.individual_links
-    if count > 1:
-        what = f"{count} individual links"
-    elif count == 1:
-        what = "1 individual link beside a link array"
+    if count:
+        what = counted(count, "individual link")
+        what += " beside a link array" if count == 1 else ""
     else:
         what = f"{entry.link_objects} link arrays" if entry.link_objects > 1 else "several links"
     return f"{_HINT}{who} has {what}{_ADVICE}"

@@ -74,7 +74,7 @@ from silo_server.services.bom.merge import (
     remember_refusal,
 )
 from silo_server.services.bom.review import told_quantities
-from silo_server.services.bom.summary import below, summary_of
+from silo_server.services.bom.summary import standing_alone, summary_of
 from silo_server.services.bom.transfer import View
 from silo_server.services.items import get_by_numbers, get_item
 from silo_server.services.revisions import clean_name
@@ -255,7 +255,7 @@ def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
         parts = tree.parts_of(tx, graph)
-        mass = tree.roll_up_mass(graph, parts, below(tx, graph, parts).standing_alone)
+        mass = tree.roll_up_mass(graph, parts, standing_alone(tx, graph))
     return {
         "part_number": graph.root.part_number,
         "total_mass_kg": mass.total,

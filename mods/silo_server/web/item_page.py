@@ -33,10 +33,10 @@ from silo_server.services.bom.summary import (
     MOST_NAMED,
     Summary,
     Worth,
-    below,
     last_look,
     marks_of,
     own_worth,
+    standing_alone,
     summaries,
     summary_of,
 )
@@ -146,10 +146,10 @@ class Structure:
         the levels that are open, or the whole for a filter or the flat list.
     """
 
-    def __init__(self, tx: Tx, summary: Summary, graph: tree.Graph, page_rows: int = PAGE_ROWS) -> None:
+    def __init__(self, tx: Tx, graph: tree.Graph, look: Look, page_rows: int = PAGE_ROWS) -> None:
         self._tx = tx
-        self.summary = summary
         self.graph = graph
+        self.look = look
         self.page_rows = page_rows
         self._lines = dict(graph.lines)
         self._worths: dict[int, Worth] = {}
@@ -159,9 +159,16 @@ class Structure:
         """What a filter looks in, for all of the graph."""
         return tree.parts_of(self._tx, self.graph)
 
-    def sought(self, look: Look) -> Callable[[Line], bool]:
-        """Return the test of lines that the view's filter is; without one nothing is read for it."""
+    @cached_property
+    def fitting(self) -> Callable[[Line], bool]:
+        """The test of lines that the view's filter is; without a filter nothing is read for it."""
+        look = self.look
         return tree.sought(look.q, look.type, self.parts) if look.is_filtered else lambda _line: True
+
+    @cached_property
+    def leaves(self) -> Sequence[tree.FlatRow]:
+        """The flat list, unfiltered."""
+        return tree.flatten(self.graph)
 
     def lines_of(self, item_id: int) -> Sequence[Line]:
         """The lines of a BOM; a branch below the open levels is read when it is asked for."""
@@ -205,12 +212,13 @@ def usual_depth(counts: Sequence[int]) -> int:
     return max(1, sum(rows <= PAGE_ROWS for rows in accumulate(counts)))
 
 
-def tree_page(shown: Structure, look: Look, total: int) -> tuple[Page[Branch], Sequence[Branch]]:
+def tree_page(shown: Structure, total: int) -> tuple[Page[Branch], Sequence[Branch]]:
     """A page of the open rows, and the branches above its first one (none on the first page).
 
     TooLargeError where more is open than anybody can page through.
     """
-    rows = list(islice(_walk(shown, look), MOST_OPEN + 1))
+    look = shown.look
+    rows = list(islice(_walk(shown), MOST_OPEN + 1))
     if len(rows) > MOST_OPEN:
         raise TooLargeError(
             f"more than {MOST_OPEN} of the {total} rows of this tree are open; show fewer levels or take an "
@@ -226,9 +234,10 @@ def tree_page(shown: Structure, look: Look, total: int) -> tuple[Page[Branch], S
     return page, shown.dressed([(row, ()) for row in above[::-1]])
 
 
-def _walk(shown: Structure, look: Look) -> Iterator[Row]:
-    graph, filtered, flipped = shown.graph, look.is_filtered, set(look.flips)
-    hit = tree.leading_to(graph, shown.sought(look)) if filtered else lambda _line: True
+def _walk(shown: Structure) -> Iterator[Row]:
+    graph, look = shown.graph, shown.look
+    filtered, flipped = look.is_filtered, set(look.flips)
+    hit = tree.leading_to(graph, shown.fitting) if filtered else lambda _line: True
 
     @cache
     def lines_of(item_id: int) -> Sequence[Line]:
@@ -276,11 +285,11 @@ def _key(above: str, line: Line) -> str:
     return hashlib.blake2b(f"{above} {line.id}".encode(), digest_size=4).hexdigest()
 
 
-def flat_page(shown: Structure, look: Look) -> Page[Branch]:
+def flat_page(shown: Structure) -> Page[Branch]:
     """A page of the leaf parts, each with its total over the whole tree."""
-    fitting, rows = shown.sought(look), tree.flatten(shown.graph)
-    found = arranged([row for row in rows if fitting(row.line)], look.sort, _flat_keys(shown))
-    table = page_of(found, len(rows), look.page, shown.page_rows)
+    look = shown.look
+    found = arranged([row for row in shown.leaves if shown.fitting(row.line)], look.sort, _flat_keys(shown))
+    table = page_of(found, len(shown.leaves), look.page, shown.page_rows)
     here = shown.dressed(
         [
             (Row(row.line, 1, row.total * look.pieces, "", False), row.doubts(look.pieces))
@@ -408,15 +417,15 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
                 f"this product has {summary.lines} lines over all levels, and a page finds in, or adds up, "
                 f"at most {MOST_READ}; look at one of its sub-assemblies, or take an export"
             )
-        shown = Structure(tx, summary, tree.load_graph(tx, item, None if whole else depth), size)
+        shown = Structure(tx, tree.load_graph(tx, item, None if whole else depth), look, size)
         if look.is_filtered:
-            narrow = tree.narrowed(shown.graph, shown.sought(look), leaves=look.is_flat)
+            narrow = tree.narrowed(shown.graph, shown.fitting, shown.leaves if look.is_flat else None)
             values |= {"totals": Totals.narrow(tx, narrow, shown.parts)}
         if look.is_flat:
-            flat = flat_page(shown, look)
+            flat = flat_page(shown)
             supplied = any(row.part.properties.get("supplier") for row in flat.rows)
             return values | {"table": flat, "has_supplier": supplied}
-        table, above = tree_page(shown, look, sum(counts))
+        table, above = tree_page(shown, sum(counts))
         return values | {"table": table, "above": above}
     except (BusyError, ConflictError, TooLargeError) as error:
         return {**values, "problem": str(error)}
@@ -443,8 +452,8 @@ class Totals:
     @classmethod
     def narrow(cls, tx: Tx, graph: tree.Graph, parts: Mapping[int, Part]) -> Totals:
         """Return those of what a filter has found."""
-        cost, mass = tree.roll_up_cost(graph, parts), below(tx, graph, parts)
-        weighed = tree.roll_up_mass(graph, parts, mass.standing_alone)
+        cost = tree.roll_up_cost(graph, parts)
+        weighed = tree.roll_up_mass(graph, parts, standing_alone(tx, graph))
         return cls(
             weighed.total or None,
             cost.totals,

@@ -48,7 +48,7 @@ from silo_server.db.tables import (
 from silo_server.db.tables import events as event_log
 from silo_server.services.bom.lines import newer_exists, select_lines, to_line
 from silo_server.services.bom.merge import NEVER, last_syncs
-from silo_server.services.bom.tree import MAX_DEPTH, Graph, Part, conflicts_in, currency_of, positive_number
+from silo_server.services.bom.tree import MAX_DEPTH, Graph, conflicts_in, currency_of, positive_number
 from silo_server.settings import stamp
 from silo_server.values import Item, Line, dumps, names_of
 
@@ -222,23 +222,10 @@ def marks_of(tx: Tx, listed: Iterable[Item]) -> dict[int, list[str]]:
     return {one: summary.inside(one, is_open=False) for one, summary in found.items()}
 
 
-class Below(NamedTuple):
-    """The summaries of the assemblies of a graph, and what each item in it is worth, by internal id."""
-
-    of: Mapping[int, Summary]
-    worths: Mapping[int, Worth]
-
-    @property
-    def standing_alone(self) -> set[int]:
-        """The assemblies that state a mass for parts without one."""
-        return {one for one, summary in self.of.items() if summary.stands_alone}
-
-
-def below(tx: Tx, graph: Graph, parts: Mapping[int, Part]) -> Below:
-    """Return what is known of all that is in a graph."""
+def standing_alone(tx: Tx, graph: Graph) -> set[int]:
+    """Return the assemblies in a graph that state a mass for parts without a mass, by internal id."""
     found = summaries(tx, graph.lines.keys() - {graph.root.id})
-    own = {one: own_worth(part.properties) for one, part in parts.items() if one not in found}
-    return Below(found, own | {one: summary.as_part for one, summary in found.items()})
+    return {one for one, summary in found.items() if summary.stands_alone}
 
 
 def _kept(tx: Tx, item_ids: Collection[int]) -> Iterator[tuple[int, Summary]]:

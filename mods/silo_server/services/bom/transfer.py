@@ -61,7 +61,7 @@ from silo_server.services.bom.lines import (
 )
 from silo_server.services.bom.merge import in_sentences, last_syncs
 from silo_server.services.bom.review import check_state, edited_state
-from silo_server.services.bom.summary import OpenBom, Worth, own_worth, summaries, summary_of
+from silo_server.services.bom.summary import OpenBom, Summary, Worth, own_worth, summaries, summary_of
 from silo_server.services.bom.tree import (
     MAX_DEPTH,
     Exact,
@@ -157,10 +157,14 @@ def export(
     root = get_item(tx, part_number, include_archived=bool(release))
     of = get_release(tx, root, release) if release else None
     frozen = frozen_product(tx, root, of) if of else None
-    graph = frozen.graph if frozen else load_graph(tx, root, bare=True)
-    root, still = graph.root, frozen.open if frozen else summary_of(tx, root).open
-    summed = {} if frozen else summaries(tx, graph.lines.keys() - {root.id})
     filtered = bool(words or item_type)
+    levels = 1 if view is View.SINGLE and not filtered else None  # a filter shows what leads to its parts
+    graph = frozen.graph if frozen else load_graph(tx, root, levels, bare=True)
+    root, still = graph.root, frozen.open if frozen else summary_of(tx, root).open
+    summed: Mapping[int, Summary] = {}
+    if not frozen:
+        below = [line.child_id for line in graph.lines.get(root.id, ())] if levels else graph.lines
+        summed = summaries(tx, {*below} - {root.id})
     # What a sync left out has no number, supplier or type: a filter finds none of it.
     gaps = [] if filtered or of else _gap_rows(tx, root, still, view)
     fitting: Callable[[Line], bool] = lambda _line: True  # noqa: E731 - as what a filter gives

@@ -222,15 +222,16 @@ def leading_to(graph: Graph, fitting: Callable[[Line], bool]) -> Callable[[Line]
     return hit
 
 
-def narrowed(graph: Graph, fitting: Callable[[Line], bool], *, leaves: bool) -> Graph:
+def narrowed(graph: Graph, fitting: Callable[[Line], bool], leaves: Sequence[FlatRow] | None) -> Graph:
     """Return the graph for the totals of what fits: each part once, with all that one root needs of it.
 
     leaves
-        of the parts of the flat list; else of what fits first on each way down, with all that is in it.
+        the flat list, if only its parts count; else what fits first on each way down, with all that is in it.
     """
-    below = (line for lines in graph.lines.values() for line in lines)
-    whole = () if leaves else {line.child_id for line in below if fitting(line)}
-    rows = [row for row in flatten(graph, whole) if fitting(row.line)]
+    if leaves is None:
+        below = (line for lines in graph.lines.values() for line in lines)
+        leaves = flatten(graph, {line.child_id for line in below if fitting(line)})
+    rows = [row for row in leaves if fitting(row.line)]
     lines = [row.line._replace(state=replace(row.line.state, quantity=float(row.total))) for row in rows]
     return Graph(graph.root, {**graph.lines, graph.root.id: lines})
 
