@@ -21,6 +21,8 @@ LINE = ("PUT", "line")
 ITEM = ("POST", "items")
 CHANGE = ("PUT", "item")
 MERGE = ("POST", "merge")
+RESTORE = ("POST", "restore")
+RELEASE = ("POST", "releases")
 ROWS: list[tuple[tuple[str, str], dict[str, Any], bool]] = [
     (ITEM, {"category": "F01"}, True),
     (ITEM, {"category": "F01", "part_number": "", "id": None, "item_type": None}, True),
@@ -38,6 +40,12 @@ ROWS: list[tuple[tuple[str, str], dict[str, Any], bool]] = [
     (ITEM, {"part_number": " ſEARCH\t"}, False),
     (ITEM, {"part_number": "\t\n ."}, False),
     (ITEM, {"part_number": "a\u0085b"}, False),
+    (ITEM, {"part_number": "\n\fa"}, False),
+    (ITEM, {"part_number": "a\x1f"}, False),
+    (RESTORE, {"change_id": 0, "with_archived": 0}, False),
+    (RESTORE, {"change_id": 0, "with_archived": False}, True),
+    (RELEASE, {"with_parts": "no"}, False),
+    (RELEASE, {"with_parts": 0}, False),
     (ITEM, {"part_number": "N" * 65}, False),
     (ITEM, {"category": "F01", "properties": DEEP}, True),
     (ITEM, {"category": "F01", "properties": {NUL: 1}}, False),
@@ -103,6 +111,8 @@ BODIES = {
     "users": "NewUserBody",
     "user": "UserChangeBody",
     "tokens": "TokenBody",
+    "restore": "RestoreBody",
+    "releases": "SubmitBody",
 }
 
 
@@ -139,6 +149,8 @@ def test_a_body_is_accepted_exactly_where_the_document_calls_it_valid(api: Api, 
             "users": "/api/users",
             "user": "/api/users/another",
             "tokens": "/api/auth/tokens",
+            "restore": bom(parent, "restore"),
+            "releases": f"/api/items/{parent}/releases",
         }[what]
         said = readers[what].is_valid(body)
         if what == "users":
@@ -174,6 +186,33 @@ def test_a_point_to_compare_is_what_the_document_says(
     schema = next(p["schema"] for p in operation["parameters"] if p["name"] == "to")
     assert reader(document, schema).is_valid(point.replace("%2B", "+")) is valid
     assert api.call("GET", f"{bom(parent, 'compare')}?to={point}").status == (200 if valid else 400)
+
+
+@pytest.mark.parametrize("form", ["", ".csv", ".xlsx"], ids=["json", "csv", "xlsx"])
+@pytest.mark.parametrize(
+    ("moment", "valid"),
+    [
+        ("2026-02-08", True),
+        ("2026-02-08T22:15:00%2B01:00", True),
+        ("r1", True),
+        ("2026-02-30", False),
+        ("2026-02-08T22:15:00", False),
+        ("0", False),
+        ("r", False),
+        ("r-1", False),
+    ],
+)
+def test_a_moment_of_what_changed_is_what_the_document_says(
+    api: Api, document: Any, form: str, moment: str, valid: bool
+) -> None:
+    """A date, a time with its zone, or a revision, which the item may not have."""
+    operation = document["paths"][f"/api/items/{{part_number}}/bom/changes{form}"]["get"]
+    path = f"{bom(api.item(), 'changes')}{form}"
+    for name, query in (("from", f"from={moment}"), ("to", f"from=2026-01-01&to={moment}")):
+        schema = next(p["schema"] for p in operation["parameters"] if p["name"] == name)
+        assert reader(document, schema).is_valid(moment.replace("%2B", "+")) is valid
+        status = api.call("GET", f"{path}?{query}").status
+        assert status in ((200, 404) if valid else (400,))
 
 
 def test_an_operation_that_refuses_what_has_the_right_form_says_why(api: Api, document: Any) -> None:

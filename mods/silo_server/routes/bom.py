@@ -15,7 +15,7 @@ from typing import IO, Annotated, Any, cast
 import anyio.to_thread
 import pydantic_core
 from fastapi import APIRouter, Depends, Path, Query, Request
-from pydantic import Field, WithJsonSchema
+from pydantic import Field, StrictBool, WithJsonSchema
 from starlette.datastructures import UploadFile
 from starlette.responses import Response, StreamingResponse
 
@@ -433,7 +433,7 @@ class RestoreBody(Body):
 
     change_id: models.ChangeIdOrNone
     reason: Text | None = None
-    with_archived: bool = False
+    with_archived: StrictBool = False
 
 
 class UndoBody(Body):
@@ -703,8 +703,9 @@ def export_json(call: Viewer, part_number: str, wanted: As) -> Response:
     return _exported(call, part_number, wanted, transfer.to_json, "application/json", "json")
 
 
-Moment = Annotated[str, Query(max_length=40)]
-Since = Annotated[str, Query(alias="from", min_length=1, max_length=40)]
+_NOW: context.Schema = {"type": "string", "maxLength": 0}
+Moment = Annotated[str, Query(max_length=40), WithJsonSchema({"anyOf": [context.MOMENT, _NOW]})]
+Since = Annotated[str, Query(alias="from", min_length=1, max_length=40), WithJsonSchema(context.MOMENT)]
 
 
 @transfer_router.get("/changes", responses=READ_ERRORS)

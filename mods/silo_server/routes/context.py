@@ -245,6 +245,7 @@ PageFrom = Annotated[int | None, Query(ge=0, le=2**62)]
 
 Schema = dict[str, Any]
 ALLOWED = f"^[^{REFUSED_CHARACTERS}]*$"
+_BLANK = rf"[^\S{REFUSED_CHARACTERS}]"
 NOTHING: Schema = {"type": "null"}
 REFUSED = "x-valid-but-refused"
 
@@ -265,7 +266,7 @@ def part_number(*, or_empty: bool = False) -> Schema:
     return {
         "type": "string",
         "maxLength": 200,
-        "pattern": f"^(\\s*{NUMBER_FORM.pattern}\\s*){optional}$",
+        "pattern": f"^({_BLANK}*{NUMBER_FORM.pattern}{_BLANK}*){optional}$",
         "not": {"pattern": f"^\\s*(\\.|\\.\\.|{'|'.join(map(_in_any_case, sorted(RESERVED)))})\\s*$"},
         "description": "1 to 64 characters, none of / \\ ? # % and no control characters; unique in any case",
     }
@@ -305,6 +306,14 @@ NUMBER_OR_CATEGORY: Schema = {
 }
 
 _TIME = "T([01][0-9]|2[0-3]):[0-5][0-9]:[0-5][0-9](\\.[0-9]{1,6})?(Z|[+-](0[0-9]|1[0-4]):[0-5][0-9])"
+_DATE = "[1-9][0-9]{3}-[0-9]{2}-[0-9]{2}"
+_AT: Schema = {
+    "type": "string",
+    "maxLength": 40,
+    "format": "date-time",
+    "pattern": f"^{_DATE}{_TIME}$",
+    "description": "a time with its zone (ISO 8601)",
+}
 POINT: Schema = {
     "anyOf": [
         {"type": "string", "enum": ["now"]},
@@ -313,13 +322,14 @@ POINT: Schema = {
             "pattern": "^[0-9]{1,18}$",
             "description": "the id of a change, 0 = no lines",
         },
-        {
-            "type": "string",
-            "maxLength": 40,
-            "format": "date-time",
-            "pattern": f"^[1-9][0-9]{{3}}-[0-9]{{2}}-[0-9]{{2}}{_TIME}$",
-            "description": "a time with its zone (ISO 8601)",
-        },
+        _AT,
+    ]
+}
+MOMENT: Schema = {
+    "anyOf": [
+        _AT,
+        {"type": "string", "format": "date", "pattern": f"^{_DATE}$"},
+        {"type": "string", "pattern": "^r[0-9]{1,9}$", "description": "a revision of the item"},
     ]
 }
 

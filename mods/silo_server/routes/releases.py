@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter
-from pydantic import Field, WithJsonSchema
+from pydantic import Field, StrictBool, WithJsonSchema
 from starlette.responses import Response
 
 from silo.api import wire
@@ -29,7 +29,7 @@ class SubmitBody(Body):
     label: Annotated[
         str, WithJsonSchema({"type": "string", "pattern": f"^({wire.RELEASE_LABEL})?$", "default": ""})
     ] = ""
-    with_parts: bool = False
+    with_parts: StrictBool = False
 
 
 class ApproveBody(Body):
