@@ -180,7 +180,9 @@ def test_answers_have_no_finding(
 
     page.goto(f"/items/{numbers['parent']}/import")
     text = f"Part number,Quantity\n{numbers['child']},9\nNO-SUCH,1\n".encode()
-    page.get_by_label("CSV file").set_input_files({"name": "x.csv", "mimeType": "text/csv", "buffer": text})
+    page.get_by_label("CSV file or workbook").set_input_files(
+        {"name": "x.csv", "mimeType": "text/csv", "buffer": text}
+    )
     page.get_by_role("button", name="Check the file").click()
     page.locator("#checked").wait_for()
     look("import")
@@ -271,7 +273,7 @@ def test_pages_of_an_edit_have_no_finding(
     look("not sent yet")
     page.goto(f"/items/{parent}/import")
     file = {"name": "x.csv", "mimeType": "text/csv", "buffer": b"a;b\n1;2\n"}
-    page.get_by_label("CSV file").set_input_files([file])  # type: ignore[list-item]
+    page.get_by_label("CSV file or workbook").set_input_files([file])  # type: ignore[list-item]
     page.get_by_role("button", name="Check the file").click()
     page.get_by_role("button", name="Check again").wait_for()
     look("columns")

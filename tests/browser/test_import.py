@@ -15,7 +15,7 @@ Visit = Callable[..., Page]
 def check(page: Page, text: str) -> None:
     """Choose a file with this text and have it checked."""
     file = {"name": "bom.csv", "mimeType": "text/csv", "buffer": text.encode()}
-    page.get_by_label("CSV file").set_input_files([file])  # type: ignore[list-item]
+    page.get_by_label("CSV file or workbook").set_input_files([file])  # type: ignore[list-item]
     page.get_by_role("button", name="Check the file").click()
     expect(page.locator("#checked, [role=alert]")).to_be_visible()
 

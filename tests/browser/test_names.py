@@ -106,7 +106,7 @@ def test_a_notice_and_a_problem_do_not_turn(api: Api, visit: Visit, names: dict[
     page.goto(f"/items/{names['top']}/import")
     text = f"Part number,Quantity\n{names['part']},9\nMARK\u202e,1\n".encode()
     file = {"name": f"{TURNED}{LONG}.csv", "mimeType": "text/csv", "buffer": text}
-    page.get_by_label("CSV file").set_input_files([file])  # type: ignore[list-item]
+    page.get_by_label("CSV file or workbook").set_input_files([file])  # type: ignore[list-item]
     page.get_by_role("button", name="Check the file").click()
     page.locator("#checked").wait_for()
     assert measured(page, LOOSE) == []

@@ -282,7 +282,7 @@ def test_import_of_an_old_check_is_checked_again(machine: dict[str, str], api: A
 def check(page: Page, text: str) -> None:
     """Choose a file with this text and have it checked."""
     file = {"name": "bom.csv", "mimeType": "text/csv", "buffer": text.encode()}
-    page.get_by_label("CSV file").set_input_files([file])  # type: ignore[list-item]
+    page.get_by_label("CSV file or workbook").set_input_files([file])  # type: ignore[list-item]
     page.get_by_role("button", name="Check the file").click()
     page.locator("#checked").wait_for()
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Callable
+from typing import Any
 
 import pytest
-from openpyxl import load_workbook
+from openpyxl import Workbook, load_workbook
+from openpyxl.styles import Font
 from server_testing import Api, bom, form_body
 
 EVIL = ['=HYPERLINK("http://x")', "+1+1", "-2", "@SUM(A1)", "\t=1", "＝1"]
@@ -227,13 +230,82 @@ def test_files_of_other_spreadsheets(api: Api, encoding: str) -> None:
         (b"a,b\r\n1,2", "Part number"),
         (b'Part number,Quantity\r\n"broken', "does not read as such"),
         (b"\xff\xfe\x00", "Part number"),
-        (b"PK\x03\x04" + bytes(60), "save the sheet as CSV"),  # our own XLSX, for one
+        (b"PK\x03\x04" + bytes(60), "the workbook cannot be read"),
+        (b"\xd0\xcf\x11\xe0" + bytes(60), "the workbook cannot be read"),
     ],
 )
 def test_what_is_no_bom_is_refused(api: Api, data: bytes, words: str) -> None:
     """400, whatever it is, with what is wanted."""
     parent = api.item()
     assert words in api.bad(400, "POST", bom(parent, "import"), body=data)["message"]
+
+
+def workbook(*sheets: tuple[str, list[list[Any]]]) -> tuple[Workbook, Callable[[], bytes]]:
+    """A workbook with these sheets, and what packs it."""
+    book = Workbook()
+    book.remove(book.active)
+    for name, rows in sheets:
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+
+    def pack() -> bytes:
+        out = io.BytesIO()
+        book.save(out)
+        return out.getvalue()
+
+    return book, pack
+
+
+def test_a_workbook_is_imported_as_its_sheet_says(api: Api) -> None:
+    """A title, an empty line, numbers as numbers, a sheet before it; problems name the sheet's lines."""
+    parent, a, b = api.items(3)
+    rows = [
+        ["Stückliste"],
+        [],
+        ["Teilenummer", "Menge", "Bemerkung"],
+        [a, 1.5, "für später"],
+        [b, 1000, None],
+    ]
+    _, pack = workbook(("Cover", [["Project", "X"]]), ("BOM", rows))
+    api.good("POST", bom(parent, "import"), body=pack())
+    assert api.quantities(parent) == {a: 1.5, b: 1000}
+    assert api.lines(parent)[a]["notes"] == "für später"
+    _, pack = workbook(("BOM", [*rows, ["NONE-1", 1], [b, "=A1*2"]]))
+    error = api.bad(400, "POST", bom(parent, "import"), body=pack())
+    assert [problem.partition(":")[0] for problem in error["problems"]] == ["row 6", "row 7"]
+
+
+def test_our_own_workbook_changes_nothing(api: Api) -> None:
+    """What was exported as XLSX is as it is in Silo, whatever its notes begin with."""
+    parent, a, b = api.items(3)
+    api.merge(parent, {a: 2})
+    api.good("POST", bom(parent), {"child_part_number": b, "quantity": 0.125, "notes": "=1+1", "unit": "m"})
+    before = api.lines(parent)
+    sent = api.call("GET", bom(parent, "export.xlsx")).body
+    plan = api.good("POST", f"{bom(parent, 'import')}?dry_run=true", body=sent)
+    assert {row["status"] for row in plan["rows"]} == {"same"}
+    assert api.lines(parent) == before
+
+
+@pytest.mark.parametrize(
+    ("hide", "words"),
+    [
+        (lambda book: setattr(book["BOM"].row_dimensions[3], "hidden", True), "these lines are hidden: 3"),
+        (lambda book: setattr(book["BOM"]["B3"], "font", Font(strike=True)), "lines are struck out: 3"),
+        (lambda book: book.copy_worksheet(book["BOM"]), "the sheets “BOM”, “BOM Copy” each hold a BOM"),
+    ],
+    ids=["hidden", "struck out", "two"],
+)
+def test_what_a_person_does_not_see_in_a_workbook_is_not_imported(
+    api: Api, hide: Callable[[Workbook], object], words: str
+) -> None:
+    """Refused by its line, before anything is written."""
+    parent, a, b = api.items(3)
+    book, pack = workbook(("BOM", [["PN", "Qty"], [a, 1], [b, 2]]))
+    hide(book)
+    assert words in api.bad(400, "POST", bom(parent, "import"), body=pack())["message"]
+    assert api.lines(parent) == {}
 
 
 @pytest.mark.parametrize(

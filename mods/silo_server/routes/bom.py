@@ -640,13 +640,14 @@ def _content(media_type: str) -> dict[int | str, dict[str, Any]]:
 
 IMPORT_BODY = {
     **context.refused(
-        "what is no CSV with a header row (part number, quantity), and rows that name unknown parts or "
+        "what is no table with a header row (part number, quantity), and rows that name unknown parts or "
         "unusable values; without dry_run a wrong row refuses the whole file"
     ),
     "requestBody": {
         "required": True,
         "content": {
             "text/csv": {"schema": {"type": "string"}},
+            XLSX: {"schema": {"type": "string", "format": "binary"}},
             "multipart/form-data": {
                 "schema": {
                     "type": "object",
@@ -745,7 +746,7 @@ def changes_xlsx(call: Viewer, part_number: str, since: Since, to: Moment = "") 
 async def import_csv(
     call: Editor, part_number: str, expected: ExpectedVersion, dry_run: Annotated[bool, Query()] = False
 ) -> Response:
-    """Import a CSV (as the body, or as the form part ``file``).
+    """Import a CSV or a workbook: XLSX, ODS, XLS (as the body, or as the form part ``file``).
 
     ``dry_run`` says row by row what would happen; without it everything is imported, or, where a row is
     wrong, nothing (400 with all problems). ``Idempotency-Key`` makes a repeat give the first answer.
@@ -753,7 +754,7 @@ async def import_csv(
     data, name = await _uploaded(call.request)
 
     def work() -> Response:
-        records = transfer.read_csv(data, call.server.settings.max_merge_entries)
+        records = transfer.read_csv(transfer.as_csv(data), call.server.settings.max_merge_entries)
         if dry_run:
             with call.read() as tx:
                 return json_answer(plan_to_wire(transfer.plan_import(tx, part_number, records), dry_run))
@@ -797,7 +798,7 @@ async def _uploaded(request: Request) -> tuple[bytes, str | None]:
     async with request.form(max_files=1, max_fields=20) as form:
         file = form.get("file")
         if not isinstance(file, UploadFile):
-            raise RejectedError("file: wanted a multipart form with the CSV in a part named 'file'")
+            raise RejectedError("file: wanted a multipart form with the table in a part named 'file'")
         return await file.read(), clean_name(file.filename or "")
 
 

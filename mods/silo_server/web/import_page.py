@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Import of a BOM from CSV: first every row with what would become of it, then, on a click, all of it.
+"""Import of a BOM from a table: first every row with what would become of it, then, on a click, all of it.
 
 Between the two the file travels in the form, packed, so that nothing waits on the server and any of its
 processes can continue.
@@ -41,7 +41,7 @@ MOST_ROWS = 1000
 
 @dataclass(frozen=True)
 class Upload:
-    """A CSV and what it is called."""
+    """A table as CSV, and the name of its file."""
 
     name: str
     data: bytes
@@ -180,9 +180,10 @@ def _uploaded(form: FormData) -> Upload:
     if not isinstance(file, UploadFile) or not file.filename:
         raise RejectedError("No file was chosen.")
     data = file.file.read(MOST_BYTES + 1)
+    if len(data) <= MOST_BYTES:
+        data = transfer.as_csv(data)
     if len(data) > MOST_BYTES:
         raise TooLargeError(f"The file is larger than {MOST_BYTES // 2**20} MiB; this cannot be a BOM.")
-    transfer.refuse_workbook(data)
     return Upload(clean_name(file.filename), data)
 
 

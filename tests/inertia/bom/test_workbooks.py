@@ -16,7 +16,7 @@ from sheet_corpus import read_corpus
 
 from silo.bom.errors import InputError
 from silo.inertia.bom import BomCode, BOMParser
-from silo.inertia.bom.workbook import read_workbook
+from silo.workbook import read_workbook
 
 openpyxl = pytest.importorskip("openpyxl")
 from openpyxl.styles import Font  # noqa: E402 - needs openpyxl

@@ -27,7 +27,7 @@ from silo.inertia.bom.table import (
     read_mass_header,
     unit_factor,
 )
-from silo.inertia.bom.workbook import Row
+from silo.workbook import Row
 
 _TOTAL_TOLERANCE = 1e-3
 """Relative, beside the rounding of both columns: how far a total may be from quantity times mass."""

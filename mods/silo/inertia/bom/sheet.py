@@ -19,7 +19,7 @@ from itertools import islice, zip_longest
 from silo.bom.errors import InputError, counted, listed
 from silo.bom.headers import Role, alias, normal, plain_cell
 from silo.inertia.bom.table import MassHeader, read_mass_header
-from silo.inertia.bom.workbook import STARTS, Grid, Row, read_workbook
+from silo.workbook import STARTS, Grid, Row, read_workbook
 
 MAX_BYTES = 64 * 1024 * 1024
 HEADER_WITHIN = 40

@@ -31,7 +31,8 @@ from typing import IO, Any, NamedTuple
 
 from sqlalchemy import select
 
-from silo.bom.errors import RejectedError
+from silo import workbook
+from silo.bom.errors import InputError, RejectedError, listed
 from silo.bom.headers import (
     Role,
     designators,
@@ -439,7 +440,6 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None) -> list[R
 
     Needs no database: to be called before a transaction begins, which others would wait for.
     """
-    refuse_workbook(data)
     text = _decode(data)
     chosen, layout = layout is not None, layout or guess(text)
     missing = [role for role in NEEDED if role not in layout.columns]
@@ -467,12 +467,45 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None) -> list[R
     return _with_exact_quantities(records, layout)
 
 
-def refuse_workbook(data: bytes) -> None:
-    """RejectedError for XLSX and other ZIP archives, which people take for a CSV as well."""
-    if data.startswith(b"PK\x03\x04"):
-        raise RejectedError(
-            "file: wanted CSV, got a workbook such as XLSX, or another ZIP archive; save the sheet as CSV"
-        )
+def as_csv(data: bytes) -> bytes:
+    """Return a table as CSV: of a workbook (XLSX, ODS, XLS) the one sheet that holds a BOM, else its first.
+
+    RejectedError where several do, or where a person does not see in the workbook what would be read: lines
+    that are hidden or struck out.
+    """
+    if not data.startswith(workbook.STARTS):
+        return data
+    try:
+        sheets = [(grid, _sheet_text(grid)) for grid in workbook.read_workbook(data, "file")]
+    except InputError as error:
+        raise RejectedError(str(error)) from None
+    known = [one for one in sheets if guess_of(one[1])]
+    if known[1:]:
+        names = listed([f"“{grid.name}”" for grid, _ in known])
+        raise RejectedError(f"file: the sheets {names} each hold a BOM; save the one that is meant by itself")
+    if not sheets:
+        raise RejectedError("file: wanted a workbook with a table, got one without a sheet")
+    grid, text = (known or sheets)[0]
+    hidden = {row for row, _ in grid.cells} & grid.hidden_rows
+    struck = {row for (row, _), cell in grid.cells.items() if cell.struck}
+    for rows, what in ((hidden, "hidden"), (struck, "struck out")):
+        if rows:
+            lines = listed([str(row + 1) for row in sorted(rows)], 8)
+            raise RejectedError(
+                f"file: of sheet “{grid.name}” these lines are {what}: {lines}; show or delete them, for an "
+                "import would take them like all others"
+            )
+    return text
+
+
+def _sheet_text(grid: workbook.Grid) -> bytes:
+    out = io.StringIO()
+    writer, line = csv.writer(out), 1
+    for row in grid.rows():
+        out.write("\n" * (row.line - line))  # lines keep their numbers
+        writer.writerow(row.cells)
+        line = row.line + 1
+    return out.getvalue().encode()
 
 
 def first_lines(data: bytes, delimiter: str, count: int = 8) -> list[list[str]]:

@@ -111,9 +111,7 @@ def read_workbook(data: bytes, source: str) -> list[Grid]:
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     except ImportError as error:
-        raise InputError(
-            f"{source}: this is a workbook; export it as CSV, or install silo-mod[inertia]"
-        ) from error
+        raise InputError(f"{source}: this is a workbook; export it as CSV, or install xlrd") from error
     except Exception as error:  # whatever a broken file leads a reader to
         raise InputError(
             f"{source}: the workbook cannot be read ({error or type(error).__name__})"
