@@ -5,7 +5,7 @@
     python benchmarks/inertia_scale.py --entities 2000000 [--repeats 1]
 
 Writes an assembly of 20 parts (plates with holes, grooved rings, rounded blocks) placed N times, flat in the
-top assembly, or with ``--nested`` in 20 sub-assemblies. Goal: 10 000 in 3 s of wall time on two
+top assembly, or with ``--nested`` in 20 sub-assemblies. Goal: 10 000 in 3.3 s of wall time on two
 idle processors, and 350 MB.
 
 whole     `silo-mod`'s own way: child process with its limits, mesh cross-check, report; no cache. CPU and

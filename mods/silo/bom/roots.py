@@ -328,6 +328,20 @@ def beside(top: Any, fates: Mapping[str, Role | None]) -> list[Any]:
     ]
 
 
+def seen_beside(top: Any, reader: Reader) -> list[Any]:
+    """What FreeCAD shows of the document of ``top``, but no part of it: geometry too, which holds no
+    component."""
+    lying = _Lying(survey_of(top.Document))
+    mine = {object_name(top), *(object_name(obj) for obj, _ in lying.around(object_name(top)))}
+    loose = [
+        obj
+        for obj in (*lying.loose(_LOOSE | {Kind.CONTAINER}), *_loose_bodies(lying))
+        if lying.is_visible(obj)
+    ]
+    roles = _roles_beside(top, reader, lying, loose, {})
+    return [obj for obj, role in roles if role is Role.LOOSE and object_name(obj) not in mine]
+
+
 def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, Role | None]:
     """The role of each object with a shape, a link or a fastener's properties, for the assembly ``top``.
 

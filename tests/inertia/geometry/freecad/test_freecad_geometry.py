@@ -292,6 +292,28 @@ def test_suppressed_excluded_and_meshes_are_reported(body: Any, tmp_path: Path, 
     assert [p.code for p in assembly.problems] == ["not_counted"] * 3
 
 
+@pytest.mark.parametrize("hidden", [False, True], ids=["visible", "hidden"])
+@pytest.mark.parametrize("loose", ["a body", "a link", "a part"])
+def test_what_lies_beside_the_assembly_is_reported(
+    loose: str, hidden: bool, body: Any, tmp_path: Path, read_in: Any
+) -> None:
+    """The mass is that of the assembly alone; the visible objects that are not in it are named."""
+    body(Doc("bolt")).save(tmp_path / "bolt.FCStd")
+    doc = body(Doc("top"), "Kept")
+    more = {"Visibility": not hidden}
+    if loose == "a body":
+        body(doc, "Loose", **more)
+    elif loose == "a link":
+        doc.link("Loose", "bolt.FCStd", "Box", **more)
+    else:
+        body(doc, "Inner", **more).add("App::Part", "Loose", Group=locals_("Inner"), **more)
+    doc.add("Assembly::AssemblyObject", "Top", Group=locals_("Kept"))
+    assembly = read_in(assembly_of(tmp_path, doc))
+    assert [i.name for i in assembly.instances] == ["Kept"]
+    told = [(problem.code, "“Loose”" in problem.message) for problem in assembly.problems]
+    assert told == ([] if hidden else [("not_counted", True)])
+
+
 @pytest.fixture(name="screw")
 def _screw(box: Any, tmp_path: Path) -> Any:
     """``screw(doc, name, length, **values)``: a fastener whose shape is a box of that length."""

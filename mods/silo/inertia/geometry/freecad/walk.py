@@ -29,7 +29,7 @@ from silo.bom.errors import DocumentError, InputError, listed
 from silo.bom.findings import FindingCode
 from silo.bom.model import BomEntry
 from silo.bom.resolve import display_name
-from silo.bom.roots import choose_assembly, silent_reader
+from silo.bom.roots import choose_assembly, seen_beside, silent_reader
 from silo.bom.walk.kinds import (
     REPEATERS,
     Kind,
@@ -219,6 +219,16 @@ class Walk:
             raise DocumentError(document.FileName, str(error)) from error
         if getattr(top, "is_document_root", False) and (contents := self._reader.contents(top)).is_part:
             top = contents.own[0].target
+        if found is None and not getattr(top, "is_document_root", False):
+            counted = {object_name(count.shown.obj) for count in self._reader.contents(top).counts}
+            names = [
+                f"“{label_of(one)}”"
+                for one in seen_beside(top, self._reader)
+                if object_name(one) not in counted and (self.hardware or kind_of(one) is not Kind.STANDARD)
+            ]
+            if names:
+                words = f"{listed(names, 4)}: beside “{label_of(top)}” in the document, and in no mass"
+                self._note("not_counted", words)
         return self.product(top)
 
     def product(self, obj: Any, copies: Any = None) -> str:
