@@ -11,10 +11,26 @@ else:
 
     if not hasattr(silo, "FREECAD_PACKAGES"):
         place = silo.__file__ or list(silo.__path__)
-        FreeCAD.Console.PrintError(
+        text = (
             f"Silo does not start: another package named silo was loaded before, from {place}. "
-            "Remove it, or the add-on that brings it, then start FreeCAD again.\n"
+            "Remove it, or the add-on that brings it, then start FreeCAD again."
         )
+        FreeCAD.Console.PrintError(text + "\n")
+        # In the pane's place, since the report view is often hidden. Nothing of ours can be imported here.
+        import FreeCADGui
+        from PySide import QtCore, QtGui
+
+        try:
+            from PySide import QtWidgets
+        except ImportError:
+            QtWidgets = QtGui
+        pane = QtWidgets.QDockWidget("Database Activity", FreeCADGui.getMainWindow())
+        pane.setObjectName("Database Activity")
+        words = QtWidgets.QLabel(text)
+        words.setTextFormat(QtCore.Qt.TextFormat.PlainText)
+        words.setWordWrap(True)
+        pane.setWidget(words)
+        FreeCADGui.getMainWindow().addDockWidget(QtCore.Qt.DockWidgetArea.RightDockWidgetArea, pane)
     else:
         from silo.workbench.start import start
 

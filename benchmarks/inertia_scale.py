@@ -11,7 +11,7 @@ idle processors, and 350 MB.
 whole     `silo-mod`'s own way: child process with its limits, mesh cross-check, report; no cache. CPU and
           memory are those of parent and child; the memory is the larger one's peak.
 cached    the same again, from the cache
-entities  instead: a file of so many entities (2 million are 127 MB), where no part is like another, on one
+entities  instead: a file of so many entities (2 million are 104 MB), where no part is like another, on one
           core and on all; goal: 300 s and 1.5 GB on one core
 stage     the inertia stage alone against the usual way (inertia_step.py), at ``--usual`` instances
 """
@@ -38,7 +38,7 @@ WHOLE = """
 import json, resource, sys, time
 from pathlib import Path
 begin = time.perf_counter()
-from silo.inertia.bom import BOMParser
+from silo.inertia.bom.parser import BOMParser
 from silo.inertia.calculator import Task, calculate, read_geometry
 from silo.inertia.geometry import ReadOptions
 from silo.inertia.materials import load_materials

@@ -35,11 +35,11 @@ OURS = """
 import json, resource, sys, time
 from pathlib import Path
 import numpy as np
-from silo.inertia.core import combine_arrays, place
-from silo.inertia.geometry.kernel import occt
+from silo.inertia.model import combine_arrays, place
+from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.graph import ReadOptions
 from silo.inertia.geometry.helpers import Helpers
-from silo.inertia.geometry.step.read import read_step
+from silo.inertia.geometry.step import read_step
 from silo.inertia.geometry.read import without
 without("scipy", "networkx")
 import trimesh.triangles
@@ -69,7 +69,7 @@ from OCP.GProp import GProp_GProps
 from OCP.STEPControl import STEPControl_Reader
 from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
-from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry import kernel as occt
 occt.quiet()
 begin = time.process_time()
 reader = STEPControl_Reader()

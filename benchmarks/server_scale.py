@@ -41,10 +41,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"
 
 from server_testing import Api, Databases, ServerProcess, bom, merge_body, postgres
 
+from silo_server.backup import back_up, restore
 from silo_server.db import tables
 from silo_server.db.engine import Database, insert_rows
-from silo_server.operation.backup import back_up, restore
-from silo_server.run import prepare, running_server, spare_the_collector
+from silo_server.run import prepare, running_server, share_the_processor
 from silo_server.services.bom.summary import keep_summaries, summary_of
 from silo_server.services.items import get_item
 from silo_server.settings import Settings
@@ -127,7 +127,7 @@ def make_vault(settings: Settings, size: int) -> None:
                 "description": f"{words}, drawing {number}",
                 "properties": json.dumps(properties),
                 "current_revision": 1,
-                "bom_version": 1,
+                "bom_version": int(kind == "assembly"),
                 "created_at": at,
                 "created_by": "admin",
                 "updated_at": at,
@@ -278,7 +278,7 @@ def move(origin: Settings, target: Settings, folder: Path) -> None:
 
 def measure(settings: Settings, size: int, bad: list[str], show: bool) -> dict[str, float]:
     """The CPU seconds of each request; checks the plans of what it asks the database."""
-    spare_the_collector()  # as a server's own process does
+    share_the_processor()  # as a server's own process does
     with (
         running_server(settings.database_url, token=TOKEN, files_dir=settings.files_dir) as server,
         Api(server.base_url, TOKEN) as api,
@@ -329,7 +329,7 @@ def export(settings: Settings, kind: str) -> None:
             )
 
         for form in ("csv", "json", "xlsx"):
-            (process / "clear_refs").write_text("5")  # the peak begins anew
+            (process / "clear_refs").write_text("5")  # the peak begins again
             before, begun = memory("VmRSS"), spent()
             size = download(server.base_url, large, form)
             took, peak = spent() - begun, memory("VmHWM")

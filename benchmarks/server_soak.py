@@ -165,7 +165,7 @@ def edit(
     chance = random.Random(seed)
     with Api(url, TOKEN) as api:
         while not ending.is_set():
-            # Two levels: trees that grow for ever would be a leak of the load, not of the server.
+            # Two levels: trees that grow forever would be a leak of the load, not of the server.
             parent, children = chance.choice(items[:20]), chance.sample(items[20:], 11)
             started = time.perf_counter()
             what = chance.randrange(9)

@@ -44,12 +44,12 @@ def registering(count: int) -> Callable[[], object]:
     """Return what makes the table of ``count`` files with one content."""
     from silo.bom.model import BomEntry
     from silo.bom.resolve import Proposal
-    from silo.registering.offer import Candidate, Offer, State
-    from silo.registering.table import write_table
+    from silo.registering.offer import Candidate, ComponentState, Offer
+    from silo.registering.orders import write_table
 
     def candidate(number: int) -> Candidate:
         entry = BomEntry(f"/v/{number}.FCStd", object_name="Body")
-        return Candidate(Proposal(entry, str(number), "part", "M01"), State.READY, sha256="same")
+        return Candidate(Proposal(entry, str(number), "part", "M01"), ComponentState.READY, sha256="same")
 
     offer = Offer(tuple(map(candidate, range(count))), {"M01": "Machined part"})
     return lambda: write_table(offer, lambda _: True, "/v")

@@ -71,7 +71,7 @@ from silo.files import documents_in
 from silo.vault.index import Index
 from silo.vault.plan import make_plan
 from silo.vault.reading import pool_of
-from silo.vault.reading import Reading
+from silo.vault.reading import VaultReader
 from silo.vault.reading import Question
 
 def main():
@@ -80,7 +80,7 @@ def main():
     tops = documents_in([folder])
     with Index(Path(index)) as memory, pool_of(jobs, dask) as pool:
         memory.expect(os.path.realpath(folder))
-        reading = Reading(memory, pool)
+        reading = VaultReader(memory, pool)
         plan = make_plan(tops, reading)
         memory.save()
         reads, seconds = reading.reads, reading.seconds
@@ -108,7 +108,7 @@ from silo.fcstd.library import facts_of
 from silo.fcstd.library import Library
 from silo.files import documents_in
 from silo.vault.index import Index
-from silo.vault.reading import Question, Session
+from silo.vault.reading import Question, WalkSession
 
 def read(session, question):
     library = Library(contents=session.contents, locator=session.locator)
@@ -125,11 +125,11 @@ def main():
         begin = now
     index = Index(Path(sys.argv[2]))
     asked = [Question(path) for path in documents_in([sys.argv[1]])]
-    begin, session = time.process_time(), Session()
+    begin, session = time.process_time(), WalkSession()
     for question in asked:
         read(session, question)
     stage("reading")
-    session = Session()
+    session = WalkSession()
     firsts = [session.read(question) for question in asked]
     stage("walking")
     spent["walking"] -= spent["reading"]  # what is left are the answers of parts

@@ -107,10 +107,11 @@ def findings() -> str:
         "What the walk through an assembly reports; [counting](../counting.md) has the rules, and",
         "[mass and inertia](../inertia.md) the warnings about masses.",
         "",
-        "| code | it is | do |",
-        "|---|---|---|",
+        "| code | severity | it is | do |",
+        "|---|---|---|---|",
     ]
-    return "\n".join([*head, *(f"| `{code}` | {code.meaning} | {code.remedy} |" for code in FindingCode), ""])
+    rows = (f"| `{code}` | {code.severity} | {code.meaning} | {code.remedy} |" for code in FindingCode)
+    return "\n".join([*head, *rows, ""])
 
 
 def executed() -> str:

@@ -3,7 +3,8 @@
 
     python scripts/english.py
 
-Exit code 1 where one stands in the docs, in a page, or in a Python file of ``mods``.
+Exit code 1 if a phrase is in the docs, in a page, or in a Python file of ``mods``, or if a package (``silo``,
+``silo_server``) has a class name twice.
 """
 
 from __future__ import annotations
@@ -33,6 +34,17 @@ BANNED = {
     r"(has|have|had|having) to be done so": "do it",
     r"in the event that": "if",
     r"at this point in time": "now",
+    r"anew": "again",
+    r"whoever|whichever": "the person who, the program that; any",
+    r"all the same": "anyway",
+    r"for ever": "forever, without end",
+    r"found out": "detected, known, checked",
+    r"(is|are|was|were) said": "report it; or say who says it",
+    r"thus|hence": "so",
+    r"in vain": "without success",
+    r"stands? first": "is on top, comes first",
+    r"as ever": "as usual",
+    r"of no avail|by no means|not least": "say it directly",
 }
 PHRASE = re.compile(
     "|".join(rf"(?P<p{n}>\b(?:{text})(?!\w))" for n, text in enumerate(BANNED)), re.IGNORECASE
@@ -49,6 +61,13 @@ def problems() -> list[str]:
             for match in PHRASE.finditer(line):
                 instead = list(BANNED.values())[int(str(match.lastgroup)[1:])]
                 found.append(f"{path.relative_to(ROOT)}:{number}: “{match[0]}”: {instead}")
+    for package in ("silo", "silo_server"):
+        places: dict[str, str] = {}
+        for path in sorted(ROOT.glob(f"mods/{package}/**/*.py")):
+            for name in re.findall(r"^class ([A-Z]\w*)", path.read_text("utf-8"), re.MULTILINE):
+                place = str(path.relative_to(ROOT))
+                if places.setdefault(name, place) != place:
+                    found.append(f"{place}: class {name} is in {places[name]} too: give it a name of its own")
     return found
 
 

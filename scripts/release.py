@@ -27,7 +27,7 @@ def contents(wheel: str) -> list[str]:
     """Return what a wheel lacks of the packages, or has beside them."""
     git = subprocess.run(["git", "ls-files", "mods"], cwd=ROOT, capture_output=True, text=True, check=True)
     tracked = {line.removeprefix("mods/") for line in git.stdout.splitlines()}
-    wanted = {name for name in tracked if not name.endswith((".ts", ".gitkeep"))}
+    wanted = {name for name in tracked if not name.endswith((".ts", ".po"))}
     with zipfile.ZipFile(wheel) as archive:
         sizes = {one.filename: one.file_size for one in archive.infolist()}
     sizes = {name: size for name, size in sizes.items() if ".dist-info/" not in name}

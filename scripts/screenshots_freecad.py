@@ -5,7 +5,8 @@ Run: ``.venv/bin/python scripts/screenshots_freecad.py [FOLDER] [STYLE]``. It ne
 newest of ``scripts/freecad-roots.sh --list`` is taken, or that of ``SILO_PICTURES_FREECAD`` (such as 1.0).
 With ``--tour`` it makes the animated ``addon-tour.gif`` instead: a commit after a colleague's.
 STYLE names a style sheet of FreeCAD, such as "FreeCAD Dark.qss", or a theme of FreeCAD 1.1, such as
-"FreeCAD Dark", to look at the windows in it; ``SILO_PICTURES_SCALE=2`` is for a screen of double resolution.
+"FreeCAD Dark", to look at the windows in it; ``SILO_PICTURES_SCALE=2`` is for a screen of double resolution,
+and ``SILO_PICTURES_LANGUAGE=German`` for another language.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from gui_cases.window import Window, window  # noqa: E402
 from silo.api.client import SiloClient  # noqa: E402
 from silo.api.wire import MergeEntry, MergeRequest  # noqa: E402
 from silo.cli.common import read_assembly  # noqa: E402
-from silo.registering.on_disk import proposals_for, register_all  # noqa: E402
+from silo.registering.orders import proposals_for, register_all  # noqa: E402
 
 DOCS = ROOT / "docs" / "images"
 # These have no part number yet when the designer comes.
@@ -81,7 +82,11 @@ def furnish(config: Path, style: str) -> None:
     if style:
         is_sheet = style.endswith(".qss")
         more += STYLE.format(style, "") if is_sheet else STYLE.format("FreeCAD.qss", THEME.format(style))
-    config.write_text(config.read_text().replace(mod, more + mod))
+    general = '<FCParamGroup Name="General">'
+    language = (
+        f'{general}<FCText Name="Language">{os.environ.get("SILO_PICTURES_LANGUAGE", "English")}</FCText>'
+    )
+    config.write_text(config.read_text().replace(mod, more + mod).replace(general, language))
 
 
 def animate(folder: Path) -> None:

@@ -1,16 +1,21 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Collects the add-on's texts for translators, in one ``silo_<language>.ts`` for each language.
+"""Collects the texts for translators: the add-on's in ``silo_<language>.ts``, others' in ``<domain>.po``.
 
     scripts/translations.py            bring the files up to date
     scripts/translations.py de         the same, and begin one for German
     scripts/translations.py --check    change nothing; exit code 1 where a file is out of date
 
 A text is what stands in ``translate("Silo", "…")``, or in ``QT_TRANSLATE_NOOP("Name_OfCommand", "…")``, in
-mods/silo/workbench or in a module of SHARED; both arguments must be literals. ``silo.ts`` is the template,
-without translations.
+mods/silo/workbench or in another module of silo; both arguments must be literals. ``silo.ts`` is the
+template, without translations.
 What is translated already stays; a translation whose text is gone is marked as vanished, as Qt Linguist does.
-FreeCAD loads compiled files: ``lrelease silo_de.ts`` makes ``silo_de.qm``.
+FreeCAD loads compiled files, so each ``silo_de.ts`` has its ``silo_de.qm``, as ``lrelease`` would write it.
+
+Each of ``DOMAINS`` has ``locale/<language>/LC_MESSAGES/<domain>.po`` in its package, for the standard
+library's gettext, and the compiled ``.mo`` beside it. Their texts stand in ``_("…")``, in ``N_("…")``, which
+is translated when it is shown, or in ``plural(n, "line", "lines")`` (without the last: with an s), in Python,
+templates and scripts. The texts of templates are all that a person reads in them.
 """
 
 from __future__ import annotations
@@ -18,16 +23,22 @@ from __future__ import annotations
 import argparse
 import ast
 import os
+import re
+import struct
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "mods" / "silo" / "workbench"
 # Words that the command line shows too.
-SHARED = (ROOT / "mods" / "silo" / "activity.py",)
+SHARED = [
+    path
+    for path in sorted((ROOT / "mods" / "silo").rglob("*.py"))
+    if SOURCES not in path.parents and 'translate("Silo"' in path.read_text("utf-8")
+]
 FOLDER = SOURCES / "resources" / "translations"
 CONTEXT = "Silo"
 
@@ -133,17 +144,245 @@ def _add(context: ET.Element, text: str, files: Iterable[str], known: Translatio
     made.text = known.text
 
 
+def qm(known: Mapping[Text, Translation]) -> bytes:
+    """Write the finished translations for QTranslator: offsets by the hash of the text, then the messages."""
+    messages, offsets = b"", []
+    for (context, text), translation in known.items():
+        if translation.state:
+            continue
+        source = text.encode()
+        offsets.append(_hash(source).to_bytes(4, "big") + len(messages).to_bytes(4, "big"))
+        for tag, value in ((3, translation.text.encode("utf-16-be")), (6, source), (7, context.encode())):
+            messages += bytes([tag]) + len(value).to_bytes(4, "big") + value
+        messages += b"\x01"
+    made = bytes.fromhex("3cb86418caef9c95cd211cbf60a1bddd")
+    for section, content in ((0x42, b"".join(sorted(offsets))), (0x69, messages)):
+        made += bytes([section]) + len(content).to_bytes(4, "big") + content
+    return made
+
+
+def _hash(text: bytes) -> int:
+    """The hash of ELF files."""
+    found = 0
+    for byte in text:
+        found = ((found << 4) + byte) & 0xFFFFFFFF
+        high = found & 0xF0000000
+        found = (found ^ high >> 24) & ~high
+    return found or 1
+
+
 def wanted(
     languages: Iterable[str] = (),
     folder: Path = FOLDER,
     sources: Path = SOURCES,
     also: Iterable[Path] = SHARED,
-) -> dict[Path, str]:
-    """What each .ts file should hold: those that exist, and one for each of ``languages``."""
+) -> dict[Path, bytes]:
+    """What each file should hold: those that exist, and one for each of ``languages``."""
     texts = collect(sources, also)
     found = dict.fromkeys(sorted(folder.glob("silo*.ts")), "")
     found |= {folder / (f"silo_{language}.ts" if language else "silo.ts"): language for language in languages}
-    return {path: ts(texts, read(path)[0] or new, read(path)[1]) for path, new in found.items()}
+    files = {}
+    for path, new in found.items():
+        language, known = read(path)
+        files[path] = ts(texts, language or new, known).encode()
+        if language or new:
+            files[path.with_suffix(".qm")] = qm({text: known.get(text, Translation()) for text in texts})
+    return files
+
+
+@dataclass(frozen=True)
+class Message:
+    """A text of a .po file; ``many`` is its plural, "" without. ``files`` use it, relative to mods."""
+
+    text: str
+    many: str = ""
+    files: tuple[str, ...] = ()
+    translations: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A gettext domain: the texts that ``texts`` yields of a package, as (text, plural or "", file)."""
+
+    name: str
+    package: Path
+    texts: Callable[[Path], Iterator[tuple[str, str, Path]]]
+
+    def file(self, language: str) -> Path:
+        """Return the path of a language's .po file."""
+        return self.package / "locale" / language / "LC_MESSAGES" / f"{self.name}.po"
+
+    def messages(self) -> dict[str, Message]:
+        """Text → message, in the order of the files."""
+        made: dict[str, Message] = {}
+        for text, many, path in self.texts(self.package):
+            before = made.get(text, Message(text))
+            if before.many and many and before.many != many:
+                raise NotLiteral(f"{path}: {text!r} has the plurals {before.many!r} and {many!r}")
+            name = path.relative_to(ROOT / "mods").as_posix()
+            files = before.files if name in before.files else (*before.files, name)
+            made[text] = Message(text, before.many or many, files)
+        return made
+
+
+def texts_of_python(path: Path) -> Iterator[tuple[str, str, Path]]:
+    """Yield the texts of a Python file that are translated with gettext."""
+    calls = [
+        node for node in ast.walk(ast.parse(path.read_text("utf-8"), str(path))) if isinstance(node, ast.Call)
+    ]
+    for call in sorted(calls, key=lambda call: (call.lineno, call.col_offset)):
+        name = getattr(call.func, "attr", getattr(call.func, "id", ""))
+        values = [one.value if isinstance(one, ast.Constant) else None for one in call.args]
+        match name, values:
+            case (("_" | "N_"), [str(text), *_]):
+                yield text, "", path
+            case (("_" | "N_"), [None, *_]):
+                # One of two texts: _("…" if … else "…").
+                pair = [getattr(call.args[0], side, None) for side in ("body", "orelse")]
+                yield from ((one.value, "", path) for one in pair if isinstance(one, ast.Constant))
+            case "plural", [_, str(one), *many]:
+                yield one, many[0] if many and isinstance(many[0], str) else f"{one}s", path
+
+
+def _texts_of_server(package: Path) -> Iterator[tuple[str, str, Path]]:
+    # The server's own reading of a template, so that both agree.
+    sys.path.insert(0, str(package.parent))
+    from jinja2 import nodes
+
+    from silo.api.wire import ItemTexts, LineTexts
+    from silo_server import schema, values
+    from silo_server.services import releases, suppliers
+    from silo_server.services.bom import imports, review
+    from silo_server.web import render
+
+    # Words that are stored, of columns and of the built-in schema; a site's own stay as they are.
+    stored = [*values.Role, *values.Scope, *schema.ITEM_TYPES, *review.REL_TYPES, *releases.NUMBERED, "draft"]
+    stored += [*suppliers.COLUMNS.values(), *imports.DELIMITERS.values()]
+    for field in (*ItemTexts.model_fields.values(), *LineTexts.model_fields.values()):
+        stored += [field.title or "", *schema.text_hints(field).get("options", ())]
+    built_in = schema.find_schema(None)
+    for one in built_in.fields:
+        stored += [one.label, one.title, one.description, *one.options]
+    stored += [*built_in.domains.values(), *(category.name for category in built_in.categories.values())]
+    stored += [
+        role.replace("_", " ").capitalize()
+        for table in (imports.BOM, suppliers.TABLE)
+        for role in table.roles
+    ]
+    yield from ((str(word), "", package / "schema" / "__init__.py") for word in stored if word)
+    for path in sorted(package.rglob("*.py")):
+        yield from texts_of_python(path)
+    environment = render.environment("en")
+    for path in sorted((package / "web" / "templates").glob("*.html")):
+        source, texts = path.read_text("utf-8"), []
+
+        def note(text: str, texts: list[str] = texts) -> str:
+            texts.append(text)
+            return text
+
+        render.translated(source, note)
+        yield from ((text, "", path) for text in texts)
+        for call in environment.parse(source).find_all(nodes.Call):
+            name = getattr(call.node, "name", "")
+            values = [one.value if isinstance(one, nodes.Const) else None for one in call.args]
+            match name, values:
+                case (("_" | "N_"), [str(text), *_]):
+                    yield text, "", path
+                case "plural", [_, str(one), *many]:
+                    yield one, many[0] if many and many[0] else f"{one}s", path
+    for path in render.SCRIPTS:
+        yield from ((text, "", path) for text in render.texts_of_script(path))
+
+
+DOMAINS = [Domain("silo_server", ROOT / "mods" / "silo_server", _texts_of_server)]
+
+
+def po(language: str, messages: Iterable[Message], plurals: str) -> str:
+    """Write a .po file; what has no translation yet is "". A text that is gone goes with its translation."""
+    head = {"Content-Type": "text/plain; charset=UTF-8", "Language": language, "Plural-Forms": plurals}
+    written = 'msgid ""\nmsgstr ""\n' + "".join(
+        f"{_quoted(f'{key}: {value}{chr(10)}')}\n" for key, value in head.items()
+    )
+    for one in messages:
+        # No line numbers: they would change with every edit.
+        written += f"\n#: {' '.join(one.files)}\nmsgid {_quoted(one.text)}\n"
+        if one.many:
+            written += f"msgid_plural {_quoted(one.many)}\n"
+            forms = one.translations or ("", "")
+            written += "".join(f"msgstr[{n}] {_quoted(form)}\n" for n, form in enumerate(forms))
+        else:
+            written += f"msgstr {_quoted(*one.translations[:1] or ('',))}\n"
+    return written
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\t", "\\t")
+    return f'"{escaped}"'
+
+
+def read_po(path: Path) -> tuple[str, dict[str, Message]]:
+    """Plural-Forms and messages of a .po file; those of German, English and most others if there is none."""
+    plurals, found = "nplurals=2; plural=(n != 1);", {}
+    blocks = path.read_text("utf-8").split("\n\n") if path.exists() else []
+    for block in blocks:
+        fields: dict[str, str] = {}
+        name = ""
+        for line in block.splitlines():
+            match = re.fullmatch(r'(?:(msgid|msgid_plural|msgstr(?:\[\d\])?) )?(".*")', line)
+            if match:
+                name = match[1] or name
+                fields[name] = fields.get(name, "") + ast.literal_eval(match[2])
+            elif not line.startswith("#"):
+                raise ValueError(f"{path}: wanted msgid, msgstr or a text in quotes, got {line!r}")
+        text = fields.pop("msgid", "")
+        if text:
+            forms = tuple(fields[name] for name in sorted(fields) if name.startswith("msgstr"))
+            found[text] = Message(text, fields.get("msgid_plural", ""), (), forms)
+        elif head := re.search(r"Plural-Forms: (.*)\n", fields.get("msgstr", "")):
+            plurals = head[1]
+    return plurals, found
+
+
+def mo(language: str, messages: Iterable[Message], plurals: str) -> bytes:
+    """Compile what is translated: a table of lengths and offsets each for texts and translations."""
+    head = f"Content-Type: text/plain; charset=UTF-8\nLanguage: {language}\nPlural-Forms: {plurals}\n"
+    pairs = {"": head}
+    for one in messages:
+        if one.translations and all(one.translations):
+            # Old gettext (Python 3.11.2) finds a text that has a plural by its number only: it stands twice.
+            pairs[one.text] = one.translations[0]
+            if one.many:
+                pairs[f"{one.text}\0{one.many}"] = "\0".join(one.translations)
+    texts = sorted((text.encode(), translation.encode()) for text, translation in pairs.items())
+    at = 28 + 16 * len(texts)
+    tables, content = b"", b""
+    for column in zip(*texts, strict=True):
+        for value in column:
+            tables += struct.pack("<II", len(value), at + len(content))
+            content += value + b"\0"
+    header = struct.pack("<7I", 0x950412DE, 0, len(texts), 28, 28 + 8 * len(texts), 0, 0)
+    return header + tables + content
+
+
+def wanted_po(domain: Domain, languages: Iterable[str] = ()) -> dict[Path, bytes]:
+    """What each file of a domain should hold: those that exist, and one for each of ``languages``."""
+    texts = domain.messages()
+    there = [path.parents[1].name for path in domain.package.glob(f"locale/*/LC_MESSAGES/{domain.name}.po")]
+    files = {}
+    for language in sorted({*there, *languages}):
+        path = domain.file(language)
+        plurals, done = read_po(path)
+        empty = Message("")
+        messages = [
+            Message(
+                one.text, one.many, one.files, old.translations if bool(old.many) == bool(one.many) else ()
+            )
+            for one in texts.values()
+            for old in [done.get(one.text, empty)]
+        ]
+        files[path] = po(language, messages, plurals).encode()
+        files[path.with_suffix(".mo")] = mo(language, messages, plurals)
+    return files
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -156,14 +395,17 @@ def main(arguments: list[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     try:
         files = wanted(["", *args.languages])
+        for domain in DOMAINS:
+            files |= wanted_po(domain, args.languages)
     except NotLiteral as mistakes:
         print(mistakes, file=sys.stderr)
         return 1
-    old = [p for p, text in files.items() if not p.exists() or p.read_text(encoding="utf-8") != text]
+    old = [path for path, content in files.items() if not path.exists() or path.read_bytes() != content]
     for path in old:
         print(f"{path.relative_to(ROOT)} {'is out of date: make translations' if args.check else 'written'}")
         if not args.check:
-            path.write_text(files[path], encoding="utf-8")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(files[path])
     return 1 if old and args.check else 0
 
 

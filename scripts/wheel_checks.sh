@@ -38,13 +38,14 @@ cp -r README.md examples "$work"
 cp scripts/page_commands.py "$work/scripts"
 cd "$work"
 export SILO_HOME="$work/home"
-user=()
+user=(env HOME="$work/home" TMPDIR="$work/tmp")
 mkdir "$work/home" "$work/tmp"
 if [ "$(id -u)" = 0 ] && command -v setpriv >/dev/null; then
     chmod 755 "$work"
     chown -R nobody "$work/home" "$work/tmp"
-    user=(setpriv --reuid=nobody --regid=nogroup --clear-groups env HOME="$work/home" TMPDIR="$work/tmp")
-    "${user[@]}" "$bin/python" -V >/dev/null 2>&1 || user=() # a Python below root's home
+    nobody=(setpriv --reuid=nobody --regid=nogroup --clear-groups)
+    # A Python below root's home is root's alone.
+    ! "${nobody[@]}" "$bin/python" -V >/dev/null 2>&1 || user=("${nobody[@]}" "${user[@]}")
 fi
 silo_mod="$bin/silo-mod"
 echo "README's commands"
@@ -61,7 +62,7 @@ if command -v "${SILO_FREECADCMD:-freecadcmd}" >/dev/null; then
     "${user[@]}" "$silo_mod" install-addon --freecad-data "$SILO_HOME/freecad" >addon.txt
     test -f "$SILO_HOME/freecad/Mod/silo-mod/mods/silo/workbench/start.py"
 fi
-echo "The wheel works with the $which versions: $("$bin/python" -m pip freeze | tr '\n' ' ')"
+echo "The wheel works with the $which versions, as $("${user[@]}" id -un), in $("$bin/python" -V): $("$bin/python" -m pip freeze | tr '\n' ' ')"
 [ -z "${DIST:-}" ] || {
     "$builder" -m pip --quiet --disable-pip-version-check install cyclonedx-bom
     "${builder%/python}/cyclonedx-py" environment --output-file "$DIST/silo-mod.cdx.json" "$bin/python"

@@ -7,24 +7,28 @@ import importlib.util
 import os
 import shutil
 import signal
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hunting import LONG, examples
 from hypothesis import HealthCheck, settings
 from sharing import scheduler
+from warm_reader import warm_reader
 
-from silo.standard_items import Memory
+from silo.bom_sync import Memory
 
 # Time is measured in benchmarks; a test on a busy machine is not wrong for being slow. The examples are the
 # same in each run, so that no landing fails by chance; SILO_LONG=1 hunts with new ones, and more of them.
-LONG = bool(os.environ.get("SILO_LONG"))
 settings.register_profile(
     "unhurried",
     deadline=None,
     derandomize=not LONG,
-    max_examples=500 if LONG else 60,
+    max_examples=examples(30),
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("unhurried")
@@ -35,6 +39,12 @@ for name in ("SILO_API_URL", "SILO_API_TOKEN", "COLUMNS", "LINES", "NO_COLOR", "
     os.environ.pop(name, None)
 for name in ("no_proxy", "NO_PROXY"):
     os.environ[name] = ",".join(filter(None, (os.environ.get(name), "127.0.0.1,localhost,::1")))
+
+# A password costs a server 0.2 s of processor, because people guess passwords. Tests would take minutes more.
+with suppress(ImportError):
+    from argon2 import PasswordHasher
+
+    PasswordHasher.__init__.__defaults__ = (1, 8, 1, *PasswordHasher.__init__.__defaults__[3:])
 
 # A shell that runs tests in the background ignores Ctrl-C for them; their programs would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -51,8 +61,25 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def _nothing_told(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """No test knows what another one told a server at the same address about unreferenced lines."""
     monkeypatch.setattr(
-        "silo.bom_sync._told", cache(lambda: Memory(tmp_path_factory.mktemp("told") / "told.json"))
+        "silo.bom_sync._reported_lines", cache(lambda: Memory(tmp_path_factory.mktemp("told") / "told.json"))
     )
+
+
+@pytest.fixture(scope="session")
+def _warm_reader() -> Iterator[str]:
+    """A process that loads the geometry kernel once for all the children that read."""
+    if sys.platform != "linux" or not _importable("OCP"):
+        yield ""
+        return
+    with warm_reader() as name:
+        yield name
+
+
+@pytest.fixture
+def warm(_warm_reader: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Children that read geometry do not load the kernel anew."""
+    if _warm_reader:
+        monkeypatch.setenv("SILO_WARM_READER", _warm_reader)
 
 
 def _needs(what: str, there: bool) -> None:

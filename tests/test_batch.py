@@ -12,11 +12,12 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from hunting import examples
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from silo.batch import JUnit, Markdown, Options, Summary, TopResult, cell, stopped_by, sync_top
+from silo.batch import JUnit, Markdown, Summary, SyncOptions, TopResult, cell, stopped_by, sync_top
 from silo.bom.compare import MergePlan
 from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
 from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
@@ -89,7 +90,7 @@ PATTERNS = (
 @pytest.mark.usefixtures("needs_git")
 @pytest.mark.usefixtures("needs_case")
 @pytest.mark.filterwarnings("ignore::FutureWarning")
-@settings(max_examples=25)
+@settings(max_examples=examples(8))
 @given(
     folders=st.lists(st.lists(st.sampled_from(NAMES[:5]), max_size=3), min_size=1, max_size=5),
     names=st.lists(st.sampled_from(NAMES[5:]), min_size=1, max_size=6),
@@ -189,7 +190,7 @@ def test_a_file_that_cannot_be_hashed_costs_its_own_outcome_only(tmp_path: Path)
     """What was synced before it stays reported."""
     silo = FakeSilo()
     found = extraction(silo, tmp_path, gone="top")
-    result = sync_top(str(tmp_path / "top.FCStd"), found, silo, Options(recursive=True))
+    result = sync_top(str(tmp_path / "top.FCStd"), found, silo, SyncOptions(recursive=True))
     assert [outcome.status for outcome in result.outcomes] == [Status.MERGED, Status.FAILED]
     assert isinstance(result.outcomes[1].error, DocumentError)
     assert stopped_by(result) is None
@@ -207,7 +208,7 @@ def test_a_refused_token_is_not_tried_on_every_assembly(tmp_path: Path, error: S
             raise error
 
     silo.before = refuse
-    result = sync_top("top.FCStd", found, silo, Options(recursive=True))
+    result = sync_top("top.FCStd", found, silo, SyncOptions(recursive=True))
     assert len(calls) == asked
     assert all(outcome.error is error for outcome in result.outcomes)
     assert (stopped_by(result) is error) == (asked == 1)
@@ -221,14 +222,14 @@ def test_an_error_of_the_file_itself_does_not_stop_the_run() -> None:
 
 def test_no_token_is_shown_in_a_repr() -> None:
     """A log or a traceback shows objects."""
-    from silo.workbench.settings.server import Known, Server
+    from silo.workbench.settings.server import Server, ServerPreferences
 
-    values: list[Any] = [Known("u", "silo_x"), Server("u", "silo_x")]
+    values: list[Any] = [ServerPreferences("u", "silo_x"), Server("u", "silo_x")]
     assert all("silo_x" not in repr(value) for value in values)
 
 
 @given(st.text(st.sampled_from("ab1 |`*_[]()<>#@&;~$\\-+.!\n\t\x00\u202e\ud800é:"), max_size=30))
-@settings(max_examples=200)
+@settings(max_examples=examples(60))
 def test_text_of_others_is_shown_in_markdown_and_does_nothing(text: str) -> None:
     """In a table, a list and a heading; the oracle is a reader of Markdown. Nobody is notified by a name."""
     shown = " ".join("".join(c if c.isprintable() else " " for c in text).split())

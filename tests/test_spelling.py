@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from fcstd_writer import Doc, XLink, locals_
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from other_disk import other_disk
@@ -26,15 +27,24 @@ from silo.platform import Spelling
 NFD = unicodedata.normalize("NFD", "Büchse")
 
 
-@pytest.fixture(params=[(), ("each-spelling",)], ids=["one-number", "each-spelling"])
-def disk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Path]:
-    """A folder on a disk that finds a name in any case and normal form: the machine's own, or a mount."""
-    (tmp_path / "ask-Ü").touch()
-    if not request.param and (tmp_path / unicodedata.normalize("NFD", "ASK-ü")).exists():
-        yield Path(os.path.realpath(tmp_path))
+@pytest.fixture(scope="module", params=[(), ("each-spelling",)], ids=["one-number", "each-spelling"])
+def root(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Iterator[Path]:
+    """A disk that finds a name in any case and normal form: the machine's own, or a mount."""
+    folder = tmp_path_factory.mktemp("disk")
+    (folder / "ask-Ü").touch()
+    if not request.param and (folder / unicodedata.normalize("NFD", "ASK-ü")).exists():
+        yield Path(os.path.realpath(folder))
         return
-    with other_disk(tmp_path, *request.param) as mounted:
+    with other_disk(folder, *request.param) as mounted:
         yield mounted
+
+
+@pytest.fixture
+def disk(root: Path) -> Path:
+    """An empty folder on such a disk."""
+    folder = root / str(uuid.uuid4())
+    folder.mkdir()
+    return folder
 
 
 def real(path: Path | str) -> str:
@@ -193,7 +203,7 @@ def respelt(draw: st.DrawFn) -> str:
     return unicodedata.normalize(draw(st.sampled_from(("NFC", "NFD"))), other)
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(15))
 @given(recorded=st.lists(respelt(), min_size=1, max_size=6), folder=st.uuids())
 def test_any_spelling_gives_the_same_bom_on_every_disk(
     disk: Path, tmp_path: Path, recorded: list[str], folder: uuid.UUID

@@ -50,12 +50,12 @@ def commits(one: Any, doc: Any) -> None:
 
 def drawing(one: Any) -> None:
     """A commit with 10 000 findings, and 2000 events in one burst."""
-    from silo.workbench.pane.activity import Entry, Line, Tone
+    from silo.workbench.pane.activity import Line, PaneEntry, Tone
 
     lines = tuple(Line(f"<b>finding</b> {number}", Tone.ERROR) for number in range(10_000))
 
     def draw() -> None:
-        one.session.add(Entry("big", "Big", time.time(), lines=lines))
+        one.session.add(PaneEntry("big", "Big", time.time(), lines=lines))
         one._draw()
         QtWidgets.QApplication.processEvents()
 
@@ -63,7 +63,7 @@ def drawing(one: Any) -> None:
     pulse = Pulse()
     pulse.start()
     for number in range(2000):
-        entry = Entry(f"e{number}", f"New item: M01-{number:04}", time.time())
+        entry = PaneEntry(f"e{number}", f"New item: M01-{number:04}", time.time())
         one.relay.post(lambda entry=entry: one.session.add(entry))
     spin(lambda: any(entry.key == "e1999" for entry in one.session.shown.activity.entries))
     end = time.perf_counter() + 0.5

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from silo.inertia.calculator import read_geometry
-from silo.inertia.output.urdf import read_urdf
+from silo.inertia.urdf import read_urdf
 
 HERE = Path(__file__).parent
 POSE = {"shoulder": -0.35, "elbow": 0.9, "wrist": 0.6}

@@ -3,7 +3,7 @@
 
 One failure does not stop the rest; every file ends in a :class:`TopResult`, which becomes JSON here, and a
 report in :mod:`silo.batch`. Files that FreeCAD reads come one by one (:func:`sync_top`); those that we
-read ourselves are one plan (:mod:`silo.vault.job`).
+read ourselves are one plan (:mod:`silo.vault.plan`).
 
 The report of a sync, as Markdown, HTML, JSON or JUnit XML: written as the run goes, whole at every moment.
 
@@ -52,7 +52,7 @@ _FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class SyncOptions:
     """How to sync.
 
     recursive
@@ -90,38 +90,40 @@ class TopResult:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Everything worth a report, each once: of the walk, and of each comparison with the server."""
-        found: dict[Finding, None] = dict.fromkeys(self.whole.findings if self.whole is not None else ())
+        unique: dict[Finding, None] = dict.fromkeys(self.whole.findings if self.whole is not None else ())
         for outcome in self.outcomes:
-            found.update(dict.fromkeys(outcome.resolved.findings))
+            unique.update(dict.fromkeys(outcome.resolved.findings))
         for outcome in self.outcomes:
             if outcome.plan is not None:
-                found.update(dict.fromkeys(outcome.plan.diff.findings_at(outcome.assembly)))
-        return tuple(found)
+                unique.update(dict.fromkeys(outcome.plan.diff.findings_at(outcome.assembly)))
+        return tuple(unique)
 
     @property
     def unregistered(self) -> tuple[BomEntry, ...]:
         """The components without an item, each once; of assemblies their outcome says it."""
         several = [self.whole] if self.whole is not None else [outcome.resolved for outcome in self.outcomes]
-        return tuple({entry.key: entry for one in several for entry in one.unresolved}.values())
+        return tuple({entry.key: entry for resolved in several for entry in resolved.unresolved}.values())
 
     @property
     def fine(self) -> bool:
         """True if nothing was left undone; own parts that are no items yet are."""
         outcomes = self.outcomes
-        return self.error is None and all(one.status in _FINE and not one.assembly.own for one in outcomes)
+        return self.error is None and all(
+            outcome.status in _FINE and not outcome.assembly.own for outcome in outcomes
+        )
 
 
-def sync_top(top: str, found: Extraction | SiloError, api: SyncApi, options: Options) -> TopResult:
+def sync_top(top: str, extraction: Extraction | SiloError, api: SyncApi, options: SyncOptions) -> TopResult:
     """Sync one file's BOM, or say why it was not read."""
-    if isinstance(found, SiloError):
-        return TopResult(top, error=found)
-    base = base_of(found)
-    if options.skip_parts and not found.entries and not found.blocked:
+    if isinstance(extraction, SiloError):
+        return TopResult(top, error=extraction)
+    base = base_of(extraction)
+    if options.skip_parts and not extraction.entries and not extraction.blocked:
         return TopResult(top, base, skipped="no components of other files: a part, not an assembly")
-    if options.skip_parts and not found.blocked and _is_library(found):
+    if options.skip_parts and not extraction.blocked and _is_library(extraction):
         return TopResult(top, base, skipped="only parts of its own, and no item: a library of parts")
     try:
-        whole = ask_for_moved(resolve(found, api), api)
+        whole = ask_for_moved(resolve(extraction, api), api)
         outcomes = tuple(_outcomes(whole, api, options))
     except SiloError as error:
         return TopResult(top, base, error=error)
@@ -136,24 +138,24 @@ def _identities_before(
     compared
         assemblies, each with the server's lines.
     """
-    found: dict[tuple[str, str], str] = {}
-    for one, lines in compared:
+    result: dict[tuple[str, str], str] = {}
+    for resolved, lines in compared:
         for line in lines:
             for part in line.get("components") or ():
                 if line.get("child_id") and isinstance(part.get("file"), str):
-                    path = os.path.normpath(os.path.join(one.folder, part["file"]))
-                    found[path, str(part.get("object") or "")] = str(line["child_id"])
-    return found
+                    path = os.path.normpath(os.path.join(resolved.folder, part["file"]))
+                    result[path, str(part.get("object") or "")] = str(line["child_id"])
+    return result
 
 
-def _lacks_files(one: Resolved) -> bool:
-    return any(entry.missing for entry in one.entries)
+def _lacks_files(resolved: Resolved) -> bool:
+    return any(entry.missing for entry in resolved.entries)
 
 
 def ask_for_moved(whole: Resolved, api: SyncApi) -> Resolved:
     """:func:`suggest_by_identity`, with the lines that the server has of assemblies that lack files."""
-    lacking = [one for one in assemblies(whole) if _lacks_files(one)]
-    return suggest_by_identity(whole, [(one, server_lines(one, api)) for one in lacking])
+    lacking = [assembly for assembly in assemblies(whole) if _lacks_files(assembly)]
+    return suggest_by_identity(whole, [(resolved, server_lines(resolved, api)) for resolved in lacking])
 
 
 def suggest_by_identity(
@@ -168,16 +170,16 @@ def suggest_by_identity(
     candidates
         UUIDs → the files that may carry one of them; None: any file of the project.
     """
-    lacking = [(one, lines) for one, lines in compared if _lacks_files(one)]
-    known = _identities_before(lacking)
-    if not known:
+    lacking = [(resolved, lines) for resolved, lines in compared if _lacks_files(resolved)]
+    identities = _identities_before(lacking)
+    if not identities:
         return whole
     from silo.fcstd.linked import with_suggestions
 
     entries = (*whole.entries, *whole.unresolved)
-    files = None if candidates is None else tuple(candidates(known.values()))
-    told = with_suggestions(Extraction(whole.assembly, entries, whole.findings), known, files)
-    return replace(whole, findings=told.findings)
+    files = None if candidates is None else tuple(candidates(identities.values()))
+    extraction = with_suggestions(Extraction(whole.assembly, entries, whole.findings), identities, files)
+    return replace(whole, findings=extraction.findings)
 
 
 def stopped_by(result: TopResult, api: object = None) -> SiloError | None:
@@ -188,13 +190,15 @@ def stopped_by(result: TopResult, api: object = None) -> SiloError | None:
     return next((error for error in errors if error is not None and ends_run(error, api)), None)
 
 
-def _is_library(found: Extraction) -> bool:
+def _is_library(extraction: Extraction) -> bool:
     """A file of screws or of several parts for others to link: unregistered, and nothing of other files."""
-    path = found.assembly.doc_path
-    return found.assembly.silo_uuid is None and all(entry.doc_path == path for entry in found.entries)
+    path = extraction.assembly.doc_path
+    return extraction.assembly.silo_uuid is None and all(
+        entry.doc_path == path for entry in extraction.entries
+    )
 
 
-def _outcomes(whole: Resolved, api: SyncApi, options: Options) -> Iterable[Outcome]:
+def _outcomes(whole: Resolved, api: SyncApi, options: SyncOptions) -> Iterable[Outcome]:
     return sync_tree(
         whole,
         api,
@@ -257,7 +261,7 @@ STATUS_WORDS = {
     Status.MERGED: "BOM merged",
     Status.UNCHANGED: "no change, nothing was sent",
     Status.DRY_RUN: "preview only, nothing was sent",
-    Status.BLOCKED: "not synced: links are broken (see below; --allow-missing syncs all the same)",
+    Status.BLOCKED: "not synced: links are broken (see below; --allow-missing syncs anyway)",
     Status.UNREGISTERED: "not synced: the assembly has no Silo part number (silo-mod register)",
     Status.FAILED: "not synced",
 }
@@ -378,7 +382,7 @@ class Summary:
 
     def told(self) -> dict[str, str]:
         """Return all that needs a person: the sentence that the next run knows it by → the report's line."""
-        several = ((words, files) for told in (self.errors, self.warnings) for words, files in told.items())
+        several = ((words, files) for lines in (self.errors, self.warnings) for words, files in lines.items())
         return {
             **{words: f"{words}{_others(words, files)}" for words, files in several},
             **{line: f"{line}: no part number" for line in self._without_number()},
@@ -435,13 +439,13 @@ class Summary:
         Errors and warnings of one cause are one line. A hint about how something is modelled is in the report
         of the first night only.
         """
-        known = self.before or frozenset()
+        before = self.before or frozenset()
         if self.before is not None:
-            yield "New since the last run", self._grouped(one for one in self.told() if one not in known)
+            yield "New since the last run", self._grouped(text for text in self.told() if text not in before)
         yield "Errors", self._grouped(self.errors)
         hint = FindingCode.CONSOLIDATION.meaning
-        old = {one for one in self.warnings if self.causes.get(one) == hint and one in known}
-        yield "Warnings", self._grouped(one for one in self.warnings if one not in old)
+        old = {text for text in self.warnings if self.causes.get(text) == hint and text in before}
+        yield "Warnings", self._grouped(text for text in self.warnings if text not in old)
         yield "Without a part number (silo-mod register)", [(line, []) for line in self._without_number()]
         yield "Moved", [(f"{name}: {old} → {new}", []) for name, old, new in self.moved]
         notes = list(self.notes)
@@ -460,7 +464,7 @@ class Summary:
         return [
             (of[0], [])
             if len(of) == 1
-            else (f"{len(of)} × {cause}", [one.replace(f": {cause}", "") for one in of])
+            else (f"{len(of)} × {cause}", [group.replace(f": {cause}", "") for group in of])
             for cause, of in groups.items()
         ]
 
@@ -479,7 +483,7 @@ class Form(Protocol):
         ...
 
 
-class Report:
+class ReportFile:
     """A file that is whole after every result: what is new replaces the end, and brings an end of its own."""
 
     def __init__(self, path: str, form: Form | None = None) -> None:
@@ -508,8 +512,8 @@ class Report:
         try:
             if summary is not None:
                 self._file.seek(self._begin)
-                told = self._file.read(self._end - self._begin)
-                whole = _bytes(self._form.head(summary)) + told + _bytes(self._form.end(summary))
+                tail = self._file.read(self._end - self._begin)
+                whole = _bytes(self._form.head(summary)) + tail + _bytes(self._form.end(summary))
                 if isinstance(self._file, BytesIO):
                     self._file = BytesIO(whole)
                 else:
@@ -592,16 +596,18 @@ class Markdown:
 
     def head(self, summary: Summary | None) -> str:
         lines = ["# BOM sync", "", *([cell(summary.sentence()), ""] if summary is not None else [])]
-        for title, told in summary.sections() if summary is not None else ():
-            if told:
+        for title, subtitle in summary.sections() if summary is not None else ():
+            if subtitle:
                 lines += [f"## {cell(title)}", ""]
-                for line, more in told:
-                    lines += [f"- {cell(line)}", *(f"  - {cell(one)}" for one in more)]
+                for line, more in subtitle:
+                    lines += [f"- {cell(line)}", *(f"  - {cell(text)}" for text in more)]
                 lines.append("")
         return "\n".join([*lines, "## Assemblies", ""])
 
     def one(self, result: TopResult, number: int) -> str:
-        return "".join(self._assembly(one, result.base) for one in result.outcomes if is_news(one))
+        return "".join(
+            self._assembly(outcome, result.base) for outcome in result.outcomes if is_news(outcome)
+        )
 
     def _assembly(self, outcome: Outcome, base: str) -> str:
         title, file, rows, reasons = _changes(outcome, base)
@@ -635,20 +641,22 @@ class Html:
         ]
         if summary is not None:
             parts.append(_element("p", summary.sentence()))
-            for title, told in summary.sections():
-                if told:
-                    parts += [_element("h2", title), _list(told)]
+            for title, subtitle in summary.sections():
+                if subtitle:
+                    parts += [_element("h2", title), _list(subtitle)]
         return "\n".join([*parts, "<h2>Assemblies</h2>", ""])
 
     def one(self, result: TopResult, number: int) -> str:
-        return "".join(self._assembly(one, result.base) for one in result.outcomes if is_news(one))
+        return "".join(
+            self._assembly(outcome, result.base) for outcome in result.outcomes if is_news(outcome)
+        )
 
     def _assembly(self, outcome: Outcome, base: str) -> str:
         title, file, rows, reasons = _changes(outcome, base)
         parts = [_element("h3", title), _element("p", file)]
         if rows:
             lines = (("th", _HEADINGS), *(("td", row) for row in rows))
-            cells = ("".join(_element(tag, one) for one in line) for tag, line in lines)
+            cells = ("".join(_element(tag, text) for text in line) for tag, line in lines)
             parts.append(f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>")
         return "\n".join([*parts, *([_list([(reason, []) for reason in reasons])] if reasons else []), ""])
 
@@ -660,10 +668,10 @@ def _element(tag: str, text: str) -> str:
     return f"<{tag}>{escape(_clean(text))}</{tag}>"
 
 
-def _list(told: Iterable[tuple[str, Sequence[str]]]) -> str:
+def _list(sections: Iterable[tuple[str, Sequence[str]]]) -> str:
     text = ""
-    for line, more in told:
-        below = _list([(one, []) for one in more]) if more else ""
+    for line, more in sections:
+        below = _list([(each_text, []) for each_text in more]) if more else ""
         text += f"<li>{escape(_clean(line))}{below}</li>"
     return f"<ul>{text}</ul>"
 
@@ -696,8 +704,8 @@ class Json:
     def end(self, summary: Summary | None) -> str:
         if summary is None:
             return '\n], "ended": false}\n'
-        told = [finding_json(finding, summary.base) for finding in summary.findings]
-        data: Mapping[str, Any] = {**summary.to_json(), "findings": told}
+        findings = [finding_json(finding, summary.base) for finding in summary.findings]
+        data: Mapping[str, Any] = {**summary.to_json(), "findings": findings}
         return f'\n], "ended": true, "summary": {json.dumps(data)}}}\n'
 
 
@@ -737,10 +745,10 @@ class JUnit:
         return f"{head}><{kind} message={_attribute(why)}/></testcase>"
 
     def end(self, summary: Summary | None) -> str:
-        told = _NOT_ENDED
+        text = _NOT_ENDED
         if summary is not None:
-            told = "\n".join([summary.sentence(), *(f"new: {line}" for line in summary.new() or ())])
-        return f"\n<system-out>{escape(_clean(told))}</system-out>\n</testsuite>\n</testsuites>\n"
+            text = "\n".join([summary.sentence(), *(f"new: {line}" for line in summary.new() or ())])
+        return f"\n<system-out>{escape(_clean(text))}</system-out>\n</testsuite>\n</testsuites>\n"
 
 
 def _clean(text: str) -> str:

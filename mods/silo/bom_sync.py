@@ -7,9 +7,17 @@
     (FreeCAD,               (frozen)     (by UUID)   (frozen)     (server's   (frozen)     (one     (frozen)
      FCStd)                                                        lines)                  request)
 
-What a run needs from the server is fetched before each pure step; nothing here knows where the document came
-from or who shows the result. Nothing is ever deleted, and manual lines are never touched: that is the
+What a run needs from the server is fetched before each pure step; nothing here knows where the document
+came from or who shows the result. Nothing is ever deleted, and manual lines are never touched: that is the
 server's rule too, so a faulty client cannot break it.
+
+Standard parts have one item per designation and server, for all people and projects. Their identity is
+derived from the designation, so no file is stamped. A server that lets us choose an item's UUID has it under
+that one. Another server (or one where somebody made the item by hand) has an item whose description is
+exactly the designation; its UUID is remembered in the user's folder.
+
+:class:`ActivityText` is a merge in the words of the Activity pane (spec bom-sync §6): plain text, never
+markup. The command line shows it in English, the pane in the user's language: it passes its ``translate``.
 """
 
 from __future__ import annotations
@@ -19,20 +27,26 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Any, Protocol, cast
 
 from silo.api.wire import (
     Component,
     LastSync,
     LeftOutPart,
+    MergeDiff,
     MergeEntry,
+    MergeEvent,
     MergeRequest,
     MergeResult,
+    MergeWarning,
+    ProductSummary,
+    Revision,
     SourceDocument,
 )
 from silo.bom.compare import MergePlan, diff_bom, plan_merge
 from silo.bom.document import relative
-from silo.bom.errors import SiloError
+from silo.bom.errors import SiloError, Translate, english
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.links import extract, extract_bom_links
 from silo.bom.model import BomDiff, BomEntry, Extraction, walk_entries
@@ -47,8 +61,97 @@ from silo.bom.resolve import (
     resolve_with,
     unregistered_findings,
 )
-from silo.platform import cache_folder
-from silo.standard_items import Memory, find_items, server_of
+from silo.platform import cache_folder, data_folder, read_memory, write_memory
+
+# Each costs a request, and only while nobody has registered the part.
+MOST_LOOKED_UP = 200
+
+
+class Memory:
+    """Server → UUID derived from the designation → UUID of the item there. One small file."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path or data_folder() / "standard-items.json"
+
+    def known(self, server: str) -> dict[str, str]:
+        """What is known of a server; nothing where the file cannot be read, which only costs a search."""
+        return self._read().get(server, {})
+
+    def remember(self, server: str, items: Mapping[str, str]) -> None:
+        """Keep what was found or made; what cannot be written costs a search."""
+        servers = self._read()
+        before = servers.get(server, {})
+        if items.items() <= before.items():
+            return
+        write_memory(self.path, {**servers, server: {**before, **items}})
+
+    def _read(self) -> dict[str, dict[str, str]]:
+        return {server: items for server, items in read_memory(self.path).items() if isinstance(items, dict)}
+
+
+def find_items(
+    entries: Iterable[BomEntry], items_by_uuid: Mapping[str, Any], api: Any, memory: Memory | None = None
+) -> dict[str, Mapping[str, Any]]:
+    """The items of standard parts that the server does not know by their UUID: UUID → item.
+
+    known
+        what the server answered for the UUIDs of the whole tree.
+    """
+    wanted = {
+        entry.silo_uuid: entry.standard
+        for entry in walk_entries(entries)
+        if entry.is_standard
+        and entry.silo_uuid
+        and entry.standard
+        and items_by_uuid.get(entry.silo_uuid) is None
+    }
+    if not wanted:
+        return {}
+    memory = memory or Memory()
+    items = dict(_remembered(wanted, api, memory))
+    # A server that reports its last syncs keeps the UUIDs that it is given, so nothing more is asked.
+    if any(item is not None and item.get("last_sync") is not None for item in items_by_uuid.values()):
+        return items
+    searched = {}
+    for uuid, designation in [pair for pair in wanted.items() if pair[0] not in items][:MOST_LOOKED_UP]:
+        if (item := by_description(designation, api)) is not None:
+            searched[uuid] = item
+    if searched:
+        memory.remember(server_of(api), {uuid: str(item["id"]) for uuid, item in searched.items()})
+    return items | searched
+
+
+def _remembered(
+    wanted: Mapping[str, str], api: Any, memory: Memory
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    items = memory.known(server_of(api))
+    for uuid, item_id in ((uuid, items[uuid]) for uuid in wanted if uuid in items):
+        if (item := api.get_item_by_uuid(item_id)) is not None:
+            yield uuid, item
+
+
+def by_description(designation: str, api: Any) -> Mapping[str, Any] | None:
+    """The one item whose description (or name) is exactly the designation; None for none and for several."""
+    search = getattr(api, "search_items", None)
+    if not callable(search):
+        return None
+    try:
+        items = {str(item["id"]): item for item in search(designation)}
+    except SiloError:
+        return None  # nothing is lost: the part reads as unregistered, and can be registered
+    same = [
+        item
+        for item in items.values()
+        if designation in (item.get("description"), item.get("name"))
+        and str(item.get("item_type") or "part") != "assembly"
+    ]
+    return same[0] if len(same) == 1 else None
+
+
+def server_of(api: Any) -> str:
+    """How a memory names the server."""
+    return str(getattr(api, "base_url", ""))
+
 
 __all__ = [
     "BomDiff",
@@ -94,17 +197,17 @@ class _Findings(tuple[Finding, ...]):
     @cached_property
     def _by_file(self) -> Mapping[str, list[int]]:
         """Where the errors of each file stand; under "" the loops, which block every assembly."""
-        found: dict[str, list[int]] = {}
+        result: dict[str, list[int]] = {}
         for number, finding in enumerate(self):
             if finding.severity is Severity.ERROR:
                 loop = finding.code in (FindingCode.CYCLE, FindingCode.TOO_DEEP)
                 for path in [""] if loop else dict.fromkeys(place.doc_path for place in finding.where):
-                    found.setdefault(path, []).append(number)
-        return found
+                    result.setdefault(path, []).append(number)
+        return result
 
     def blocking(self, path: str) -> tuple[Finding, ...]:
-        known = self._by_file
-        return tuple(self[number] for number in sorted({*known.get("", ()), *known.get(path, ())}))
+        by_file = self._by_file
+        return tuple(self[number] for number in sorted({*by_file.get("", ()), *by_file.get(path, ())}))
 
 
 @dataclass(frozen=True)
@@ -157,8 +260,8 @@ class Resolved:
         last = self.last_syncs.get(self.assembly.silo_uuid or "")
         if last is None:
             return False
-        known = LastSync.model_validate(last) if isinstance(last, Mapping) else last
-        if known.at is None or _texts(known.left_out) != _texts(_left_out(self)):
+        last_sync = LastSync.model_validate(last) if isinstance(last, Mapping) else last
+        if last_sync.at is None or _texts(last_sync.left_out) != _texts(_left_out(self)):
             return True
         before = {line["child_part_number"]: _places(line.get("components") or ()) for line in lines}
         now: dict[str, set[tuple[str, str]]] = {}
@@ -174,11 +277,11 @@ class Resolved:
 
 
 def _places(components: Iterable[Mapping[str, Any]]) -> set[tuple[str, str]]:
-    return {(one.get("file") or "", one.get("object") or "") for one in components}
+    return {(component.get("file") or "", component.get("object") or "") for component in components}
 
 
 def _left_out(resolved: Resolved) -> list[LeftOutPart]:
-    return [LeftOutPart.model_validate(one.as_dict()) for one in resolved.left_out]
+    return [LeftOutPart.model_validate(out.as_dict()) for out in resolved.left_out]
 
 
 def _texts(parts: Iterable[LeftOutPart]) -> list[str]:
@@ -209,15 +312,15 @@ def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
 
 def known_items(uuids: Iterable[str], entries: Iterable[BomEntry], api: ItemLookup) -> Known:
     """The server's items of these identities, and those of the standard parts among the entries."""
-    known = look_up(uuids, api)
-    return {**known, **find_items(entries, known, api)}
+    items = look_up(uuids, api)
+    return {**items, **find_items(entries, items, api)}
 
 
-def resolve_known(extraction: Extraction, known: Known) -> Resolved:
+def resolve_known(extraction: Extraction, items: Known) -> Resolved:
     """:func:`resolve` against items fetched before; pure."""
     head = extraction.assembly
-    entries, unresolved = resolve_with(extraction.entries, known)
-    item = known.get(head.silo_uuid) if head.silo_uuid else None
+    entries, unresolved = resolve_with(extraction.entries, items)
+    item = items.get(head.silo_uuid) if head.silo_uuid else None
     if item is not None:
         number = str(item["part_number"])
         head = replace(head, part_number=number, name=item.get("name") or item.get("description") or number)
@@ -228,12 +331,12 @@ def resolve_known(extraction: Extraction, known: Known) -> Resolved:
         entries=tuple(entries),
         unresolved=tuple(unresolved),
         findings=(
-            *numbered_findings(extraction.findings, known),
+            *numbered_findings(extraction.findings, items),
             *consolidation_findings(entries),
             *unregistered_findings(unresolved),
         ),
         last_syncs={
-            uuid: last for uuid, item in known.items() if item and (last := item.get("last_sync")) is not None
+            uuid: last for uuid, item in items.items() if item and (last := item.get("last_sync")) is not None
         },
     )
 
@@ -262,8 +365,8 @@ def names_of(resolved: Resolved, lines: Iterable[Mapping[str, Any]] = ()) -> dic
         line["child_part_number"]: line.get("child_description") or line.get("child_name") or ""
         for line in lines
     }
-    known = walk_entries((resolved.assembly, *resolved.entries, *resolved.unresolved))
-    return names | {entry.part_number: entry.name or "" for entry in known if entry.part_number}
+    entries = walk_entries((resolved.assembly, *resolved.entries, *resolved.unresolved))
+    return names | {entry.part_number: entry.name or "" for entry in entries if entry.part_number}
 
 
 def decide(
@@ -288,7 +391,7 @@ def decide(
     return Outcome(Status.MERGED if is_news else Status.UNCHANGED, resolved, plan, names=names)
 
 
-def _told() -> Memory:
+def _reported_lines() -> Memory:
     """Server → part number of an assembly → its unreferenced lines that the server has heard of."""
     return Memory(cache_folder() / "unreferenced.json")
 
@@ -296,14 +399,14 @@ def _told() -> Memory:
 def _is_told(resolved: Resolved, plan: MergePlan, server: str) -> bool:
     if not server or resolved.assembly.silo_uuid in resolved.last_syncs or replace(plan, flag=()).news:
         return False
-    told = _told().known(server).get(resolved.assembly.part_number or "", "")
-    return bool(plan.flag) and set(plan.flag) <= set(told.split("\n"))
+    answer = _reported_lines().known(server).get(resolved.assembly.part_number or "", "")
+    return bool(plan.flag) and set(plan.flag) <= set(answer.split("\n"))
 
 
 def merged(resolved: Resolved, plan: MergePlan, server: str) -> None:
     """Remember what a merge has told a server that does not show which lines are unreferenced."""
     if plan.flag and server and resolved.assembly.silo_uuid not in resolved.last_syncs:
-        _told().remember(server, {resolved.assembly.part_number or "": "\n".join(plan.flag)})
+        _reported_lines().remember(server, {resolved.assembly.part_number or "": "\n".join(plan.flag)})
 
 
 def sync(
@@ -355,7 +458,7 @@ def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | N
         MergeEntry(
             child_part_number=entry.part_number,
             quantity=entry.quantity,
-            components=[Component(**one) for one in components_of(entry, resolved.folder)]
+            components=[Component(**component) for component in components_of(entry, resolved.folder)]
             if remembers
             else None,
         )
@@ -382,7 +485,7 @@ def assemblies(resolved: Resolved) -> Iterator[Resolved]:
                 yield from below(entry.children)
                 yield entry
 
-    # Sub-assemblies without a number hang in `unresolved`; their own sub-assemblies are synced all the same.
+    # Sub-assemblies without a number hang in `unresolved`; their own sub-assemblies are synced anyway.
     for entry in below((*resolved.unresolved, *resolved.entries)):
         yield replace(resolved, assembly=entry, entries=entry.children)
     yield resolved
@@ -405,17 +508,118 @@ def sync_tree(
     from silo.api.policy import ends_run  # loads the network's packages
 
     stopped: SiloError | None = None
-    for one in assemblies(resolved) if recursive else (resolved,):
+    for assembly in assemblies(resolved) if recursive else (resolved,):
         if stopped is not None:
-            yield Outcome(Status.FAILED, one, error=stopped)
+            yield Outcome(Status.FAILED, assembly, error=stopped)
             continue
         outcome = sync(
-            one,
+            assembly,
             api,
             sync_id=sync_id(),
             allow_missing=allow_missing,
             dry_run=dry_run,
-            describe=partial(describe, one.assembly),
+            describe=partial(describe, assembly.assembly),
         )
         stopped = outcome.error if outcome.error is not None and ends_run(outcome.error, api) else None
         yield outcome
+
+
+@dataclass(frozen=True)
+class ActivityText:
+    """What one merge shows: a headline, the counts, and where a person decides."""
+
+    headline: str
+    counts: str
+    resolve_url: str
+    unregistered: str = ""
+
+    def lines(self) -> tuple[str, ...]:
+        """All of it, a line each."""
+        link = "View in Silo →" if self.resolve_url else ""
+        return tuple(line for line in (self.headline, self.counts, link, self.unregistered) if line)
+
+
+class MergeCount(StrEnum):
+    """What a merge counts, in the order in which it is shown."""
+
+    ADDED = "added"
+    CHANGED = "changed"
+    UNREFERENCED = "unreferenced"
+    IN_CONFLICT = "in conflict"
+
+
+def headline(item: str, translate: Translate = english) -> str:
+    """``BOM Updated: ASM-001``."""
+    return translate("Silo", "BOM Updated: {number}").replace("{number}", item)
+
+
+def count_texts(
+    diff: MergeDiff, warnings: Iterable[MergeWarning] = (), translate: Translate = english
+) -> dict[MergeCount, str]:
+    """Each count of a merge in words, such as ``+1 added``, without those that are zero."""
+    conflicts = sum(1 for warning in warnings if warning.type == "conflict")
+    counted = (
+        (MergeCount.ADDED, len(diff.added), translate("Silo", "+{n} added")),
+        (MergeCount.CHANGED, len(diff.quantity_changed), translate("Silo", "~{n} qty changed")),
+        (MergeCount.UNREFERENCED, len(diff.removed), translate("Silo", "⚠{n} unreferenced")),
+        (MergeCount.IN_CONFLICT, conflicts, translate("Silo", "⚡{n} in conflict")),
+    )
+    return {kind: text.replace("{n}", str(count)) for kind, count, text in counted if count}
+
+
+def no_changes(translate: Translate = english) -> str:
+    """What stands there instead of counts."""
+    return translate("Silo", "no changes")
+
+
+def counts_text(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> str:
+    """``+1 added  ~1 qty changed  ⚠1 unreferenced``, without what is zero."""
+    return "  ".join(count_texts(diff, warnings).values()) or no_changes()
+
+
+def unregistered_text(count: int, translate: Translate = english) -> str:
+    """``2 components have no Silo part number``; "" for none."""
+    text = translate("Silo", "{n} component has no Silo part number")
+    many = translate("Silo", "{n} components have no Silo part number")
+    return (text if count == 1 else many).replace("{n}", str(count)) if count else ""
+
+
+def draft_text(result: MergeResult | Revision | None, translate: Translate = english) -> str:
+    """Which draft a change of a released product is part of; "" if nothing of it is released."""
+    draft = result.draft if result is not None else None
+    if draft is None:
+        return ""
+    text = translate("Silo", "This is part of draft {draft}. Revision {released} stays released as it is.")
+    return text.replace("{draft}", draft.label).replace("{released}", draft.released)
+
+
+def summary_texts(summary: ProductSummary, translate: Translate = english) -> tuple[list[str], list[str]]:
+    """What is open in each BOM of a product; and what it weighs and costs, as the server keeps it."""
+    texts = [f"{number}: {words}" for number, words in (*summary.open.items(), *summary.incomplete.items())]
+    mass = f"{summary.total_mass_kg:g} kg" if summary.total_mass_kg else ""
+    costs = ", ".join(f"{total.total_cost:.2f} {total.currency}" for total in summary.totals)
+    values = []
+    for value, lacking in ((mass, summary.mass_missing), (costs, summary.cost_missing)):
+        text = translate("Silo", "{value} for {n} of {all} parts") if lacking.count else "{value}"
+        text = text.replace("{n}", str(summary.parts - lacking.count)).replace("{all}", str(summary.parts))
+        values += [text.replace("{value}", value)] if value else []
+    return texts, values
+
+
+def rules_text(problem: str, translate: Translate = english) -> str:
+    """That the site's category rules have a mistake, and which; "" where they have none."""
+    text = translate("Silo", "The category rules of this Silo are not used until they are mended: {problem}")
+    return text.replace("{problem}", problem) if problem else ""
+
+
+def activity_text(
+    item: str, merge: MergeEvent | MergeResult, *, resolve_url: str = "", unregistered: int = 0
+) -> ActivityText:
+    """The box of one merge; ``resolve_url`` overrides the event's (made absolute by the caller)."""
+    without = unregistered_text(unregistered)
+    return ActivityText(
+        headline=headline(item),
+        counts=counts_text(merge.diff, tuple(merge.warnings)),
+        resolve_url=resolve_url or merge.resolve_url,
+        unregistered=f"⚠ {without}" if without else "",
+    )

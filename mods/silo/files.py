@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """FreeCAD files on disk: which are meant, their content's hash, and whose turn a folder is. Standard library
-only."""
+only.
+
+A :class:`Locator` leads from the path that a link records to a file on disk. FreeCAD records paths relative
+to the folder of the owning file as it was opened, always with ``/``, and joins them as text: ``..`` takes
+one name away, symlinks are not followed first (``src/App/PropertyLinks.cpp``, observed with FreeCAD 0.20 and
+1.0). We do the same, and try the folder where the owning file really lies after that; FreeCAD 1.1 goes from
+there alone. Only if both ways lead to a file do the versions differ.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +17,31 @@ import glob
 import hashlib
 import json
 import os
+import re
 import socket
 import time
 from codecs import BOM_UTF8
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from itertools import chain
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from silo.bom.errors import ConfigError, DocumentError, InputError
-from silo.platform import Spelling, cache_folder, hold_lock, one_path, read_memory, replacing, shows_locks
+from silo.bom.findings import FindingCode
+from silo.platform import (
+    Spelling,
+    Spelt,
+    cache_folder,
+    folded,
+    hold_lock,
+    is_device_name,
+    one_path,
+    read_memory,
+    replacing,
+    shows_locks,
+)
 
 IGNORE_FILE = ".siloignore"
 
@@ -33,11 +53,11 @@ def documents_in(tops: Iterable[str]) -> list[str]:
 
     Left out are backups, hidden files and folders, recycle bins, and what a ``.siloignore`` in the folder or
     below it names (in the syntax of ``.gitignore``). A folder that cannot be listed is in the result itself,
-    so that whoever reads the files reports it. A pattern
+    so that the reader of the files reports it. A pattern
     (``*.FCStd``) stands for what fits it: the shells of Windows hand patterns over as they are. InputError
     names all that is not there.
     """
-    meant = list(chain.from_iterable(map(_meant, tops)))
+    meant = list(chain.from_iterable(map(_documents_of, tops)))
     must_exist(*meant)
     spelling = Spelling()
     once: dict[str, str] = {}
@@ -78,8 +98,8 @@ def _below(folder: str, rules: tuple[tuple[int, Check], ...] = (), inner: str = 
         the folder as seen from the first one; "" or ending in ``/``.
     """
     try:
-        with os.scandir(folder) as found:
-            entries = sorted(found, key=lambda entry: entry.name)
+        with os.scandir(folder) as listing:
+            entries = sorted(listing, key=lambda entry: entry.name)
     except OSError:
         yield folder
         return
@@ -126,7 +146,7 @@ def _patterns(path: str) -> Check:
     return lambda name: spec.check_file(name).include
 
 
-def _meant(top: str) -> list[str]:
+def _documents_of(top: str) -> list[str]:
     if glob.has_magic(top) and not os.path.lexists(top):
         return sorted(glob.glob(top)) or [top]
     return [top]
@@ -138,7 +158,7 @@ _TRIES = 100  # of a lock whose file was deleted by its last holder
 
 
 @dataclass(frozen=True)
-class Kept:
+class ProjectEntry:
     """What a project remembers of a file, by its path relative to the root, with ``/``.
 
     document
@@ -183,22 +203,22 @@ class Project:
         """Return where a file of the project lies."""
         return os.path.join(self.root, *place.split("/"))
 
-    def files(self) -> dict[str, Kept]:
+    def files(self) -> dict[str, ProjectEntry]:
         """Return what is remembered of each file, by place."""
-        told = read_memory(Path(self.root, PROJECT_FILE)).get("files")
-        names = {one.name for one in fields(Kept)}
+        files_noted = read_memory(Path(self.root, PROJECT_FILE)).get("files")
+        names = {each_field.name for each_field in fields(ProjectEntry)}
         return {
-            str(place): Kept(**{key: str(value) for key, value in one.items() if key in names})
-            for place, one in (told.items() if isinstance(told, dict) else ())
-            if isinstance(one, dict) and one.get("document")
+            str(place): ProjectEntry(**{key: str(value) for key, value in each_field.items() if key in names})
+            for place, each_field in (files_noted.items() if isinstance(files_noted, dict) else ())
+            if isinstance(each_field, dict) and each_field.get("document")
         }
 
-    def note(self, known: Mapping[str, Kept | None]) -> None:
+    def note(self, noted: Mapping[str, ProjectEntry | None]) -> None:
         """Remember these files, None to forget one. Raises DocumentError where the folder takes nothing."""
         try:
             with folder_lock(self.root, f"{PROJECT_FILE}.lock", "written", _PATIENCE_S):
-                files = {place: asdict(kept) for place, kept in self.files().items() if place not in known}
-                files |= {place: asdict(kept) for place, kept in known.items() if kept is not None}
+                files = {place: asdict(kept) for place, kept in self.files().items() if place not in noted}
+                files |= {place: asdict(kept) for place, kept in noted.items() if kept is not None}
                 with replacing(Path(self.root, PROJECT_FILE), mode=0o644) as out:
                     out.write(json.dumps({"files": files}, indent=1, sort_keys=True).encode())
         except OSError as error:
@@ -357,3 +377,172 @@ def shipped() -> Path:
     """The folder with the example and the add-on's own files: the checkout, or what the wheel holds of it."""
     wheel = Path(__file__).parent / "shipped"
     return wheel if wheel.is_dir() else Path(__file__).resolve().parents[2]
+
+
+_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
+_STREAM = re.compile(r"\.fcstd:", re.I)
+_LONGEST, _DEEPEST = 4096, 128
+_FOLDER_AT_MOST = 50_000
+
+
+class FoundFile(NamedTuple):
+    """A file. ``opened`` is the path as FreeCAD would open it, ``real`` has no symlinks in it."""
+
+    opened: str
+    real: str
+    respelt: bool = False
+
+    def is_straight(self, recorded: str, folder: str) -> bool:
+        """True where the path itself leads to the file: it is found so for as long as it lies there."""
+        return self.real == os.path.normpath(os.path.join(folder, recorded))
+
+
+class NotFound(NamedTuple):
+    """Why there is no file to open."""
+
+    code: FindingCode
+    detail: str = ""
+
+
+@dataclass
+class Locator:
+    """Finds linked files, all below ``root`` where one is given; remembers folders for one session.
+
+    remembers_files
+        a file that was found is not looked for again.
+    """
+
+    root: str | None = None
+    remembers_files: bool = False
+    _files: dict[tuple[str, tuple[str, ...]], FoundFile] = field(default_factory=dict)
+    _spelling: Spelling = field(default_factory=Spelling)
+    _listings: dict[str, dict[str, list[str]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.root is not None:
+            self.root = self._spelling.real(self.root)
+
+    def real(self, path: str) -> str:
+        """The one path of a file: without symlinks, as its folders list it."""
+        return self._spelling.look(path).path
+
+    def inside(self, real_path: str) -> bool:
+        """True where a path without symlinks may be read."""
+        root = self.root
+        return root is None or real_path == root or real_path.startswith(os.path.join(root, ""))
+
+    def find(self, recorded: str, folders: tuple[str, ...]) -> FoundFile | NotFound:
+        """The file that a link in a document of (one of) these folders means."""
+        if not self.remembers_files:
+            return self._find(recorded, folders)
+        result: FoundFile | NotFound | None = self._files.get((recorded, folders))
+        if result is None:
+            result = self._find(recorded, folders)
+            if isinstance(result, FoundFile):
+                self._files[recorded, folders] = result
+        return result
+
+    def learn(self, folders: tuple[str, ...], locations: Mapping[str, FoundFile]) -> None:
+        """Remember where the paths of a document's links lead, as another session found it just now."""
+        for recorded, location in locations.items():
+            self._files.setdefault((recorded, folders), location)
+
+    def _find(self, recorded: str, folders: tuple[str, ...]) -> FoundFile | NotFound:
+        if "://" in recorded and _URL.match(recorded):
+            return NotFound(FindingCode.MISSING_FILE, "it is a web address; only files are read")
+        if (refused := refusal(recorded)) is not None:
+            return refused
+        outside = False
+        for path in _candidates(recorded, folders):
+            spelt = self._spelling.look(path)
+            if not self.inside(spelt.path):
+                outside = True
+            elif spelt.there:
+                return FoundFile(path, spelt.path, respelt=_respelt_by_disk(recorded, spelt))
+        if outside:
+            return NotFound(FindingCode.OUTSIDE_ROOT)
+        if recorded.count("/") > _DEEPEST:
+            return NotFound(FindingCode.MISSING_FILE)
+        return self._respelt(recorded, folders)
+
+    def lies_straight(self, path: str) -> bool:
+        """True where what is there has this very path: no folder is a symlink, names are as listed."""
+        return self._spelling.is_plain(path)
+
+    def _respelt(self, recorded: str, folders: tuple[str, ...]) -> FoundFile | NotFound:
+        """Written on Windows or macOS, where ``Part.FCStd`` opens ``part.FCStd``: taken if only one fits."""
+        for path in _candidates(recorded, folders):
+            matches = list(self._spellings(path))
+            if len(matches) > 1:
+                names = ", ".join(sorted(os.path.basename(match) for match in matches[:4]))
+                return NotFound(
+                    FindingCode.MISSING_FILE,
+                    f"several files differ from it in case or Unicode form only: {names}",
+                )
+            if matches and self.inside(real := self.real(matches[0])):
+                return FoundFile(matches[0], real, respelt=True)
+        return NotFound(FindingCode.MISSING_FILE)
+
+    def _spellings(self, path: str) -> Iterator[str]:
+        folder, name = os.path.split(path)
+        if not name or folder == path:
+            return
+        if os.path.isdir(folder):
+            parents = [folder]
+        else:
+            parents = [p for p in self._spellings(folder) if os.path.isdir(p)][:2]
+        for parent in parents:
+            if self.inside(os.path.realpath(parent)):
+                for match in self._listing(parent).get(folded(name), ()):
+                    yield os.path.join(parent, match)
+
+    def _listing(self, folder: str) -> dict[str, list[str]]:
+        listing = self._listings.get(folder)
+        if listing is None:
+            listing = self._listings[folder] = {}
+            try:
+                with os.scandir(folder) as entries:
+                    for _, item in zip(range(_FOLDER_AT_MOST), entries, strict=False):
+                        listing.setdefault(folded(item.name), []).append(item.name)
+            except OSError:
+                pass  # a folder that cannot be listed shows nothing
+        return listing
+
+
+def refusal(recorded: str) -> NotFound | None:
+    """Why a recorded path is not even looked at; None where it may be.
+
+    The rules are those of Windows, where a mere look can do harm, and the same on every platform: a project
+    must not read in one way here and in another there.
+    """
+    if "\0" in recorded or len(recorded) > _LONGEST:
+        return NotFound(FindingCode.MISSING_FILE, "its path cannot be one")
+    path = recorded.replace("\\", "/")
+    if path.startswith("//"):
+        # The mere look would send the user's credentials to that host; //./ and //?/ name devices.
+        return NotFound(FindingCode.OUTSIDE_ROOT, "it is on the network or a device, by an absolute path")
+    for name in path.split("/"):
+        if is_device_name(name):
+            return NotFound(FindingCode.MISSING_FILE, f"{name} is a device on Windows, not a file")
+        if _STREAM.search(name):
+            return NotFound(FindingCode.MISSING_FILE, f"{name} names a stream within a file")
+    return None
+
+
+def _respelt_by_disk(recorded: str, spelt: Spelt) -> bool:
+    """True where a disk that ignores case found a name of the link under another spelling.
+
+    How the user spelt the folders above is not the link's matter.
+    """
+    if spelt.path == spelt.plain:
+        return False
+    own = len([name for name in recorded.replace("\\", "/").split("/") if name not in ("", ".", "..")])
+    plain, listed = (Path(path).parts[-own:] for path in (spelt.plain, spelt.path))
+    return plain != listed
+
+
+def _candidates(recorded: str, folders: tuple[str, ...]) -> Iterator[str]:
+    spellings = (recorded, recorded.replace("\\", "/")) if "\\" in recorded else (recorded,)
+    for spelling in spellings:
+        for folder in folders:
+            yield os.path.normpath(os.path.join(folder, spelling))

@@ -9,7 +9,7 @@ Which files a running FreeCAD of this user has open: it would later overwrite wh
 FreeCAD (0.20 to 1.1) keeps a folder ``<program>_Doc_<Uid>_<hash>_<number>`` in its cache for each open
 document, the hash being the first six digits of the SHA-1 of the file's path, and holds a lock on
 ``<program>_<number>.lock`` while it runs (App/Document.cpp, Gui/Application.cpp; seen in all three). Where
-the platform cannot say whether a lock is held, nothing is known and nothing is said; the same goes for a
+the platform cannot say whether a lock is held, nothing is known and nothing is reported; the same goes for a
 FreeCAD of another user or machine. Standard library only.
 
 FreeCAD as a child process: BOMs of many files, read by ``freecadcmd``, each on its own.
@@ -74,10 +74,10 @@ def commands(env: Mapping[str, str] = os.environ, platform: str = NAME, root: Pa
     elsewhere = (str(path) for path in _matching(env, root, *_command_places(env, platform)))
     # Windows and macOS find one program under two of these names.
     real, seen = Spelling().real, set()
-    for found in (*filter(None, on_path), *elsewhere):
-        if os.access(found, os.X_OK) and real(found) not in seen:
-            seen.add(real(found))
-            yield found
+    for command_path in (*filter(None, on_path), *elsewhere):
+        if os.access(command_path, os.X_OK) and real(command_path) not in seen:
+            seen.add(real(command_path))
+            yield command_path
 
 
 def _command_places(env: Mapping[str, str], platform: str) -> tuple[str, ...]:
@@ -167,9 +167,9 @@ def exchange_folder(command: str, env: Mapping[str, str] = os.environ) -> str | 
 
 def _windows(env: Mapping[str, str]) -> list[str]:
     """Installed for all users, or for one."""
-    known = [name for name in ("PROGRAMFILES", "PROGRAMW6432", "LOCALAPPDATA") if env.get(name)]
-    places = [f"{{{name}}}" for name in known]
-    places += ["{LOCALAPPDATA}/Programs"] if "LOCALAPPDATA" in known else []
+    roots = [name for name in ("PROGRAMFILES", "PROGRAMW6432", "LOCALAPPDATA") if env.get(name)]
+    places = [f"{{{name}}}" for name in roots]
+    places += ["{LOCALAPPDATA}/Programs"] if "LOCALAPPDATA" in roots else []
     return [f"{place}/FreeCAD*" for place in places]
 
 
@@ -214,11 +214,15 @@ class OpenInFreecad:
     """
 
     def __init__(self, caches: Iterable[str | Path], but_not: str = str(os.getpid())) -> None:
-        self._hashes = frozenset(found for cache in caches for found in _open_in(cache, but_not))
+        self._hashes = frozenset(digest for cache in caches for digest in _open_in(cache, but_not))
 
     def has(self, *paths: str) -> bool:
         """True where a file, by any of these spellings, is open in FreeCAD."""
-        return any(_hash(path) in self._hashes for path in paths if path)
+        return any(
+            hashlib.sha1(os.fsencode(path), usedforsecurity=False).hexdigest()[:6] in self._hashes
+            for path in paths
+            if path
+        )
 
     def has_file(self, path: str) -> bool:
         """True where a file is open in FreeCAD under its given, its absolute or its real path.
@@ -247,20 +251,16 @@ def open_in_others(own_folder: str) -> OpenInFreecad:
     return OpenInFreecad((), "") if own is None else OpenInFreecad((cache,), own["number"])
 
 
-def _hash(path: str) -> str:
-    return hashlib.sha1(os.fsencode(path), usedforsecurity=False).hexdigest()[:6]
-
-
 def _open_in(cache: str | Path, but_not: str) -> frozenset[str]:
     try:
         names = os.listdir(cache)
     except OSError:
         return frozenset()
-    found = [match for name in names if (match := _FOLDER.fullmatch(name)) and match["number"] != but_not]
-    locks = {f"{match['program']}_{match['number']}.lock" for match in found}
+    matches = [match for name in names if (match := _FOLDER.fullmatch(name)) and match["number"] != but_not]
+    locks = {f"{match['program']}_{match['number']}.lock" for match in matches}
     alive = {lock for lock in locks if is_locked(os.path.join(cache, lock))}
     # A folder whose lock is free is what a FreeCAD that crashed has left behind.
-    return frozenset(m["hash"] for m in found if f"{m['program']}_{m['number']}.lock" in alive)
+    return frozenset(m["hash"] for m in matches if f"{m['program']}_{m['number']}.lock" in alive)
 
 
 HEADLESS = Path(__file__).resolve().parent / "workbench" / "headless.py"
@@ -275,20 +275,20 @@ def find_freecadcmd(given: str | None = None, env: Mapping[str, str] = os.enviro
     """The ``freecadcmd`` to start: the given one, ``SILO_FREECADCMD``, or one found. ConfigError if none."""
     wanted = given or env.get("SILO_FREECADCMD")
     if wanted:
-        found = shutil.which(wanted)
-        if found is None:
+        command = shutil.which(wanted)
+        if command is None:
             raise ConfigError(
                 f"{wanted} cannot be run; SILO_FREECADCMD must name FreeCAD's freecadcmd, its AppImage "
                 "or what Flatpak exports (…/flatpak/exports/bin/org.freecad.FreeCAD)"
             )
-        return found
-    found = next(commands(env), None)
-    if found is None:
+        return command
+    command = next(commands(env), None)
+    if command is None:
         raise ConfigError(
             "no FreeCAD found: freecadcmd is not on the PATH, nor where FreeCAD is usually installed. "
             "Install FreeCAD, or set SILO_FREECADCMD to its freecadcmd or AppImage"
         )
-    return found
+    return command
 
 
 _VERSION = """
@@ -305,13 +305,13 @@ def freecad_for(saved_by: tuple[int, ...]) -> tuple[str, str]:
     ConfigError if there is none.
     """
     given = [find_freecadcmd()] if os.environ.get("SILO_FREECADCMD") else None
-    known: list[tuple[tuple[int, ...], str]] = []
+    versions: list[tuple[tuple[int, ...], str]] = []
     for command in given or commands():
         with suppress(ConfigError):
-            known.append((tuple(ask_inside(command, _VERSION, {})), command))
-            if known[-1][0] >= saved_by:
+            versions.append((tuple(ask_inside(command, _VERSION, {})), command))
+            if versions[-1][0] >= saved_by:
                 break
-    version, command = max(known, key=lambda one: one[0]) if known else ((), find_freecadcmd())
+    version, command = max(versions, key=lambda pair: pair[0]) if versions else ((), find_freecadcmd())
     return command, ".".join(map(str, version)) or "of an unknown version"
 
 
@@ -365,27 +365,27 @@ def run_freecad(
     env
         set in FreeCAD's environment beside our own, such as ``FREECAD_USER_HOME``.
     witness
-        takes what the geometry of each file says (``silo.workbench.freecad.witness``), by file.
+        takes what the geometry of each file says (``silo.workbench.freecad.live``), by file.
 
     A file that FreeCAD cannot read, dies of or hangs on gives its error, and the rest is still read.
     ConfigError where there is no FreeCAD, or where it does not start.
     """
     freecadcmd = find_freecadcmd(command)
     rest = [os.path.abspath(top) for top in tops]
-    told = dict(zip(rest, tops, strict=True))
+    answers = dict(zip(rest, tops, strict=True))
     settings = {"assembly": assembly, "no_hardware": not hardware, "verify": witness is not None}
     given = {key: value for key, value in settings.items() if value}
     while rest:
         with FreeCADRun(freecadcmd, {**given, "tops": rest}, timeout_s, env or {}) as run:
             for line in run.lines():
-                top = told[rest.pop(0)]
+                top = answers[rest.pop(0)]
                 if witness is not None:
                     witness[top] = line.get("witness", [])
                 yield top, _result(line)
         if rest:
             # The process is over, and this file was not finished.
             failed = rest.pop(0)
-            yield told[failed], run.failure(failed)
+            yield answers[failed], run.failure(failed)
 
 
 def _result(line: Mapping[str, Any]) -> Extraction | SiloError:
@@ -556,7 +556,7 @@ _ASK_SECONDS, _PIP_SECONDS = 60.0, 600.0
 
 
 @dataclass(frozen=True)
-class Place:
+class Installation:
     """A FreeCAD: how it is started, its data folder, its folder for packages, its version and its Python's.
 
     pythons
@@ -582,7 +582,7 @@ class Place:
         return self.data / "Mod" / FOLDER
 
 
-def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Place:
+def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Installation:
     """Ask FreeCAD for its folders and versions, and let it import what the add-on needs. Raises ConfigError.
 
     data
@@ -590,17 +590,17 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
     """
     command = find_freecadcmd(freecadcmd)
     env = {"SILO_ASK_DATA": str(data or ""), "SILO_ASK_NAMES": " ".join(FREECAD_PACKAGES)}
-    told = ask_inside(command, _ASK, env)
-    (major, minor), python = told["freecad"], told["python"]
-    return Place(
+    answer = ask_inside(command, _ASK, env)
+    (major, minor), python = answer["freecad"], answer["python"]
+    return Installation(
         command,
-        Path(told["data"]),
-        Path(told["packages"]),
+        Path(answer["data"]),
+        Path(answer["packages"]),
         (major, minor),
         (python[0], python[1]),
-        (*python_beside(told["prefix"]), *python_beside(os.path.dirname(os.path.realpath(command)))),
-        told["missing"],
-        told["constraints"],
+        (*python_beside(answer["prefix"]), *python_beside(os.path.dirname(os.path.realpath(command)))),
+        answer["missing"],
+        answer["constraints"],
     )
 
 
@@ -634,8 +634,8 @@ def _has_pip(python: str, version: tuple[int, int] | None = None) -> bool:
 
 def _any_python() -> str:
     """A Python with pip. Inside FreeCAD, ``sys.executable`` is FreeCAD."""
-    found = (sys.executable, shutil.which("python3"), shutil.which("python"), shutil.which("py"))
-    for python in found:
+    paths = (sys.executable, shutil.which("python3"), shutil.which("python"), shutil.which("py"))
+    for python in paths:
         if python and "freecad" not in os.path.basename(python).lower() and _has_pip(python):
             return python
     raise ConfigError(
@@ -644,7 +644,7 @@ def _any_python() -> str:
     )
 
 
-def install_folder(place: Place, source: Path | None = None, *, copy: bool = False) -> str:
+def install_folder(place: Installation, source: Path | None = None, *, copy: bool = False) -> str:
     """Link (or copy) the add-on into ``Mod``; returns what was done. A stranger's folder is left alone.
 
     source
@@ -682,14 +682,14 @@ def install_folder(place: Place, source: Path | None = None, *, copy: bool = Fal
     return f"{target} now leads to this checkout"
 
 
-def _remove_old(place: Place) -> None:
+def _remove_old(place: Installation) -> None:
     """Remove the add-on under the name of earlier versions: FreeCAD would start both."""
     old = place.data / "Mod" / OLD_FOLDER
     if (old / "package.xml").is_file() and (old / "mods" / "silo" / "workbench").is_dir():
         remove_patiently(old) if old.is_symlink() else shutil.rmtree(old)
 
 
-def install_packages(place: Place) -> str:
+def install_packages(place: Installation) -> str:
     """Install what the add-on lacks inside this FreeCAD, and have FreeCAD import it; return where it is.
 
     What is there already stays as it is, for other add-ons use it too. ConfigError if FreeCAD still cannot
@@ -725,7 +725,7 @@ def install_packages(place: Place) -> str:
     return str(place.packages)
 
 
-def _constraint(place: Place) -> list[str]:
+def _constraint(place: Installation) -> list[str]:
     if not place.constraints:
         return []
     return ["--constraint", "{}/{}.{}/constraints.txt".format(place.constraints.rstrip("/"), *place.python)]

@@ -275,10 +275,10 @@ def shows_locks(path: str, mounts: str = "/proc/self/mountinfo") -> bool:
     ):
         for line in file:
             words = line.split()
-            place = re.sub(r"\\(\d{3})", lambda found: chr(int(found[1], 8)), words[4])
+            place = re.sub(r"\\(\d{3})", lambda match: chr(int(match[1], 8)), words[4])
             kinds[place] = words[words.index("-") + 1]
     real = os.path.realpath(path)
-    place = max((one for one in kinds if one == "/" or f"{real}/".startswith(f"{one}/")), key=len)
+    place = max((kind for kind in kinds if kind == "/" or f"{real}/".startswith(f"{kind}/")), key=len)
     return not (kinds[place].startswith("fuse.") or kinds[place] in ("9p", "vboxsf", "virtiofs"))
 
 
@@ -309,15 +309,15 @@ def limit_this_process(
 
     Returns the names of the limits that could not be set: Windows has none, macOS refuses one of memory.
     """
-    found = resources or _resources()
+    system = resources or _resources()
     wanted = {"core": 0, **({"memory": memory} if memory else {}), **({"cpu": cpu_s} if cpu_s else {})}
-    if found is None:
+    if system is None:
         return tuple(wanted)
-    which = {"core": found.RLIMIT_CORE, "memory": found.RLIMIT_AS, "cpu": found.RLIMIT_CPU}
+    which = {"core": system.RLIMIT_CORE, "memory": system.RLIMIT_AS, "cpu": system.RLIMIT_CPU}
     refused = []
     for name, most in wanted.items():
         try:
-            found.setrlimit(which[name], (most, most + 5 if name == "cpu" else most))
+            system.setrlimit(which[name], (most, most + 5 if name == "cpu" else most))
         except (ValueError, OSError):
             refused.append(name)
     return tuple(refused)
@@ -325,12 +325,12 @@ def limit_this_process(
 
 def allow_many_files(resources: Resources | None = None) -> None:
     """Raise the limit of open files to what the machine allows: each listener of a server is one."""
-    found = resources or _resources()
-    if found is None:
+    system = resources or _resources()
+    if system is None:
         return
     with suppress(OSError, ValueError):  # macOS names no limit as the limit, and then refuses it
-        _, hard = found.getrlimit(found.RLIMIT_NOFILE)
-        found.setrlimit(found.RLIMIT_NOFILE, (hard, hard))
+        _, hard = system.getrlimit(system.RLIMIT_NOFILE)
+        system.setrlimit(system.RLIMIT_NOFILE, (hard, hard))
 
 
 def child_options(*, group: bool = False, offered: object = subprocess) -> dict[str, Any]:
@@ -399,8 +399,8 @@ def how_it_ended(code: int) -> str:
 
     A shell that started the child adds 128 to the signal; Windows has codes from 0xC0000000 on for crashes.
     """
-    known = {int(number): number.name for number in signal.Signals}
-    name = known.get(code - 128 if code > 128 else -code, str(-code) if code < 0 else "")
+    names = {int(number): number.name for number in signal.Signals}
+    name = names.get(code - 128 if code > 128 else -code, str(-code) if code < 0 else "")
     if code >= 0xC0000000:
         return f"crashed (0x{code:08X})"
     if name:
@@ -598,8 +598,8 @@ class Spelling:
         """The same for an absolute path, with what was asked for and whether anything is there."""
         folder, name = os.path.split(path)
         if not name:
-            found = os.path.realpath(path)
-            return Spelt(self._as_listed(found), found, os.path.lexists(found))
+            real = os.path.realpath(path)
+            return Spelt(self._as_listed(real), real, os.path.lexists(real))
         if folder not in self._folders:
             plain = os.path.realpath(folder)
             self._folders[folder] = plain, self._as_listed(plain)
@@ -624,20 +624,20 @@ class Spelling:
 
     def _as_listed(self, real: str) -> str:
         """A path without symlinks, each name as its folder lists it."""
-        known = self._canonical.get(real)
-        if known is None:
+        text = self._canonical.get(real)
+        if text is None:
             folder, name = os.path.split(real)
             if not name or folder == real:
-                known = real
+                text = real
             else:
                 parent = self._as_listed(folder)
                 try:
                     name = self._listed(parent, name, os.lstat(os.path.join(parent, name)))
                 except (OSError, ValueError):
                     pass  # nothing is there, so nothing lists it
-                known = os.path.join(parent, name)
-            self._canonical[real] = known
-        return known
+                text = os.path.join(parent, name)
+            self._canonical[real] = text
+        return text
 
     def _listed(self, folder: str, name: str, status: os.stat_result) -> str:
         if name.isascii() and folder in self._exact:
@@ -658,16 +658,16 @@ class Spelling:
 
     def _listing(self, folder: str) -> dict[str, list[tuple[str, int]]]:
         """Names and inode numbers of a folder's entries, by :func:`folded` name."""
-        known = self._listings.get(folder)
-        if known is None:
-            known = self._listings[folder] = {}
+        listing = self._listings.get(folder)
+        if listing is None:
+            listing = self._listings[folder] = {}
             try:
-                with os.scandir(folder) as found:
-                    for _, item in zip(range(_LISTED_AT_MOST), found, strict=False):
-                        known.setdefault(folded(item.name), []).append((item.name, item.inode()))
+                with os.scandir(folder) as entries:
+                    for _, item in zip(range(_LISTED_AT_MOST), entries, strict=False):
+                        listing.setdefault(folded(item.name), []).append((item.name, item.inode()))
             except OSError:
                 pass  # a folder that cannot be listed shows nothing; names stay as they were given
-        return known
+        return listing
 
 
 def one_path(path: str) -> str:

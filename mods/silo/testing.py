@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
-from uuid import UUID, uuid4
+from uuid import uuid4
 
 from silo.api.boms import LineBody, result_of
 from silo.api.client import ItemBody, ItemChanges, LookAlike
@@ -36,6 +36,7 @@ from silo.api.wire import (
     MergeEvent,
     MergeRequest,
     MergeResult,
+    ProductSummary,
     Release,
     Revision,
     ServerState,
@@ -54,6 +55,7 @@ from silo.bom.errors import (
     RouteMissingError,
     VersionConflictError,
 )
+from silo.bom.model import as_uuid
 from silo.bom.numbers import counts_pieces
 from silo.bom.report import Reason, remembered
 from silo.bom.resolve import name_key
@@ -86,8 +88,8 @@ class Stored:
 
     def hashes(self) -> list[str]:
         """The SHA-256 of its files, as far as they are known."""
-        known = [self.item.properties.get("file_sha256"), *(r.file_checksum for r in self.revisions)]
-        return [str(one).removeprefix("sha256:") for one in known if one]
+        checksums = [self.item.properties.get("file_sha256"), *(r.file_checksum for r in self.revisions)]
+        return [str(checksum).removeprefix("sha256:") for checksum in checksums if checksum]
 
 
 def check_base(stored: Stored, base: int | None, checksum: str | None) -> None:
@@ -129,6 +131,7 @@ class FakeStore:
         self.log: list[ServerEvent] = []
         self.releases: dict[tuple[str, str], Release] = {}  # (part number, label) → what was frozen
         self.answers: dict[tuple[str, str], tuple[Any, Any]] = {}  # (subject, key) → (request, answer)
+        self.models: dict[str, dict[str, bytes]] = {}  # SHA-256 of a file → geometry, structure
         self._clock = clock or (lambda: datetime.now(UTC))
         self._lock = threading.RLock()
         self._news = threading.Condition(self._lock)
@@ -155,7 +158,7 @@ class FakeStore:
 
     def _stored(self, part_number: str, *, make: bool = False) -> Stored:
         if isinstance(part_number, DocumentId):
-            return self._document(str(_uuid(part_number)), make=make)
+            return self._document(as_uuid(part_number), make=make)
         stored = self.items.get(part_number.casefold())
         if stored is None:
             raise NotFoundError(f"{self.base_url} has no item {part_number}")
@@ -172,19 +175,21 @@ class FakeStore:
             raise NotFoundError(f"{self.base_url} has no document {uuid}")
         return self.documents[uuid]
 
-    def _shown(self, stored: Stored) -> Document | None:
-        newest = next((one for one in reversed(stored.revisions) if one.file_checksum), None)
+    def _document_of(self, stored: Stored) -> Document | None:
+        newest = next((revision for revision in reversed(stored.revisions) if revision.file_checksum), None)
         if newest is None:
             return None
         own = stored.item.id not in self.documents
-        known = {item.item.id: item.item.part_number for item in self.items.values()}
-        held = [one for one in stored.held if one.item in known]
-        if own and stored.item.id not in {one.item for one in held}:
+        numbers = {item.item.id: item.item.part_number for item in self.items.values()}
+        held = [held_item for held_item in stored.held if held_item.item in numbers]
+        if own and stored.item.id not in {held_item.item for held_item in held}:
             held.append(HeldItem(item=stored.item.id))
         return Document(
             id=stored.item.id,
             part_number=stored.item.part_number if own else "",
-            holds=[one.model_copy(update={"part_number": known[one.item]}) for one in held],
+            holds=[
+                held_item.model_copy(update={"part_number": numbers[held_item.item]}) for held_item in held
+            ],
             **newest.model_dump(exclude={"properties", "labels", "status", "links"}),
         )
 
@@ -235,12 +240,14 @@ class FakeStore:
         file_name: str | None = None,
         origin: Origin | None = None,
     ) -> Revision:
-        known = {**stored.item.properties, **(properties or {})} if content is not None else properties or {}
-        as_json(known)
+        all_properties = (
+            {**stored.item.properties, **(properties or {})} if content is not None else properties or {}
+        )
+        as_json(all_properties)
         revision = Revision(
             revision_number=len(stored.revisions) + 1,
             comment=comment,
-            properties=dict(known),
+            properties=dict(all_properties),
             file_name=file_name,
             file_checksum=hashlib.sha256(content).hexdigest() if content is not None else None,
             file_size=len(content) if content is not None else None,
@@ -255,7 +262,7 @@ class FakeStore:
             stored.files[revision.revision_number] = content
             stored.held = list((origin.items if origin else None) or ())
         stored.item = stored.item.model_copy(
-            update={"current_revision": revision.revision_number, "properties": dict(known)}
+            update={"current_revision": revision.revision_number, "properties": dict(all_properties)}
         )
         number = stored.item.part_number
         data = {
@@ -309,7 +316,7 @@ class FakeStream:
 Bom = Callable[[str], Sequence[BomLine]]
 
 
-def entries_of(request: MergeRequest, known: Mapping[str, str]) -> list[dict[str, Any]]:
+def entries_of(request: MergeRequest, numbers: Mapping[str, str]) -> list[dict[str, Any]]:
     """The request's entries under the server's own numbers (``known``: case-folded → number).
 
     Raises :class:`RejectedError` with all unknown children at once, each with its index.
@@ -317,7 +324,7 @@ def entries_of(request: MergeRequest, known: Mapping[str, str]) -> list[dict[str
     problems = [
         f"entries[{index}].child_part_number: {entry.child_part_number!r} does not exist on this server"
         for index, entry in enumerate(request.entries)
-        if entry.child_part_number.casefold() not in known
+        if entry.child_part_number.casefold() not in numbers
     ]
     if problems:
         raise RejectedError(
@@ -325,7 +332,7 @@ def entries_of(request: MergeRequest, known: Mapping[str, str]) -> list[dict[str
         )
     return [
         {
-            "child_part_number": known[entry.child_part_number.casefold()],
+            "child_part_number": numbers[entry.child_part_number.casefold()],
             "quantity": entry.quantity,
             "components": [component.model_dump() for component in entry.components or ()],
         }
@@ -335,7 +342,7 @@ def entries_of(request: MergeRequest, known: Mapping[str, str]) -> list[dict[str
 
 def missing_of(request: MergeRequest) -> list[tuple[str, str]]:
     """The components that the assembly has lost."""
-    return [(one.file, one.object) for one in request.left_out or () if one.reason == Reason.MISSING]
+    return [(part.file, part.object) for part in request.left_out or () if part.reason == Reason.MISSING]
 
 
 def with_components(
@@ -350,19 +357,19 @@ def with_components(
 def check_cycle(bom: Bom, parent: str, children: Sequence[str]) -> None:
     """Raise :class:`CycleError` where one of the children contains the parent."""
     for child in children:
-        path = _way(bom, child, parent, (parent,))
+        path = _path_to(bom, child, parent, (parent,))
         if path is not None:
             raise CycleError(path)
 
 
-def _way(bom: Bom, here: str, goal: str, path: tuple[str, ...]) -> tuple[str, ...] | None:
+def _path_to(bom: Bom, here: str, goal: str, path: tuple[str, ...]) -> tuple[str, ...] | None:
     path = (*path, here)
     if here == goal:
         return path
     for line in bom(here):
-        found = _way(bom, line.child_part_number, goal, path)
-        if found is not None:
-            return found
+        result = _path_to(bom, line.child_part_number, goal, path)
+        if result is not None:
+            return result
     return None
 
 
@@ -409,8 +416,8 @@ class FakeSilo(FakeStore):
         self, uuids: Iterable[str], /, *, cancelled: Cancel | None = None
     ) -> dict[str, Item]:
         stop_if(cancelled)
-        known = {UUID(stored.item.id): stored.item for stored in self.items.values()}
-        return {uuid: known[key] for uuid in uuids if (key := _uuid(uuid)) in known}
+        items = {as_uuid(stored.item.id): stored.item for stored in self.items.values()}
+        return {uuid: items[key] for uuid in uuids if (key := as_uuid(uuid)) in items}
 
     def get_item(self, part_number: str, /) -> Item:
         return self._stored(part_number).item
@@ -422,13 +429,13 @@ class FakeSilo(FakeStore):
         self, query: str = "", *, item_type: str | None = None, limit: int = 50, offset: int = 0
     ) -> list[Item]:
         words = query.casefold().removeprefix("sha256:").split()
-        found = [
+        items = [
             stored.item
             for _, stored in sorted(self.items.items())
             if all(word in stored.search_text() for word in words)
             and item_type in (None, stored.item.item_type)
         ]
-        return found[offset : offset + limit]
+        return items[offset : offset + limit]
 
     def find_look_alikes(
         self, wanted: Iterable[tuple[str, str]], /, *, cancelled: Cancel | None = None
@@ -436,14 +443,14 @@ class FakeSilo(FakeStore):
         return {(name, digest): self._look_alikes(name, digest) for name, digest in wanted}
 
     def _look_alikes(self, name: str, digest: str) -> list[LookAlike]:
-        found = []
+        matches = []
         for _, stored in sorted(self.items.items()):
             item, same_file = stored.item, bool(digest) and digest in stored.hashes()
             if same_file or (name and name_key(item.name) == name_key(name)):
-                found.append(
+                matches.append(
                     LookAlike(id=item.id, part_number=item.part_number, name=item.name, same_file=same_file)
                 )
-        return sorted(found, key=lambda one: not one.same_file)[:12]
+        return sorted(matches, key=lambda match: not match.same_file)[:12]
 
     def create_item(
         self,
@@ -531,11 +538,15 @@ class FakeSilo(FakeStore):
     ) -> dict[str, list[BomLine]]:
         stop_if(cancelled)
         self.before("get_boms")
-        known = [number for number in part_numbers if number.casefold() in self.items]
-        return {number: self.get_bom(number) for number in known}
+        numbers = [number for number in part_numbers if number.casefold() in self.items]
+        return {number: self.get_bom(number) for number in numbers}
 
     def get_bom_version(self, part_number: str, /) -> str | None:
         return str(self._stored(part_number).item.bom_version)
+
+    def get_summary(self, part_number: str, /) -> ProductSummary | None:
+        """None: this Silo keeps no summaries."""
+        return None
 
     def where_used(self, part_number: str, /) -> list[WhereUsedLine]:
         number = self.get_item(part_number).part_number
@@ -555,7 +566,7 @@ class FakeSilo(FakeStore):
         line = body(LineBody, {"quantity": 1, **values, "child_part_number": child}, "a BOM line")
         with self._changing("add_bom_line"):
             stored, number = self._stored(part_number), self.get_item(child).part_number
-            if any(known["child_part_number"] == number for known in stored.lines):
+            if any(line_there["child_part_number"] == number for line_there in stored.lines):
                 raise ConflictError(f"{number} is in the BOM of {part_number} already")
             check_cycle(self.get_bom, stored.item.part_number, [number])
             new = {**line.model_dump(exclude_none=True), "child_part_number": number, "source": "manual"}
@@ -605,8 +616,8 @@ class FakeSilo(FakeStore):
 
     def _merge(self, stored: Stored, request: MergeRequest) -> MergeResult:
         number = stored.item.part_number
-        known = {key: other.item.part_number for key, other in self.items.items()}
-        entries = entries_of(request, known)
+        numbers = {key: other.item.part_number for key, other in self.items.items()}
+        entries = entries_of(request, numbers)
         plan = plan_merge(entries, stored.lines, missing_of(request))
         check_cycle(self.get_bom, number, [change.part_number for change in plan.diff.added])
         result = result_of(plan.diff, number, request)
@@ -632,52 +643,69 @@ class FakeSilo(FakeStore):
 
     # -- files ------------------------------------------------------------------------------------------
 
+    def lacking_models(self, sha256: Iterable[str], /) -> set[str]:
+        file_checksums = {
+            checksum.file_checksum for stored in self._files().values() for checksum in stored.revisions
+        }
+        return {
+            checksum
+            for checksum in sha256
+            if checksum in file_checksums and len(self.models.get(checksum, {})) < 2
+        }
+
+    def put_model(self, sha256: str, part: str, body: bytes, /) -> None:
+        if not any(
+            sha256 == revision.file_checksum for each in self._files().values() for revision in each.revisions
+        ):
+            raise NotFoundError(f"no revision has a file with the SHA-256 {sha256}; commit the file first")
+        self.models.setdefault(sha256, {})[part] = body
+
     def get_documents(self, uuids: Iterable[str], /) -> dict[str, Document]:
         files, wanted = self._files(), [uuid.lower() for uuid in uuids]
-        found = [self._shown(files[uuid]) for uuid in wanted if uuid in files]
-        return {one.id: one for one in found if one is not None}
+        documents = [self._document_of(files[uuid]) for uuid in wanted if uuid in files]
+        return {document.id: document for document in documents if document is not None}
 
     def get_document(self, uuid: str, /) -> Document:
         stored = self._document(uuid.lower(), make=False)
-        now = self._shown(stored)
+        now = self._document_of(stored)
         if now is None:
             raise NotFoundError(f"{self.base_url} has no document {uuid}")
         files = self._files()
-        links = {key: self._targets(one) for key, one in files.items()}
-        linked = [self._shown(files[one]) for one in links[stored.item.id] if one in files]
-        users = [self._shown(files[key]) for key, targets in links.items() if stored.item.id in targets]
-        newest = next(one for one in reversed(stored.revisions) if one.file_checksum)
+        links = {key: self._targets(each_stored) for key, each_stored in files.items()}
+        linked = [self._document_of(files[link]) for link in links[stored.item.id] if link in files]
+        users = [self._document_of(files[key]) for key, targets in links.items() if stored.item.id in targets]
+        newest = next(revision for revision in reversed(stored.revisions) if revision.file_checksum)
         return now.model_copy(
             update={
                 "links": newest.links,
-                "linked": [one for one in linked if one is not None],
-                "used_by": [one for one in users if one is not None],
+                "linked": [document for document in linked if document is not None],
+                "used_by": [user for user in users if user is not None],
             }
         )
 
     def _targets(self, stored: Stored) -> set[str]:
-        newest = next((one for one in reversed(stored.revisions) if one.file_checksum), None)
+        newest = next((revision for revision in reversed(stored.revisions) if revision.file_checksum), None)
         return {link.document or link.item for link in newest.links} if newest else set()
 
     def documents_of(self, part_number: str, /) -> list[Document]:
         item = self.get_item(part_number)
-        found = filter(None, map(self._shown, self._files().values()))
+        documents = filter(None, map(self._document_of, self._files().values()))
         return sorted(
-            (one for one in found if item.id in {held.item for held in one.holds}),
-            key=lambda one: one.id != item.id,
+            (document for document in documents if item.id in {held.item for held in document.holds}),
+            key=lambda document: document.id != item.id,
         )
 
     def get_release(self, part_number: str, label: str, /) -> Release:
         item = self.get_item(part_number)
-        found = self.releases.get((item.part_number, label))
-        if found is None:
+        release = self.releases.get((item.part_number, label))
+        if release is None:
             raise NotFoundError(f"{item.part_number} has no revision {label!r}")
-        return found
+        return release
 
     def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
         self.before("revisions")
-        known = reversed(self._stored(part_number).revisions)
-        return [revision for revision in known if revision.revision_number > after][:newest]
+        newest_first = reversed(self._stored(part_number).revisions)
+        return [revision for revision in newest_first if revision.revision_number > after][:newest]
 
     def get_revision(self, part_number: str, number: int, /) -> Revision:
         for revision in self._stored(part_number).revisions:
@@ -744,10 +772,3 @@ class FakeSilo(FakeStore):
         if on_progress is not None:
             on_progress(len(content), len(content))
         return hashlib.sha256(content).hexdigest()
-
-
-def _uuid(text: str) -> UUID | None:
-    try:
-        return UUID(text)
-    except ValueError:
-        return None

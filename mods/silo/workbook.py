@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """XLSX, ODS and XLS workbooks: one model of a sheet, with what each cell says and how a program shows it.
 
+And the text of CSV files, by what their bytes say of it.
+
 XLSX and ODS are read here, from their XML; XLS by xlrd. Readers that give values alone lose what decides
 a mass: an error, or a formula that nobody has calculated, looks like an empty cell, and "12.5 g" is 12.5.
 """
@@ -28,6 +30,20 @@ STARTS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 MAX_UNPACKED, MOST_CELLS = 128 * 1024 * 1024, 500_000
 
 
+def unicode_name(data: bytes) -> str | None:
+    """Return the encoding that the mark or the zeros of a file show; None for UTF-8 without a mark, and for
+    code pages."""
+    if data.startswith(b"\xef\xbb\xbf"):
+        return "utf-8-sig"
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    start = data[:64]
+    if data.startswith(STARTS) or start.count(0) <= len(start) // 4:
+        return None
+    # UTF-16 without its mark: every second byte of ASCII text is zero.
+    return "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
+
+
 class Cell(NamedTuple):
     """What a cell says.
 
@@ -45,7 +61,7 @@ class Cell(NamedTuple):
     uncalculated: bool = False
 
 
-class Row(NamedTuple):
+class SheetRow(NamedTuple):
     """Cells of one record and the line of the file that it begins on (1 = first)."""
 
     line: int
@@ -76,7 +92,7 @@ class Grid:
 
     def covered(self) -> set[tuple[int, int]]:
         """Return the cells that say something under a merged cell, where no program shows it."""
-        found: set[tuple[int, int]] = set()
+        covered_cells: set[tuple[int, int]] = set()
         effort = 0
         for top, left, bottom, right in self.merged:
             size = (bottom - top + 1) * (right - left + 1)
@@ -86,10 +102,10 @@ class Grid:
             inside = ((row, column) for row in range(top, bottom + 1) for column in range(left, right + 1))
             for row, column in inside if size < len(self.cells) else self.cells:
                 if top <= row <= bottom and left <= column <= right and (row, column) != (top, left):
-                    found.add((row, column))
-        return found & self.cells.keys()
+                    covered_cells.add((row, column))
+        return covered_cells & self.cells.keys()
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[SheetRow]:
         """Return the rows that say something, each up to its last such cell."""
         by_row: dict[int, dict[int, str]] = {}
         covered = self.covered()
@@ -99,7 +115,7 @@ class Grid:
         if sum(map(max, by_row.values())) > 10 * MOST_CELLS:
             raise InputError(f"sheet “{self.name}” is too wide; delete what stands outside of the table")
         return [
-            Row(row + 1, tuple(cells.get(column, "") for column in range(max(cells) + 1)))
+            SheetRow(row + 1, tuple(cells.get(column, "") for column in range(max(cells) + 1)))
             for row, cells in by_row.items()
         ]
 
@@ -135,7 +151,7 @@ def _zipped(data: bytes) -> Iterator[Grid]:
         content = archive.read(part) if part is not None else b"<none/>"
         # No workbook has a document type. Without one there are no entities, which could grow without end.
         if b"<!DOCTYPE" in content or b"\0" in content[:64]:
-            raise InputError(f"its {path} has a document type or is not UTF-8; save the workbook anew")
+            raise InputError(f"its {path} has a document type or is not UTF-8; save the workbook again")
         return fromstring(content)  # noqa: S314 - see above
 
     return _ods(read) if "content.xml" in parts else _xlsx(read)
@@ -157,7 +173,7 @@ _COMPARE = {
 _START, _START_1904 = datetime(1899, 12, 30), datetime(1904, 1, 1)
 
 
-def _shown(value: float, code: str, start: datetime = _START) -> str:
+def _formatted(value: float, code: str, start: datetime = _START) -> str:
     """Return a number in full, with what its format writes before and behind it.
 
     A format with one more digit group, such as a fraction or a telephone number, is left out: "12".
@@ -248,11 +264,11 @@ def _xlsx(read: _Read) -> Iterator[Grid]:
 def _links(read: _Read, path: str) -> dict[str, str]:
     """Return the paths that a part of the package refers to, by their ids and by their kinds."""
     folder, name = posixpath.split(path)
-    found: dict[str, str] = {}
+    links: dict[str, str] = {}
     for link in read(posixpath.join(folder, "_rels", f"{name}.rels")):
         target = posixpath.normpath(posixpath.join("/", folder, link.get("Target", ""))).lstrip("/")
-        found[link.get("Id", "")] = found[posixpath.basename(link.get("Type", ""))] = target
-    return found
+        links[link.get("Id", "")] = links[posixpath.basename(link.get("Type", ""))] = target
+    return links
 
 
 def _is_on(element: Element | None, name: str, default: str = "0") -> bool:
@@ -280,8 +296,8 @@ def _xlsx_styles(sheet: Element) -> Iterator[_Style]:
     formats = {
         **{str(number): code for number, code in std_format_strings.items()},
         **{
-            one.get("numFmtId", ""): one.get("formatCode", "")
-            for one in sheet.iterfind("{*}numFmts/{*}numFmt")
+            element.get("numFmtId", ""): element.get("formatCode", "")
+            for element in sheet.iterfind("{*}numFmts/{*}numFmt")
         },
     }
     fonts = [_is_on(font.find("{*}strike"), "val", "1") for font in sheet.iterfind("{*}fonts/{*}font")]
@@ -291,10 +307,10 @@ def _xlsx_styles(sheet: Element) -> Iterator[_Style]:
 
 def _place(reference: str) -> tuple[int, int]:
     """Return row and column of "D3"."""
-    found = re.fullmatch("([A-Z]{1,3})([1-9][0-9]{0,6})", reference.upper())
-    if found is None:
+    match = re.fullmatch("([A-Z]{1,3})([1-9][0-9]{0,6})", reference.upper())
+    if match is None:
         raise InputError(f"a cell stands at “{reference[:20]}”, which no sheet has")
-    return int(found[2]) - 1, reduce(lambda number, letter: number * 26 + ord(letter) - 64, found[1], 0) - 1
+    return int(match[2]) - 1, reduce(lambda number, letter: number * 26 + ord(letter) - 64, match[1], 0) - 1
 
 
 def _xlsx_cell(cell: Element, strings: list[Cell], styles: list[_Style], start: datetime) -> Cell:
@@ -310,7 +326,7 @@ def _xlsx_cell(cell: Element, strings: list[Cell], styles: list[_Style], start: 
     elif kind == "s":
         text = strings[int(value)]
     elif kind == "n":
-        text = Cell(_shown(float(value), code, start))
+        text = Cell(_formatted(float(value), code, start))
     else:
         text = Cell(_BOOLEANS[value] if kind == "b" else _iso(value) if kind == "d" else value)
     return text._replace(struck=struck or text.struck)
@@ -342,17 +358,17 @@ def _ods(read: _Read) -> Iterator[Grid]:
         if part.tag in (f"{_OFFICE}styles", f"{_OFFICE}automatic-styles")
         for style in part
     }
-    known: dict[tuple[str, str], _Style] = {}
+    style_table: dict[tuple[str, str], _Style] = {}
 
     def look(family: str, name: str | None) -> _Style:
         key = family, name or ""
-        if key not in known:
-            known[key] = "", False  # also if a style is its own parent
+        if key not in style_table:
+            style_table[key] = "", False  # also if a style is its own parent
             style = styles.get(key)
             if style is not None:
                 above = look(family, style.get(f"{_STYLE}parent-style-name"))
-                known[key] = _ods_style(style, styles, above)
-        return known[key]
+                style_table[key] = _ods_style(style, styles, above)
+        return style_table[key]
 
     for table in content.iterfind(f"{_OFFICE}body/{_OFFICE}spreadsheet/{_TABLE}table"):
         style = styles.get(("table", table.get(f"{_TABLE}style-name", "")))
@@ -379,9 +395,9 @@ def _code(style: Element | None, styles: dict[tuple[str, str], Element]) -> str:
     if style is None:
         return ""
     sections = [
-        one.get(f"{_STYLE}condition", "").replace("value()", "[").replace("!=", "<>") + "]"
-        + _code(styles.get(("", one.get(f"{_STYLE}apply-style-name", ""))), {})
-        for one in style.iterfind(f"{_STYLE}map")
+        element.get(f"{_STYLE}condition", "").replace("value()", "[").replace("!=", "<>") + "]"
+        + _code(styles.get(("", element.get(f"{_STYLE}apply-style-name", ""))), {})
+        for element in style.iterfind(f"{_STYLE}map")
         if styles
     ]  # fmt: skip
     own = ""
@@ -417,7 +433,7 @@ def _fill_ods(grid: Grid, table: Element, look: Callable[[str, str | None], _Sty
                 iter(defaults[columns.start :][:1]), None
             )
             said = _ods_cell(cell, cell.get(f"{_TABLE}style-name") or default, look)
-            down, across = (_count(cell, f"number-{one}-spanned") for one in ("rows", "columns"))
+            down, across = (_count(cell, f"number-{axis}-spanned") for axis in ("rows", "columns"))
             if down * across > 1:
                 grid.merged.append(
                     (lines.start, columns.start, lines.start + down - 1, columns.start + across - 1)
@@ -449,7 +465,9 @@ def _ods_cell(cell: Element, style: str | None, look: Callable[[str, str | None]
     formula, value = cell.get(f"{_TABLE}formula"), cell.get(f"{_OFFICE}value")
     code, struck = look("table-cell", style)
     struck |= any(
-        look("text", one.get(f"{_TEXT}style-name"))[1] for p in lines for one in p.iter(f"{_TEXT}span")
+        look("text", element.get(f"{_TEXT}style-name"))[1]
+        for p in lines
+        for element in p.iter(f"{_TEXT}span")
     )
     kind = cell.get(f"{_OFFICE}value-type", "")
     if formula is not None:
@@ -459,7 +477,7 @@ def _ods_cell(cell: Element, style: str | None, look: Callable[[str, str | None]
             bare = re.sub(r"^\w+:(?==)|[\[\]]|(?<!\w)\.(?=\$?[A-Z])", "", formula)
             return Cell(bare, struck, uncalculated=True)
     if value is not None:
-        text = text if text.isalpha() else _shown(float(value), code)  # TRUE is the number 1
+        text = text if text.isalpha() else _formatted(float(value), code)  # TRUE is the number 1
     elif kind == "date":
         text = _iso(cell.get(f"{_OFFICE}date-value", text))
     elif kind == "time":
@@ -474,17 +492,13 @@ def _ods_text(element: Element) -> str:
     for child in element:
         kind = child.tag.removeprefix(_TEXT)
         if kind == "s":
-            said += " " * min(_ods_spaces(child), 1000)
+            said += " " * min(int(child.get(f"{_TEXT}c", 1)), 1000)
         elif kind in ("tab", "line-break"):
             said += " "
         elif kind != "ruby-text":
             said += _ods_text(child)
         said += re.sub(r"\s+", " ", child.tail or "")
     return said
-
-
-def _ods_spaces(element: Element) -> int:
-    return int(element.get(f"{_TEXT}c", 1))
 
 
 # XLS (BIFF)
@@ -496,7 +510,7 @@ def _xls(data: bytes) -> Iterator[Grid]:
 
     log = io.StringIO()
     container = CompDoc(data, logfile=log)
-    for entry in container.dirlist:  # xlrd follows a circle of short sectors for ever
+    for entry in container.dirlist:  # xlrd follows a circle of short sectors forever
         sector, steps = entry.first_SID, 0
         while entry.tot_size < container.min_size_std_stream and 0 <= sector < len(container.SSAT):
             sector, steps = container.SSAT[sector], steps + 1
@@ -524,7 +538,7 @@ def _xls(data: bytes) -> Iterator[Grid]:
                 if (number, row, column) in empty and not value:
                     text = "=…"
                 elif kind in (xlrd.XL_CELL_NUMBER, xlrd.XL_CELL_DATE):
-                    text = _shown(value, book.format_map[style.format_key].format_str, start)
+                    text = _formatted(value, book.format_map[style.format_key].format_str, start)
                 elif kind == xlrd.XL_CELL_ERROR:
                     text = xlrd.error_text_from_code.get(value, "#ERROR")
                 else:

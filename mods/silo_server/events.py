@@ -38,7 +38,7 @@ from starlette.types import Receive, Scope, Send
 
 from silo_server.db.engine import Database, Tx, get_state, mode_of, newest_first, put_state
 from silo_server.db.tables import events, items
-from silo_server.services.access import audit
+from silo_server.services import access
 from silo_server.settings import cause_of, spec_time
 from silo_server.values import Document, Item, NewEvent, Revision, dumps, from_row
 
@@ -83,8 +83,9 @@ def item_created(tx: Tx, item: Item) -> None:
     _about(tx, "item.created", item, {**_named(item), "item_type": item.item_type})
 
 
-def item_updated(tx: Tx, item: Item) -> None:
-    _about(tx, "item.updated", item, {**_named(item), "revision": item.current_revision})
+def item_updated(tx: Tx, item: Item, summary: str = "changed") -> None:
+    data = {**_named(item), "revision": item.current_revision, "summary": summary}
+    _about(tx, "item.updated", item, data)
 
 
 def item_deleted(tx: Tx, item: Item) -> None:
@@ -127,7 +128,7 @@ def released(tx: Tx, item: Item, label: str, what: str) -> None:
 
 def set_mode(tx: Tx, mode: str) -> str:
     """Take changes (``normal``), or none (``read-only``); returns the mode that the server is in now."""
-    audit.note(tx, "mode.set", mode, f"{mode_of(tx)} → {mode}")
+    access.note(tx, "mode.set", mode, f"{mode_of(tx)} → {mode}")
     put_state(tx, "mode", mode)
     tx.emit(NewEvent("server.state", dumps({"mode": mode_of(tx)})))
     return mode_of(tx)
@@ -188,8 +189,8 @@ def newest(
 
 def usernames(tx: Tx) -> list[str]:
     """Everybody of whom there are events."""
-    found = tx.conn.scalars(select(events.c.username).distinct().where(events.c.username.is_not(None)))
-    return sorted(found, key=str.casefold)
+    scalars = tx.conn.scalars(select(events.c.username).distinct().where(events.c.username.is_not(None)))
+    return sorted(scalars, key=str.casefold)
 
 
 def horizon_of(tx: Tx) -> int:
@@ -518,6 +519,7 @@ class _PostgresListener:
             connection.execute(psycopg.sql.SQL("LISTEN {}").format(psycopg.sql.Identifier(EVENT_CHANNEL)))
             self._away = False
             self._heard()  # what happened before the LISTEN is in the log
+            self._access()
             while not self._stopping.is_set():
                 for notice in connection.notifies(timeout=0.5):
                     (self._access if notice.payload == "access" else self._heard)()
@@ -536,7 +538,7 @@ class EventStream(Response):
     """The stream. ``last``: what the client saw last, None = only what is new from now on.
 
     ``items`` (UUIDs or part numbers) lets only their events through, and those of no item.
-    ``still_allowed`` is asked with every heartbeat: a stream must not outlive the token that opened it.
+    ``still_allowed`` is asked at the start and with every heartbeat: a stream must not outlive its token.
     """
 
     media_type = "text/event-stream"
@@ -573,10 +575,11 @@ class EventStream(Response):
 
     async def _run(self, send: Send) -> None:
         hub = self._hub
+        # No beat yet: the credential may have been revoked since the request was let in, so look first.
+        beats, epoch = -1, hub.epoch
         cursor, reset = await hub.place(self._last)
         # The first bytes show proxies and clients that the stream stands.
         await _send(send, _hello(cursor) + (_reset(cursor) if reset else b""))
-        beats, epoch = hub.beats, hub.epoch
         while not hub.closed:
             if hub.epoch != epoch:
                 epoch, cursor = hub.epoch, hub.head
@@ -585,8 +588,8 @@ class EventStream(Response):
             cursor = batch.cursor
             payload = self._payload(batch)
             if hub.beats != beats:
+                payload = payload or HEARTBEAT * (beats >= 0)
                 beats = hub.beats
-                payload = payload or HEARTBEAT
                 if not await asyncio.to_thread(self._still_allowed):
                     break
             if payload:

@@ -45,7 +45,7 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
 )
-from silo_server.operation.metrics import Metrics
+from silo_server.housekeeping import Metrics
 from silo_server.settings import MIB, InDoubtError, Settings, TooManyAttemptsError, cause_of, stamp, utc_now
 
 request_logger = logging.getLogger("silo_server.requests")
@@ -235,9 +235,10 @@ async def _database_error(request: Request, error: Exception) -> Response:
         return error_answer(400, "rejected", "a value cannot be stored: it is too long, too large or no text")
     if isinstance(error, IntegrityError):
         return error_answer(409, "conflict", "somebody else changed the same thing just now; read it again")
-    if isinstance(error, OperationalError | PoolTimeoutError):
+    is_lost = getattr(error, "connection_invalidated", False)  # such as one that was idle for too long
+    if is_lost or isinstance(error, OperationalError | PoolTimeoutError):
         logger.error("request %s: the database: %s", info_of(request.scope).id, cause_of(error))
-        if request.method not in ("GET", "HEAD") and getattr(error, "connection_invalidated", False):
+        if request.method not in ("GET", "HEAD") and is_lost:
             # The commit may have come through before the connection was lost; Retry-After would deny that.
             doubt = InDoubtError(
                 "the connection to the database was lost; the change may be stored or not. Read it again "
@@ -290,7 +291,7 @@ COMPRESSED_BYTES = 1400
 # Half the time of the highest level for a tenth more bytes.
 COMPRESSION = 5
 # A stream of events must not be held back, a file keeps its length and its ranges.
-_AS_IT_IS = re.compile(r"/(?:events|thumbnail|file(?:/[0-9]+)?|export\.xlsx)$")
+_AS_IT_IS = re.compile(r"/(?:events|thumbnail|geometry|structure|file(?:/[0-9]+)?|export\.xlsx)$")
 UPLOAD_PATH = re.compile(r"/(?:api/)?items/[^/]+/file$")
 
 SECURITY_HEADERS = {

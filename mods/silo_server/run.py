@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import importlib.metadata
 import ipaddress
 import multiprocessing
 import multiprocessing.connection
@@ -15,6 +16,7 @@ import os
 import shutil
 import signal
 import socket
+import sys
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager, suppress
@@ -35,16 +37,13 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from silo.bom.errors import ConfigError
 from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port, scratch_folder
 from silo_server import http
-from silo_server.background import Later, Probe
 from silo_server.db.engine import WRITERS_WAITING, Database, Tx
 from silo_server.db.migrate import upgrade
 from silo_server.db.tables import events, users
 from silo_server.events import Hub
+from silo_server.housekeeping import SHARED, Later, Metrics, Probe, keep_tidy, tidy
 from silo_server.http import BodyLimit, Compressed, Observed, SecurityHeaders, log_to_stderr
-from silo_server.operation.housekeeping import keep_tidy, tidy
-from silo_server.operation.metrics import SHARED, Metrics
-from silo_server.services import search
-from silo_server.services.access import accounts, credentials, logins
+from silo_server.services import access, search
 from silo_server.services.revisions import FileStore
 from silo_server.settings import MIB, Clock, Settings, cause_of, settings_from_environment, stamp, utc_now
 from silo_server.values import Role
@@ -79,17 +78,17 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
     with db.write(even_when_read_only=True) as tx:
         if tx.conn.scalar(select(func.count()).select_from(users)) == 0:
             settings = tx.settings
-            accounts.create_user(tx, settings.admin_username, Role.ADMIN, password=settings.admin_password)
+            access.create_user(tx, settings.admin_username, Role.ADMIN, password=settings.admin_password)
         if reset_admin is not None:
-            accounts.make_admin(tx, reset_admin)
-        admin = accounts.get_user(tx, reset_admin) if reset_admin else _first_admin(tx)
+            access.make_admin(tx, reset_admin)
+        admin = access.get_user(tx, reset_admin) if reset_admin else _first_admin(tx)
         secret, dead = token if admin else None, ""
         if admin and token is None:
             expires = stamp(tx.at + timedelta(days=START_TOKEN_DAYS))
-            secret = credentials.create_token(tx, admin.id, credentials.START_TOKEN, expires=expires)[1]
-        elif admin and token is not None and (dead := credentials.take_configured_token(tx, admin.id, token)):
+            secret = access.create_token(tx, admin.id, access.START_TOKEN, expires=expires)[1]
+        elif admin and token is not None and (dead := access.take_configured_token(tx, admin.id, token)):
             secret = None
-        link = logins.create_login_link(tx, admin.username) if admin else None
+        link = access.create_login_link(tx, admin.username) if admin else None
         search.ensure_index(tx)
         last = tx.conn.scalar(select(events.c.at).order_by(events.c.id.desc()).limit(1)) or ""
         late = stamp(tx.at + timedelta(minutes=1))
@@ -101,21 +100,20 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
     return Welcome(admin.username if admin else None, secret, link, warnings)
 
 
-def _first_admin(tx: Tx) -> accounts.User | None:
+def _first_admin(tx: Tx) -> access.User | None:
     row = tx.conn.execute(
         select(users).where(users.c.role == Role.ADMIN.value, users.c.active).order_by(users.c.id).limit(1)
     ).one_or_none()
-    return accounts.to_user(row) if row is not None else None
+    return access.to_user(row) if row is not None else None
 
 
-VERSION = "0.1.0"
 READING_THREADS = 40
 # Routes are matched in this order; /items/by-uuid and /items/search stand before /items/{part_number}.
 
 
 def routers() -> tuple[APIRouter, ...]:
     """Return all routes; imported late, for they are half of the import, and a backup needs none of them."""
-    from silo_server.routes import bom, documents, items, releases, system
+    from silo_server.routes import bom, items, orders, releases, scene, system
     from silo_server.web import pages
 
     return (
@@ -123,12 +121,14 @@ def routers() -> tuple[APIRouter, ...]:
         system.auth_router,
         items.router,
         items.revisions_router,
-        documents.router,
+        items.by_uuid,
         releases.router,
+        scene.router,
         bom.router,
         bom.several,
         bom.review_router,
         bom.transfer_router,
+        orders.router,
         *pages.ROUTERS,
     )
 
@@ -162,7 +162,7 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     metrics = Metrics()
     app = FastAPI(
         title="silo-mod server",
-        version=VERSION,
+        version=importlib.metadata.version("silo-mod"),
         openapi_url="/api/openapi.json",
         docs_url=None,
         redoc_url=None,
@@ -248,7 +248,7 @@ class Greeting:
 
 
 def _tell(greeting: Greeting) -> None:
-    # Whoever reads the output of a pipe waits for the address, and the server never ends by itself.
+    # A reader of a pipe waits for the address, and the server never ends by itself.
     print(*greeting.lines(), sep="\n", flush=True)
 
 
@@ -310,6 +310,7 @@ class SiloServer(uvicorn.Server):
             app = getattr(app, "app", None)
         if app is not None and hasattr(app.state, "server"):
             app.state.server.hub.close()
+            app.state.server.large_reads.close()
         await super().shutdown(sockets)
 
 
@@ -342,7 +343,7 @@ def serve(
         )
     given = token or os.environ.get("SILO_API_TOKEN") or None
     if given:
-        credentials.check_configured_secret(given)
+        access.check_configured_secret(given)
     sock = _bind(host, port)  # first: where the port is taken, no token is made that nobody sees
     try:
         welcome = _prepare(settings, given, reset_admin)
@@ -355,8 +356,9 @@ def serve(
     database, login_url = _without_password(settings), _login_url(settings, welcome)
     shown = welcome.token
     if shown and given:
-        shown = f"{credentials.shown_prefix(given)}… (the one you gave)"
-    warnings = [*start_warnings(own, is_loopback(host)), *welcome.warnings]
+        shown = f"{access.shown_prefix(given)}… (the one you gave)"
+    free = shutil.disk_usage(_nearest(own.storage)).free
+    warnings = [*start_warnings(own, is_loopback(host), free), *welcome.warnings]
     settings = replace(settings, warnings=tuple(warnings))
     greeting = Greeting(base_url, shown, login_url, database, not is_loopback(host), warnings)
     # uvicorn passes Ctrl-C on when it has ended in good order; to the person that is no error.
@@ -370,11 +372,16 @@ def serve(
                 _run_workers(settings, workers, sock)
 
 
-def start_warnings(settings: Settings, loopback: bool) -> list[str]:
-    """Return what is wrong with the settings of a server; ``loopback``: only this machine sees it."""
+def start_warnings(settings: Settings, loopback: bool, free: int) -> list[str]:
+    """Return what is wrong with the settings of a server.
+
+    loopback
+        only this machine sees it.
+    free
+        room on the disk of its files [bytes].
+    """
     public = settings.public_url or ""
-    free = shutil.disk_usage(_nearest(settings.storage)).free
-    known = {
+    conditions = {
         "SILO_PUBLIC_URL is not set: login links begin with the address that the server listens on.": not (
             public or loopback
         ),
@@ -382,13 +389,13 @@ def start_warnings(settings: Settings, loopback: bool) -> list[str]:
             "https:"
         )
         and not settings.secure_cookies,
-        "SILO_TRUSTED_PROXIES is *: whoever reaches the server chooses the address that it writes down.": (
+        "SILO_TRUSTED_PROXIES is *: who reaches the server chooses the address that it writes down.": (
             "*" in settings.trusted_proxies
         ),
         f"The disk of {settings.storage} has {free // MIB} MiB left: make room, or changes fail.": free
         < 1024 * MIB,
     }
-    return [warning for warning, wrong in known.items() if wrong]
+    return [warning for warning, wrong in conditions.items() if wrong]
 
 
 def _nearest(folder: Path) -> Path:
@@ -491,7 +498,7 @@ def _run_workers(settings: Settings, workers: int, sock: socket.socket) -> None:
 
 
 def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | None = None) -> None:
-    spare_the_collector()
+    share_the_processor()
     allow_many_files()
     log_to_stderr(settings)
     server = SiloServer(_config(create_app(settings), settings), on_up or (lambda: None))
@@ -503,12 +510,14 @@ def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | N
     server.run(sockets=[sock])
 
 
-def spare_the_collector() -> None:
-    """Set Python's garbage collector for large answers; for a process that does nothing but serve.
+def share_the_processor() -> None:
+    """Set Python for large answers beside small ones; for a process that does nothing but serve.
 
     An answer of 100 000 rows is as many small objects; the collector, as it is set, would look through all of
-    them (and through every loaded module) again and again while they are made. Half the time would go.
+    them (and through every loaded module) again and again while they are made. Half the time would go. And
+    while a thread makes it, each other one would wait 5 ms for its turn, many times in each request.
     """
+    sys.setswitchinterval(0.0005)
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The server's own frozen values, between the services and whoever shows them.
+"""The server's own frozen values, between the services and what shows them.
 
 JSON that users give us (properties, a line's metadata): what is let in, and how it is stored.
 
@@ -199,11 +199,23 @@ class Item:
     updated_at: str
     updated_by: str
     archived_at: str | None
+    supplier_parts: Sequence[Mapping[str, Any]] = ()  # as silo.api.wire.SupplierPart
+    origins: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  # as silo.api.wire.Origin
 
     @property
     def subject(self) -> str:
         """What people read in messages."""
         return self.part_number
+
+    @property
+    def is_bought(self) -> bool:
+        """True for an item that is purchased: it says so, or says nothing and a supplier is known."""
+        return bought(self.texts.get("sourcing_type"), self.supplier_parts or self.properties.get("supplier"))
+
+
+def bought(said: str | None, supplier: object) -> bool:
+    """Answer :attr:`Item.is_bought`."""
+    return said == "purchased" or bool(not said and supplier)
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,8 +106,17 @@ def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> Non
         }
 
     client, fake = methods(SiloClient), methods(FakeSilo)
-    # The fake has no connection, no pages and no pictures, and keeps no summaries.
-    own = {"begin_login", "close", "events", "get_summary", "modules", "thumbnail"}
+    # The fake has no connection, no pages, no pictures and no models.
+    own = {
+        "begin_login",
+        "close",
+        "events",
+        "get_changes",
+        "get_geometry",
+        "get_scene",
+        "modules",
+        "thumbnail",
+    }
     assert set(client) - set(fake) == own
     assert set(fake) - set(client) == {"set_mode"}
     for name in set(client) & set(fake):

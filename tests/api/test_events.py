@@ -12,7 +12,7 @@ import pytest
 
 from silo.api.client import SiloClient
 from silo.api.config import Pause
-from silo.api.events import SELDOM, Connection, ConnectionState, EventListener, ServerEvent
+from silo.api.events import SELDOM, Connection, ConnectionState, EventListener, Pauses, ServerEvent
 from silo.api.policy import Backoff
 from silo.bom.errors import AuthError, ServerFaultError, UnreachableError
 from silo.testing import FakeSilo
@@ -191,14 +191,14 @@ def test_a_login_page_waits_for_a_person_too(
         assert watch.event().id == "1"
 
 
-class Shared:
+class Shared(Pauses):
     """The pause of a server, as the queue and the live connection share it."""
 
     def __init__(self, pause: Pause | None = None) -> None:
-        self.pause = pause
+        self.pause, self.now = pause, 1000.0
 
     def clock(self) -> float:
-        return 1000.0
+        return self.now
 
     def get(self) -> Pause | None:
         return self.pause
@@ -214,20 +214,40 @@ def test_the_pause_of_the_queue_is_that_of_the_connection(
     server.on(EVENTS, answer(503, {"error": "busy"}, {"Retry-After": "40"}), stream(frame(1), stay=True))
     pauses = Shared(Pause(1600.0, "the queue was put off", "busy", 3, told=True))
     asked: list[int] = []
-    with Watch(client, pauses=pauses, wait=lambda _wake, _seconds: asked.append(len(server.seen))) as watch:
+
+    def wait(_wake: object, seconds: float) -> None:
+        pauses.now += seconds
+        asked.append(len(server.seen))
+
+    with Watch(client, pauses=pauses, wait=wait) as watch:
         said = watch.state(Connection.OFFLINE)
         assert (said.message, said.retry_in) == ("the queue was put off", 600.0)
         assert watch.state(Connection.OFFLINE).retry_in == 40.0
         watch.event()
     assert asked == [0, 1]
     assert pauses.pause is not None
-    assert (pauses.pause.until, pauses.pause.failures, pauses.pause.told) == (1040.0, 4, True)
+    assert (pauses.pause.until, pauses.pause.failures, pauses.pause.told) == (1640.0, 4, True)
     server.on(EVENTS, answer(503, {"error": "unavailable"}), stream(frame(2), stay=True))
     pauses.pause = None
     with Watch(client, pauses=pauses) as watch:
         watch.state(Connection.OFFLINE)
         watch.event()
         assert pauses.pause is None
+
+
+def test_events_do_not_end_the_pause_of_a_server_that_takes_no_changes(
+    server: Any, client: SiloClient, stream: Callable[..., Any]
+) -> None:
+    """It is read-only still: what the queue sends would be refused again."""
+    server.scripts["GET /ready"].clear()
+    server.on("GET /ready", {"mode": "read-only"})
+    server.on(EVENTS, stream(frame(1), frame(2), stay=True))
+    pauses = Shared(Pause(1600.0, "read-only", "read_only", 1, told=False))
+    with Watch(client, pauses=pauses, wait=lambda _wake, _seconds: None) as watch:
+        watch.state(Connection.READ_ONLY)
+        watch.event()
+        watch.event()
+        assert pauses.pause is not None
 
 
 def test_a_server_without_events_is_asked_again_but_rarely(
@@ -405,7 +425,7 @@ def test_events_of_one_connection_can_be_iterated(
 def test_what_was_received_ends_the_count_of_failures(
     server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
 ) -> None:
-    """Pauses begin anew after a connection that brought something, and grow after one that only greeted."""
+    """Pauses begin again after a connection that brought something, and grow after one that only greeted."""
     server.on(
         EVENTS,
         *(

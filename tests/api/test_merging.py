@@ -127,3 +127,12 @@ def test_another_conflict_stays_one(server: Any, client: SiloClient, answer: Any
     with pytest.raises(ConflictError, match="edit session"):
         client.merge_bom("A01-0001", WANTED)
     assert len(server.paths("POST")) == 1
+
+
+def test_a_refused_dry_run_is_not_asked_again(server: Any, client: SiloClient, answer: Any) -> None:
+    """A dry run answers what a merge would do; without the manual lines it would answer something else."""
+    server.on(f"GET {BOM}", LINES)
+    server.on(MERGE, answer(409, {"error": "conflict"}), {"diff": {"added": []}})
+    with pytest.raises(ConflictError):
+        client.merge_bom("A01-0001", WANTED.model_copy(update={"dry_run": True}))
+    assert [(sent.method, sent.path) for sent in server.seen] == [("POST", f"{BOM}/merge")]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.api.client import SiloClient
+from silo.api.config import Pause
 from silo.api.policy import (
     LONGEST_TOLD,
     Backoff,
@@ -21,6 +23,7 @@ from silo.api.policy import (
     WebPageError,
     judge,
     may_repeat,
+    pause_after,
 )
 from silo.bom import errors
 from silo.bom.errors import (
@@ -28,6 +31,7 @@ from silo.bom.errors import (
     CycleError,
     DocumentError,
     NewerRevisionError,
+    NotSentError,
     SiloError,
     UnreachableError,
 )
@@ -38,6 +42,7 @@ VERDICTS = {
     "InputError": ENTRY_PERSON,
     "DocumentError": ENTRY_PERSON,
     "ConfigError": (Scope.ALL, Then.PERSON),
+    "PackageError": (Scope.ALL, Then.PERSON),
     "RemoteError": ENTRY_PERSON,
     "UnreachableError": ALL_RETRY,
     "NotSentError": ALL_RETRY,
@@ -165,3 +170,21 @@ def test_a_long_pause_is_reported_with_its_time(server: Any, client: SiloClient,
         client.create_item("kindred-rd", "F01", "Bolt")
     assert caught.value.retry_after == 40.0
     assert len(server.seen) == 1
+
+
+@pytest.mark.parametrize(
+    ("left", "told", "kept"), [(600.0, True, True), (math.inf, False, True), (2.0, True, False)]
+)
+def test_a_pause_that_was_promised_is_not_cut_short(left: float, told: bool, kept: bool) -> None:
+    """By the live connection that breaks meanwhile, for one."""
+    before = Pause(1000.0 + left, "put off", "busy", 3, told)
+    after = pause_after(NotSentError("refused"), before, 1000.0, Backoff(first=5.0), 0.0)
+    assert after == (before if kept else Pause(1040.0, "refused", "unreachable", 4, told=False))
+
+
+def test_a_person_who_is_back_in_the_network_waits_a_minute_at_most() -> None:
+    """However often it failed; a server in other trouble is left alone for longer."""
+    before = Pause(1000.0, "refused", "unreachable", 20, told=False)
+    for error, most in ((NotSentError("refused"), 60.0), (errors.ServerFaultError("500"), 900.0)):
+        after = pause_after(error, before, 1000.0, Backoff(first=5.0, longest=900.0), 0.0)
+        assert after.left(1000.0) == most

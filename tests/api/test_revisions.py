@@ -78,13 +78,13 @@ def test_a_revision_without_a_file_is_none_of_ours() -> None:
     [
         ("a.FCStd", rev(2, file_key="items/A/rev2.fcstd"), {}),
         ("a.FCStd", rev(2, file_size=8), {}),
-        ("a.kc", rev(2, file_size=123), {"r2": b"packed anew"}),
+        ("a.kc", rev(2, file_size=123), {"r2": b"packed again"}),
     ],
 )
 def test_where_nothing_decides_a_person_looks(
     name: str, revision: Revision, content: dict[str, bytes]
 ) -> None:
-    """The file cannot be read, or the server packs it anew."""
+    """The file cannot be read, or the server packs it again."""
     sent = SentFile(name, SENT.sha256, SENT.size, 1)
     with pytest.raises(MayHaveArrivedError, match="revision 2") as caught:
         find_arrived(Files(**content), "A", sent, [revision])
@@ -124,7 +124,7 @@ def test_retry_after_a_look_sends_the_file(tmp_path: Path) -> None:
         ("Top.FCStd", 2, "bb", False),  # the number is another file's by now
         ("Top.FCStd", 2, None, True),
         ("Top.FCStd", 3, None, False),
-        ("Top.kc", 2, "bb", True),  # the server packs it anew
+        ("Top.kc", 2, "bb", True),  # the server packs it again
         ("Top.kc", 3, "bb", False),
     ],
 )

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Iterator
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.api.events import ServerEvent, SseParser, parse
+from silo.api.events import ServerEvent, SseParser
 from silo.bom.errors import ServerFaultError
 
 MERGE = {
@@ -28,6 +29,12 @@ def block(name: str | None, data: object, marker: str | None = None, end: str = 
     lines += [f"event: {name}"] if name else []
     lines += [f"data: {line}" for line in json.dumps(data, indent=1).split("\n")]
     return (end.join(lines) + end * 2).encode()
+
+
+def parse(chunks: Iterable[bytes]) -> Iterator[ServerEvent]:
+    parser = SseParser()
+    for chunk in chunks:
+        yield from parser.feed(chunk)
 
 
 def one(raw: bytes) -> ServerEvent:
@@ -117,7 +124,7 @@ def test_an_event_without_end_is_refused() -> None:
 
 
 def test_a_long_event_in_small_pieces_is_read_in_good_time() -> None:
-    """The search for its end does not begin anew with each piece: 300 000 single bytes."""
+    """The search for its end does not begin again with each piece: 300 000 single bytes."""
     raw = block("big", "x" * 300_000)
     parser = SseParser()
     events = [event for index in range(len(raw)) for event in parser.feed(raw[index : index + 1])]

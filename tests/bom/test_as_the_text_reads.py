@@ -70,7 +70,7 @@ def test_no_children_equal_an_empty_list() -> None:
 
 
 def test_documents_that_hold_their_objects_can_be_compared() -> None:
-    """Plain objects compare by value; documents that know their objects would do so for ever."""
+    """Plain objects compare by value; documents that know their objects would do so forever."""
 
     def known(path: str) -> Any:
         part = Plain(Name="Part")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.bom.compare import Assembly, changes_json, compare_assemblies, compare_three
+from silo.bom.compare import ComparedAssembly, changes_json, compare_assemblies, compare_three
 from silo.bom.model import BomEntry
 
 
@@ -16,11 +16,13 @@ def entry(path: str, quantity: int = 1, uuid: str | None = None, name: str = "Bo
     return BomEntry(doc_path=path, object_name=name, silo_uuid=uuid, quantity=quantity)
 
 
-def assembly(path: str, *lines: BomEntry, uuid: str | None = None) -> Assembly:
-    return Assembly(entry(path, uuid=uuid), lines)
+def assembly(path: str, *lines: BomEntry, uuid: str | None = None) -> ComparedAssembly:
+    return ComparedAssembly(entry(path, uuid=uuid), lines)
 
 
-def told(old: Sequence[Assembly], new: Sequence[Assembly]) -> list[tuple[str, str, list[tuple[str, str]]]]:
+def told(
+    old: Sequence[ComparedAssembly], new: Sequence[ComparedAssembly]
+) -> list[tuple[str, str, list[tuple[str, str]]]]:
     return [
         (change.head.doc_path, change.kind, [(line.entry.doc_path, line.kind) for line in change.lines])
         for change in compare_assemblies(old, new)
@@ -91,12 +93,14 @@ states = st.dictionaries(paths, lines_of, max_size=4).map(
 
 
 @given(states)
-def test_a_state_does_not_differ_from_itself(state: list[Assembly]) -> None:
+def test_a_state_does_not_differ_from_itself(state: list[ComparedAssembly]) -> None:
     assert compare_assemblies(state, state) == ()
 
 
 @given(states, states)
-def test_the_changes_turn_the_old_state_into_the_new_one(old: list[Assembly], new: list[Assembly]) -> None:
+def test_the_changes_turn_the_old_state_into_the_new_one(
+    old: list[ComparedAssembly], new: list[ComparedAssembly]
+) -> None:
     """Every line of both states is either untouched or named once by a change, with its own quantity."""
     state = {a.head.key: {line.key: line.quantity for line in a.lines} for a in old}
     changes = compare_assemblies(old, new)
@@ -119,7 +123,9 @@ def test_the_changes_turn_the_old_state_into_the_new_one(old: list[Assembly], ne
 # --- three states ----------------------------------------------------------------------------------------
 
 
-def three(base: Assembly | None, theirs: Assembly, mine: Assembly) -> dict[str, tuple[float, float, float]]:
+def three(
+    base: ComparedAssembly | None, theirs: ComparedAssembly, mine: ComparedAssembly
+) -> dict[str, tuple[float, float, float]]:
     return {row.entry.doc_path: row.quantities for row in compare_three(base, theirs, mine)}
 
 
@@ -157,7 +163,7 @@ def test_every_change_of_theirs_that_mine_does_not_have_is_named(
 ) -> None:
     """A law: the lines that would be undone are exactly those that they changed and mine has otherwise."""
 
-    def state(lines: dict[str, int]) -> Assembly:
+    def state(lines: dict[str, int]) -> ComparedAssembly:
         return assembly("top", *(entry(name, quantity) for name, quantity in lines.items()))
 
     rows = compare_three(state(base), state(theirs), state(mine))

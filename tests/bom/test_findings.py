@@ -14,8 +14,7 @@ from silo.bom import BomEntry, Finding, FindingCode, Severity, choose_assembly, 
 from silo.bom.document import LinkProblem
 from silo.bom.findings import respelt_findings
 from silo.bom.resolve import consolidation_findings, unregistered_findings
-from silo.bom.walk.notes import Notes
-from silo.bom.walk.roles import Reader
+from silo.bom.roles import Files, Reader
 
 
 class Scene:
@@ -131,10 +130,9 @@ def two_roles() -> Iterable[Finding]:
     """A screw of the assembly, taken for one that lies beside it."""
     scene = Scene()
     one = screw(scene.top)
-    notes = Notes(lambda obj: str(obj.Document.FileName))
-    reader = Reader(notes, lambda obj: (obj.Document.FileName, obj.Name), None, beside=lambda _top: [one])
+    reader = Reader(None, Files(), beside=lambda _top: [one])
     reader.contents(scene.top.assembly(one))
-    return notes.findings()
+    return reader.notes.findings()
 
 
 SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {

@@ -49,4 +49,4 @@ def test_what_is_missing_is_said_with_what_was_seen() -> None:
     assert missing_columns(header, at, (Role.PART_NUMBER,)) == ""
     text = missing_columns(header, at, (Role.PART_NUMBER, Role.QUANTITY))
     assert text.startswith("there is no column 'Quantity'; the columns are PN, Colour. ")
-    assert "'Quantity' may also be called qty, count" in text
+    assert "'Quantity' may also be called qty, qnty, count" in text

@@ -45,7 +45,7 @@ def test_a_line_is_known_by_all_its_components() -> None:
 
 def test_a_standard_part_has_no_file_to_be_missing() -> None:
     """Its key is its designation."""
-    from silo.bom.walk.standard import standard_uuid
+    from silo.bom.standard import standard_uuid
 
     screw = BomEntry("/v/top.FCStd", standard_uuid("ISO 4762 M4×16"), standard="ISO 4762 M4×16")
     assert screw.is_standard
@@ -89,7 +89,7 @@ def test_a_kept_line_keeps_its_flag_too() -> None:
 
 
 def test_the_first_sync_is_news_even_where_nothing_differs() -> None:
-    """Else an assembly whose lines somebody had typed in would read as never synced for ever."""
+    """Else an assembly whose lines somebody had typed in would read as never synced forever."""
     head = BomEntry("/v/top.FCStd", "u-top", part_number="A-1")
     plan = plan_merge([], [])
     assert Resolved(head, (), (), (), {"u-top": {"at": None}}).is_news(plan)

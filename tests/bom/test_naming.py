@@ -13,7 +13,7 @@ from silo.bom.errors import ConfigError, InputError
 from silo.bom.model import BomEntry
 from silo.bom.resolve import (
     Categories,
-    Rule,
+    CategoryRule,
     assembly_categories,
     categories_of,
     clean_name,
@@ -24,7 +24,7 @@ from silo.bom.resolve import (
     proposed_name,
     rules_of,
 )
-from silo_server.schema.catalog import RULES, category_rules, describe, find_schema
+from silo_server.schema import RULES, category_rules, describe, find_schema
 
 SCHEMA = {
     "A01": "Mechanical assembly",
@@ -165,7 +165,7 @@ def test_a_rule_of_the_site_comes_first() -> None:
         {"words": ["top"], "category": "A05"},
         {"words": ["plates"], "without": ["cover"], "category": "M02"},
     ]
-    known = Categories(KNOWN, map(Rule.read, rules))
+    known = Categories(KNOWN, map(CategoryRule.read, rules))
     assert proposed_category(PART, "TopPlate", known).code == "M02"
     assert proposed_category(PART, "Cover plate", known).code == "S01"
     assert proposed_category(ASSEMBLY, "Top", known).code == "A05"
@@ -175,9 +175,9 @@ def test_a_rule_of_the_site_comes_first() -> None:
 def test_a_rule_that_is_none_is_refused(raw: object) -> None:
     """In plain words; a server's is passed over."""
     with pytest.raises(InputError, match="category rule"):
-        Rule.read(raw)
+        CategoryRule.read(raw)
     assert rules_of({"category_rules": [raw, {"words": ["top"], "category": "S01"}]}) == (
-        Rule("S01", frozenset({"top"})),
+        CategoryRule("S01", frozenset({"top"})),
     )
 
 
@@ -257,7 +257,7 @@ STANDARDS = {
 
 @pytest.mark.parametrize("designation", STANDARDS)
 def test_a_standard_part_gets_the_category_of_its_kind(designation: str) -> None:
-    """Numbers are for ever: a nut was registered, checked and certain, as a screw."""
+    """Numbers are forever: a nut was registered, checked and certain, as a screw."""
     guess = proposed_category(standard(designation), designation, shipped())
     assert (guess.code, guess.is_sure) == (STANDARDS[designation], True)
 
@@ -289,7 +289,7 @@ def test_a_nut_where_no_category_or_several_are_for_nuts(
 
 def test_the_site_decides_about_kinds_by_its_rules() -> None:
     """As about names: a rule with the word of the kind."""
-    known = Categories({"S": "Screws", "N": "Nuts", "B": "Bought"}, [Rule("B", frozenset({"nut"}))])
+    known = Categories({"S": "Screws", "N": "Nuts", "B": "Bought"}, [CategoryRule("B", frozenset({"nut"}))])
     assert proposed_category(standard("ISO 4032 M4"), "ISO 4032 M4", known).code == "B"
     assert proposed_category(standard("ISO 4762 M4×16"), "", known).code == "S"
 

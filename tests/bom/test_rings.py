@@ -6,7 +6,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.bom.walk.rings import Graph, Key, Rings, strongly_connected
+from silo.bom.links import Graph, Key, Rings, strongly_connected
 
 
 def graph(**edges: str) -> Graph:

@@ -14,13 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom import choose_assembly, extract
+from silo.bom.document import LinkProblem
 from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode
+from silo.bom.objects import ObjectRole, chains, draft_count
 from silo.bom.roots import fates, silent_reader
-from silo.bom.walk.kinds import draft_count
-from silo.bom.walk.tree import Role, chains
-from silo.inertia.geometry.freecad.walk import NOTHING, Material, Walk
+from silo.inertia.geometry.freecad import NOTHING, StatedMaterial, Walk
 
+UUID = "5d8d3a1e-6f0b-4c7a-9a54-2f1d7c0e4b36"
 M4 = "ISO 4762 M4×16"
 Counts = dict[str, int]
 
@@ -137,6 +138,54 @@ def left_out_beside(doc: Doc) -> Obj:
     return doc.assembly(doc.link("L", bolt()))
 
 
+def twice_at_the_root(doc: Doc) -> Any:
+    """One body, shown by two groups: two pieces, so that the file is not that part."""
+    body = doc.body("Body")
+    doc.link_group("A", body)
+    doc.link_group("B", body)
+    return choose_assembly(doc)
+
+
+def assembly_in_a_part(doc: Doc) -> Obj:
+    """A part around an assembly is no part of geometry alone."""
+    return doc.assembly(doc.part("Outer", doc.assembly(doc.body("A"), doc.body("B"), name="Inner")))
+
+
+def own_identity_in_capitals(doc: Doc) -> Obj:
+    """The assembly's own identity on a body declares nothing, however it is spelt."""
+    return doc.assembly(doc.body("A", SiloUUID=UUID.upper()), doc.body("B"), SiloUUID=UUID)
+
+
+def a_part_that_is_cut_away(doc: Doc) -> Obj:
+    """What lies in a tool goes with it; so does a screw that is alone in its assembly."""
+    tool = doc.part("Tool", doc.screw("Inside"))
+    doc.add("Part::Cut", "Cut", Base=doc.body("Plate"), Tool=tool)
+    return doc.assembly(tool, doc.link("L", bolt()))
+
+
+def a_lone_screw_that_is_cut_away(doc: Doc) -> Obj:
+    screw = doc.screw("Alone")
+    doc.add("Part::Cut", "Cut", Base=doc.body("Plate"), Tool=screw)
+    return doc.assembly(screw)
+
+
+def all_hidden(doc: Doc) -> Obj:
+    """Nothing else is shown, so what is hidden is meant."""
+    return doc.assembly(doc.body("A", Visibility=False), doc.body("B", Visibility=False))
+
+
+def imported_part(doc: Doc) -> Obj:
+    """A2plus names a file, whose one part it is."""
+    doc.__dict__["imported"] = files_of_a2plus().__getitem__
+    return doc.assembly(doc.add(PYTHON, "I", sourceFile="./alone.FCStd", a2p_Version="1"))
+
+
+def lone_screw(doc: Doc) -> Any:
+    """A file with one standard part is no part of its own."""
+    doc.screw("S")
+    return choose_assembly(doc)
+
+
 CASES: list[tuple[Callable[[Doc], Any], Counts, Counts]] = [
     (assembly3, {"Bolt": 1, M4: 3}, {}),
     (masters, {M4: 4}, {}),
@@ -153,6 +202,14 @@ CASES: list[tuple[Callable[[Doc], Any], Counts, Counts]] = [
     (elements_of_an_array_beside, {"Bolt": 2}, {}),
     (left_out_beside, {"Bolt": 1}, {}),
     (parts_at_the_root, {}, {"Left": 1, "Right": 1, "Middle": 1}),
+    (assembly_in_a_part, {}, {"A": 1, "B": 1}),
+    (own_identity_in_capitals, {}, {"A": 1, "B": 1}),
+    (twice_at_the_root, {}, {"Body": 2}),
+    (lone_screw, {M4: 1}, {}),
+    (all_hidden, {}, {"A": 1, "B": 1}),
+    (imported_part, {"Alone": 1}, {}),
+    (a_part_that_is_cut_away, {"Bolt": 1}, {}),
+    (a_lone_screw_that_is_cut_away, {}, {}),
 ]
 
 
@@ -168,6 +225,15 @@ def test_each_way_of_use_counts_once(build: Callable[[Doc], Any], counts: Counts
     obeys_the_laws(top)
 
 
+def test_a_registered_screw_in_a_folder_is_that_item() -> None:
+    """The document's identity is the screw's, if only folders and sketches lie beside it."""
+    other, top = Doc("/v/special.FCStd", meta={"SiloUUID": UUID}), Doc("/v/top.FCStd")
+    screw = other.screw("Special")
+    other.folder("F", screw)
+    (entry,) = extract(top.assembly(top.link("L", screw))).entries
+    assert (entry.key, entry.silo_uuid) == (("/v/special.FCStd", "Special"), UUID)
+
+
 def obeys_the_laws(top: Any) -> None:
     """No object without a role, and none that contributes through another one than that of a component."""
     reader = silent_reader(counts_beside=True)
@@ -175,7 +241,7 @@ def obeys_the_laws(top: Any) -> None:
     roles = fates(top, contents, reader)
     assert None not in roles.values()
     counted = {count.shown.obj.Name for count in (*contents.counts, *contents.own)}
-    assert all(roles[name] is Role.COMPONENT for name in counted)
+    assert counted == {name for name, role in roles.items() if role is ObjectRole.COMPONENT}
     for count in (*contents.counts, *contents.own):
         pieces = 0
         for way in chains(count, contents.tree):
@@ -194,11 +260,29 @@ def test_what_lies_beside_is_reported_together() -> None:
 
 KINDS = (
     *("link", "array", "element", "draft", "compound", "clone", "mirror", "cut", "fusion", "screw", "body"),
-    *("foreign", "import", "changed", "assembly_link"),
+    *("foreign", "import", "changed", "assembly_link", "a2plus"),
 )
 HOLDERS = ("part", "folder", "link_group")
 TOPS = ("assembly", "part", "assembly3", "model", "root", "several", "inner")
 PYTHON = "Part::FeaturePython"
+
+
+def files_of_a2plus() -> dict[str, Any]:
+    """What A2plus's files hold: a part, an assembly, several things, one thing; and a file that is lost."""
+    several, alone = Doc("/v/several.FCStd"), Doc("/v/alone.FCStd")
+    several.link("L", bolt())
+    several.screw("S")
+    alone.body("Alone")
+    sub = Doc("/v/sub.FCStd")
+    sub.assembly(sub.screw("S"), sub.link("L", bolt()), name="Sub")
+    tops = {
+        name: choose_assembly(doc) for name, doc in (("several", several), ("alone", alone), ("sub", sub))
+    }
+    gone = LinkProblem(FindingCode.MISSING_FILE, "./gone.FCStd")
+    return {f"./{name}.FCStd": found for name, found in {**tops, "bolt": bolt(), "gone": gone}.items()}
+
+
+A2PLUS = ("several", "alone", "sub", "bolt", "gone")
 
 
 def made_of(draw: st.DrawFn, doc: Doc, name: str, near: Any, far: Any, **more: Any) -> Obj:
@@ -226,6 +310,9 @@ def made_of(draw: st.DrawFn, doc: Doc, name: str, near: Any, far: Any, **more: A
         return doc.screw(name, **more)
     if kind == "foreign":
         return doc.add(PYTHON, name, sourceFile="", a2p_Version="1", **more)
+    if kind == "a2plus":
+        file = draw(st.sampled_from(A2PLUS))
+        return doc.add(PYTHON, name, sourceFile=f".\\{file}.FCStd", a2p_Version="1", **more)
     if kind == "changed":  # copy on change: the source may lie anywhere
         copy = doc.screw(f"{name}C", "20")
         doc.link_group(f"CopyOnChangeGroup{name}", copy, Visibility=False)
@@ -267,6 +354,7 @@ def documents(draw: st.DrawFn) -> Any:
     """A document with every kind, in any container or in none, that shows and consumes any other."""
     doc = Doc("/v/top.FCStd")
     far, made = bolt(), list[Any]()
+    doc.__dict__["imported"] = files_of_a2plus().__getitem__
     members = list[Any]()
     for number in range(draw(st.integers(1, 9))):
         more = {"Visibility": draw(st.booleans())}
@@ -307,7 +395,7 @@ class Unplaced:
     def shape(self, obj: Any) -> Any:
         return object()
 
-    def material(self, obj: Any) -> Material:
+    def material(self, obj: Any) -> StatedMaterial:
         return NOTHING
 
     def problem(self, link: Any) -> None:
@@ -331,6 +419,24 @@ def test_the_mass_has_the_pieces_of_the_bom(top: Any) -> None:
         assert not contents.counts
     else:
         assert weighed == +counted
+
+
+def test_a_compound_of_bodies_that_another_file_links_to_is_one_piece() -> None:
+    """It is a product made of its own shape, and does not contain itself."""
+    doc = Doc("/v/plates.FCStd")
+    walk = Walk(Unplaced())
+    assert walk.product(doc.add("Part::Compound", "C", Links=[doc.body("A"), doc.body("B")])) in walk.leaves
+    assert not walk.problems()
+
+
+def test_the_members_of_a_compound_are_left_out_with_it() -> None:
+    """And are no sources, which somebody may look for."""
+    doc = Doc("/v/top.FCStd")
+    screw = doc.screw("S")
+    both = doc.add("Part::Compound", "Pair", Links=[screw], SiloBomExclude=True)
+    reader = silent_reader()
+    top = doc.assembly(screw, both, doc.link("L", bolt()))
+    assert fates(top, reader.contents(top), reader)["S"] is ObjectRole.LEFT_OUT
 
 
 def test_a_screw_that_no_assembly_gets_is_reported() -> None:

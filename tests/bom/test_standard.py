@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from fakes import Doc
 
-from silo.bom.walk.standard import NAMESPACE, designated, designation, same_articles, standard_uuid
+from silo.bom.standard import NAMESPACE, designated, designation, same_articles, standard_uuid
 
 LATER_USED_OF = {
     "type": "Type",
@@ -175,7 +175,7 @@ def test_only_python_features_are_fasteners() -> None:
 
 
 def test_the_identity_follows_from_the_designation() -> None:
-    """UUID version 5 in the documented namespace: the same in every project, for ever."""
+    """UUID version 5 in the documented namespace: the same in every project, forever."""
     assert str(NAMESPACE) == "5d8d3a1e-6f0b-5c7a-9a54-2f1d7c0e4b36"
     text = "ISO 4762 M4×16"
     assert standard_uuid(text) == str(uuid.uuid5(NAMESPACE, text))

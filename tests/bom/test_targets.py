@@ -11,7 +11,7 @@ from fakes import Doc, edit
 from silo.bom import FindingCode, Severity, extract
 from silo.bom.document import LinkProblem, located, split_sub_name
 from silo.bom.findings import Finding
-from silo.bom.walk.targets import resolve_target
+from silo.bom.targets import resolve_target
 
 
 @pytest.fixture
@@ -387,7 +387,7 @@ def test_a_damaged_live_assembly_is_not_read(top: Doc, bolt: Any) -> None:
 
 
 def test_a_link_that_was_never_set_does_not_block(top: Doc, bolt: Any) -> None:
-    """Nothing is missing where there never was anything; it is reported all the same."""
+    """Nothing is missing where there never was anything; it is reported anyway."""
     found = extract(top.assembly(broken(top, "New", FindingCode.UNSET_LINK), top.link("L", bolt)))
     (finding,) = found.findings
     assert (finding.code, finding.severity) == (FindingCode.UNSET_LINK, Severity.WARNING)

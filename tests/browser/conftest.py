@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
-from server_testing import Api
+from server_testing import Api, sqlite_database
 from settled import come_late
 from web_visitor import link_of
 
@@ -54,7 +54,10 @@ def chromium() -> Iterator[Browser]:
     expect.set_options(timeout=SECONDS * 1000)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=path, args=["--no-sandbox", "--disable-gpu"], timeout=SECONDS * 1000
+            executable_path=path,
+            # Pages are drawn by Chromium itself; models by WebGL in software.
+            args=["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"],
+            timeout=SECONDS * 1000,
         )
         yield browser
         browser.close()
@@ -64,7 +67,7 @@ def chromium() -> Iterator[Browser]:
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
     """A server over an empty database; each test makes its own items."""
     folder = tmp_path_factory.mktemp("server")
-    with running_server(f"sqlite:///{folder / 'silo.db'}", token=TOKEN) as running:
+    with running_server(sqlite_database(folder / "silo.db"), token=TOKEN) as running:
         yield running
 
 
@@ -95,7 +98,7 @@ def visit(chromium: Browser, server: RunningServer, api: Api) -> Iterator[Visit]
         page.on("console", lambda message: _refused(message.text, faults))
         if role is not None:
             page.goto(login_path(api, role))
-            page.get_by_role("button", name="Log in").click()
+            page.locator("form.stack button").click()
             page.locator(".who").wait_for()
         return page
 

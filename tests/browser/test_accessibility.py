@@ -15,13 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from model_scenes import machine
 from playwright.sync_api import Page
+from public_projects import ASSEMBLIES
 from server_testing import Api, bom
 from settled import come_late, measured
 
 Visit = Callable[..., Page]
 
-REAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "assemblies" / "lmn3"
+REAL = ASSEMBLIES / "lmn3"
 AXE = "axe-core@4.10.3"
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 # Dark differs from light in colours alone.
@@ -54,13 +56,19 @@ TALL = """() => {
         const style = getComputedStyle(control);
         const sides = ["paddingTop", "paddingBottom", "borderTopWidth", "borderBottomWidth"];
         const around = sides.reduce((sum, side) => sum + parseFloat(style[side]), 0);
-        const needed = around + lines.size * parseFloat(style.lineHeight);
+        // The least height of a finger's target is meant, up to 44 px.
+        const least = Math.min(parseFloat(style.minHeight) || 0, 44);
+        const needed = Math.max(around + lines.size * parseFloat(style.lineHeight), least);
         if (control.getBoundingClientRect().height > needed + 2) found.push("tall: " + control.textContent);
         const short = control.textContent.length <= 30;
         if (innerWidth > 1400 && short && lines.size > 1) found.push("two lines: " + control.textContent);
     }
     return found.map(text => text.slice(0, 200));
 }"""
+# Words of our controls that were left in English; the foot offers the language by its own name.
+ENGLISH = """() => [...document.querySelectorAll("button:not([lang]), .button, summary, th a, nav a")]
+    .map(one => one.textContent)
+    .filter(words => /\\b(the|of|and|by|with|save|remove|show|keep|edit|add|find)\\b/i.test(words))"""
 HEADER = "getComputedStyle(document.querySelector('.top')).display"
 # Wide; a phone; a small one, or a zoomed page. Both phones have the same style sheet: one of them is for axe.
 WIDTHS, FOR_AXE = (1440, 390, 320), (1440, 320)
@@ -79,6 +87,11 @@ PAGES = (
     "/items/{parent}?depth=1&sort=-mass&pieces=3",
     "/items/{parent}?q=nothing-like-this",
     "/items/{parent}?view=flat",
+    "/items/{parent}?beside={child}",
+    "/items/{parent}/changes?since=2020-01-01",
+    "/items/{parent}/releases",
+    "/items/{parent}/releases/A",
+    "/mine",
     "/items/{child}",
     "/items/{parent}/bom",
     "/items/{parent}/bom?edit={child}",
@@ -86,6 +99,9 @@ PAGES = (
     "/items/{parent}/history",
     "/items/{parent}/compare?old=0&all=1",
     "/items/{parent}/import",
+    "/items/{parent}/order?pieces=3",
+    "/items/{child}/suppliers",
+    "/suppliers",
     "/activity",
     "/account",
     "/users",
@@ -126,11 +142,15 @@ def numbers(api: Api) -> dict[str, str]:
     """A BOM with everything: used, unreferenced, manual, in conflict, several levels."""
     parent, child, module, gone, also_gone, disputed = api.items(6)
     api.good("PUT", f"/api/items/{child}", {"properties": {"mass_kg": 0.5}, "comment": "weighed"})
+    price = {"quantity": "1", "price": "0.5"}
+    sold = {"supplier": "Misumi", "number": "A-1", "pack_size": "10", "prices": [price]}
+    api.good("PUT", f"/api/items/{child}/suppliers", {"supplier_parts": [sold]})
     api.merge(module, {child: 2})
     whole = {child: 4, module: 1, gone: 1, also_gone: 2, disputed: 3}
     api.merge(parent, whole)
     api.good("PUT", bom(parent, disputed), {"quantity": 6, "notes": "one spare"})
     api.merge(parent, {child: 5, module: 1, disputed: 4})
+    api.good("POST", f"/api/items/{parent}/releases", {"label": "A"})
     return {"parent": parent, "child": child}
 
 
@@ -147,7 +167,8 @@ def test_no_page_has_a_finding(axe: str, numbers: dict[str, str], visit: Visit, 
     assert findings == []
 
 
-def test_no_control_is_taller_than_its_text(api: Api, visit: Visit) -> None:
+@pytest.mark.parametrize("locale", ["en-US", "de-DE"])
+def test_no_control_is_taller_than_its_text(api: Api, visit: Visit, locale: str) -> None:
     """With the names of a real project: no word of ours breaks, no button is taller than its words."""
     if not REAL.is_dir():
         pytest.skip(f"the real assemblies are not at hand: {REAL}")
@@ -157,10 +178,20 @@ def test_no_control_is_taller_than_its_text(api: Api, visit: Visit) -> None:
     api.good("PUT", bom(parent, parts[0]), {"quantity": 0.5, "unit": "m", "notes": " ".join(names[:9])})
     api.good("PUT", bom(parent, parts[1]), {"find_number": "10", "notes": names[5]})
     api.merge(parent, dict.fromkeys([parts[0], *parts[3:]], 3))
-    page = visit("admin")
+    page = visit("admin", locale=locale)
     findings: list[str] = []
-    for path in ("", "?view=flat", "/bom", f"/bom?edit={parts[1]}", "/history", "/print"):
-        page.goto(f"/items/{parent}{path}")
+    of_item = ("", "?view=flat", "/bom", f"/bom?edit={parts[1]}", "/history", "/print", "/edit", "/releases")
+    for path in (
+        *(f"/items/{parent}{one}" for one in of_item),
+        "/items",
+        "/waiting",
+        "/mine",
+        "/users",
+        "/account",
+    ):
+        page.goto(path)
+        english = measured(page, ENGLISH) if locale == "de-DE" else []
+        findings += [f"{path}: {words}" for words in english]
         for width in WIDTHS:
             page.set_viewport_size({"width": width, "height": 844})
             findings += [f"{path} at {width}: {tall}" for tall in measured(page, TALL)]
@@ -292,3 +323,16 @@ def test_a_page_is_measured_with_its_style_sheet(visit: Visit) -> None:
     page.get_by_role("link", name="Activity").click()
     page.get_by_role("heading", name="Activity").wait_for()
     assert measured(page, HEADER) == plain
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_pages_with_a_model_have_no_finding(axe: str, api: Api, visit: Visit, scheme: str) -> None:
+    """The controls of the model, beside a product, a decision and a comparison."""
+    top = machine(api, f"A{scheme}")
+    page = visit("admin", color_scheme=scheme)
+    findings: list[str] = []
+    for path in ("", "/bom", "/compare"):
+        page.goto(f"/items/{top}{path}")
+        page.locator("#model[data-ready]").wait_for()
+        findings += in_each_width(page, axe, path)
+    assert findings == []

@@ -32,7 +32,7 @@ def test_columns_are_chosen_by_hand(api: Api, visit: Visit, script: bool) -> Non
     page.get_by_label("Header").select_option(index=1)
     page.get_by_role("button", name="Check again").click()
     expect(page.get_by_role("alert")).to_contain_text("Say which column is 'Part number' and 'Quantity'")
-    page.get_by_label("Part number").select_option(index=1)
+    page.get_by_label("Part number choose").select_option(index=1)
     page.get_by_label("Quantity").select_option(index=2)
     page.get_by_label("Notes").select_option(index=3)
     page.get_by_role("button", name="Check again").click()

@@ -32,7 +32,14 @@ def _report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "bom.csv").write_text(bom, "utf-8")
     assert (
         main(
-            ["inertia", f"{ARM / 'arm.step'}", "--bom", f"{folder / 'bom.csv'}", "--html", f"{folder}/r.html"]
+            [
+                "inertia",
+                f"{ARM / 'arm.step'}",
+                "--bom",
+                f"{folder / 'bom.csv'}",
+                "--report",
+                f"{folder}/r.html",
+            ]
         )
         == 0
     )
@@ -65,7 +72,7 @@ def _opened(chromium: Browser, report: Path) -> Iterator[Callable[..., Page]]:
 
 
 def seen(page: Page, other_than: bytes = b"") -> bytes:
-    """The view, once it looks otherwise: it is drawn anew a moment after it was asked to."""
+    """The view, once it looks otherwise: it is drawn again a moment after it was asked to."""
     canvas = page.locator("#view canvas")
     wait_until(lambda: picture_of(canvas) != other_than, "another picture")
     return picture_of(canvas)
@@ -76,19 +83,22 @@ def test_the_view_turns_and_hides_links(opened: Callable[..., Page]) -> None:
     page: Any = opened()
     page.wait_for_selector("body[data-ready='35']")
     first = seen(page)
+    expect(page.locator("#view .tools").get_by_text("at", exact=True)).to_be_hidden()  # no section
     box = box_of(page.locator("#view canvas"))
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] * 0.8
     page.mouse.click(x, y)
-    expect(page.locator("#picked")).to_contain_text("base_link: ")
+    expect(page.locator("#view .said")).to_contain_text("base_link: ")
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 150, y + 20, steps=3)
     page.mouse.up()
     turned = seen(page, other_than=first)
-    page.locator("#side").get_by_label("upper_arm").uncheck()
+    page.locator("#side").get_by_label("Show upper_arm").uncheck()
     hidden = seen(page, other_than=turned)
-    page.get_by_label("see through bodies").check()
+    page.get_by_role("button", name="See through").click()
     seen(page, other_than=hidden)
+    page.set_viewport_size({"width": 390, "height": 800})
+    assert box_of(page.locator("#view"))["width"] < 390  # the stage would cut off the rest
     assert [word for word in page.said if not word.startswith("file:") or not word.endswith("r.html")] == []
 
 
@@ -101,28 +111,66 @@ def test_clicks_give_parts_to_links_and_save_the_map(opened: Callable[..., Page]
     page.locator(".draft input[type=text]").last.press("Tab")
     canvas = page.locator("#view canvas")
     canvas.click(position={"x": box_of(canvas)["width"] / 2, "y": box_of(canvas)["height"] * 0.8})
-    expect(page.locator("#picked")).to_contain_text("to: “ol”: base_link/")
-    clicked = page.locator("#picked").inner_text().partition("”: ")[2]
+    expect(page.locator("#view .said")).to_contain_text("to: “ol”: base_link/")
+    clicked = page.locator("#view .said").inner_text().partition("”: ")[2]
     page.get_by_label("Link of Finger").select_option("to: “ol”")
     page.get_by_label("Filter parts").fill("to: ol")
     page.get_by_label("Filter parts").fill("to: “ol”")
     expect(page.locator("#shown")).to_have_text("2 of 19 lines")
     page.locator(".draft input[type=text]").nth(2).fill("upper_arm")
-    page.locator(".draft input[type=text]").nth(2).press("Tab")
-    with page.expect_download() as download:
-        page.get_by_role("button", name="Save map.yaml").click()
-    download.value.save_as(tmp_path / "map.yaml")
-    made = {link.name: link.patterns for link in read_link_map(tmp_path / "map.yaml").links}
+    page.get_by_label("Clicks go to base_link").click()  # it ends the typing, and is a click as well
+    expect(page.get_by_label("Clicks go to base_link")).to_be_checked()
+    expect(page.locator(".draft:visible")).to_have_count(4)
+    made = saved(page, tmp_path)
     assert made["upper_arm"] == ("path:upper_arm", "path:forearm")
     assert made["to: “ol”"] == (f"path:{clicked}", "path:gripper/finger left", "path:gripper/finger right")
     assert sorted(made) == ["base_link", "gripper", "to: “ol”", "upper_arm"]
     assert [word for word in page.said if not word.startswith(("file:", "blob:"))] == []
 
 
+def test_a_click_with_shift_gives_a_whole_link_and_undo_takes_it_back(
+    opened: Callable[..., Page], tmp_path: Path
+) -> None:
+    """The link that was clicked leaves the list and the map; each undo takes one step back, names too."""
+    page: Any = opened()
+    page.wait_for_selector("body[data-ready='35']")
+    first = saved(page, tmp_path)
+    undo = page.get_by_role("button", name="Undo")
+    expect(undo).to_be_disabled()
+    lines = page.locator(".draft:visible")
+    page.get_by_label("Clicks go to gripper").check()
+    canvas = page.locator("#view canvas")
+    place = {"x": box_of(canvas)["width"] / 2, "y": box_of(canvas)["height"] * 0.8}
+    before = seen(page)
+    canvas.click(position=place, modifiers=["Shift"])
+    expect(page.locator("#view .said")).to_contain_text("gripper: ")
+    seen(page, other_than=before)
+    expect(lines).to_have_count(3)
+    assert set(saved(page, tmp_path)["gripper"]) == set(first["gripper"] + first["base_link"])
+    page.locator(".draft:visible input[type=text]").first.fill("gripper")
+    page.locator(".draft:visible input[type=text]").first.press("Enter")
+    expect(lines).to_have_count(2)
+    assert sorted(saved(page, tmp_path)) == ["forearm", "gripper"]
+    undo.click()
+    expect(lines).to_have_count(3)
+    undo.click()
+    expect(lines).to_have_count(4)
+    expect(undo).to_be_disabled()
+    assert saved(page, tmp_path) == first
+
+
+def saved(page: Page, folder: Path) -> dict[str, tuple[str, ...]]:
+    """Link → patterns of the map that the page saves."""
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save map.yaml").click()
+    download.value.save_as(folder / "map.yaml")
+    return {link.name: link.patterns for link in read_link_map(folder / "map.yaml").links}
+
+
 def test_tables_sort_and_filter_and_names_are_text(opened: Callable[..., Page]) -> None:
     """Numbers as numbers; without WebGL the tables are there; dark where wanted, never wider than a phone."""
     page: Any = opened(webgl=False)
-    expect(page.locator("#picked")).to_contain_text("shows no 3D (WebGL)")
+    expect(page.locator("#view")).to_contain_text("shows no 3D (WebGL)")
     assert page.locator("#view canvas").count() == 0
     rows = page.locator("#parts tbody tr")
     page.get_by_role("button", name="Total kg").click()

@@ -126,6 +126,27 @@ def test_the_tree_opens_and_closes(machine: dict[str, str], visit: Visit) -> Non
     expect(screw).to_have_count(0)
 
 
+@pytest.mark.parametrize("script", [True, False])
+def test_a_row_is_looked_at_beside_the_table(machine: dict[str, str], visit: Visit, script: bool) -> None:
+    """The table stays as it is; the heading has the focus, Escape closes it; the address keeps it."""
+    page = visit("viewer", java_script_enabled=script)
+    page.goto(f"/items/{machine['machine']}?sort=number")
+    row = page.get_by_role("row").filter(has=page.locator(f"a[href='/items/{machine['plate']}']"))
+    row.get_by_role("link", name="Show it beside the table").click()
+    beside = page.locator(".glance")
+    expect(beside.get_by_role("heading")).to_contain_text(machine["plate"])
+    expect(beside.get_by_role("link", name="Open")).to_have_attribute("href", f"/items/{machine['plate']}")
+    assert "sort=number" in page.url
+    if script:
+        expect(page.locator("#beside")).to_be_focused()
+        page.keyboard.press("Escape")
+    else:
+        beside.get_by_role("link", name="Close").click()
+    expect(beside).to_have_count(0)
+    page.goto(f"/items/{machine['machine']}?beside=NO-SUCH")
+    expect(beside).to_have_count(0)
+
+
 def test_the_tree_says_what_each_row_weighs_and_costs(machine: dict[str, str], visit: Visit) -> None:
     """Quantity in its parent and in all, mass and cost of one and of all; several pieces; without script."""
     page = visit("viewer", java_script_enabled=False)
@@ -191,7 +212,7 @@ def test_flat_view_totals_and_what_is_missing(machine: dict[str, str], visit: Vi
     totals = page.locator(".totals").first
     expect(totals).to_contain_text("3 kg")
     expect(totals).to_contain_text("12.00 EUR")
-    expect(totals).to_contain_text(f"without 1 item that states none: {machine['plate']}")
+    expect(totals).to_contain_text(f"1 item that states none is left out: {machine['plate']}")
 
 
 def test_where_used(machine: dict[str, str], visit: Visit) -> None:

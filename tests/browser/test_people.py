@@ -99,7 +99,7 @@ def test_the_last_admin_stays(api: Api, visit: Visit) -> None:
 
 
 def test_read_only_and_back(machine: dict[str, str], visit: Visit) -> None:
-    """An open page hears of it, and a form that is sent all the same is answered in plain words."""
+    """An open page hears of it, and a form that is sent anyway is answered in plain words."""
     admin, editor = visit("admin"), visit("editor")
     editor.goto(f"/items/{machine['machine']}/bom?edit={machine['plate']}")
     admin.goto("/users")
@@ -165,7 +165,7 @@ def test_login_leads_where_one_wanted_to_go(machine: dict[str, str], visit: Visi
     page.get_by_label("Password").fill("not the password")
     page.get_by_role("button", name="Log in").click()
     expect(page.get_by_role("alert")).to_contain_text("user name or password is wrong")
-    assert page.locator('input[name="next"]').input_value() == path
+    assert page.locator('#main input[name="next"]').input_value() == path
     inside = visit("viewer")
     inside.goto(path)
     inside.get_by_role("button", name="Log out").click()

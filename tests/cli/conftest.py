@@ -13,8 +13,10 @@ from typing import Any
 
 import jsonschema_rs
 import pytest
+from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
+from silo.api.policy import Retries
 from silo.cli.main import main
 from silo.cli.shapes import schema_of
 from silo_server.run import running_server
@@ -59,13 +61,15 @@ def gearbox(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def home(tmp_path: Path, warm: None, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Nothing of the user's own configuration or data is read or written."""
     for name in ("SILO_API_URL", "SILO_API_TOKEN", "SILO_SSL_VERIFY"):
         monkeypatch.delenv(name, raising=False)
     folder = tmp_path / "home"
     for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME"):
         monkeypatch.setenv(name, str(folder / name.lower()))
+    first = 0.01  # [s], the first pause before a command tries again
+    monkeypatch.setattr(Retries.__init__, "__defaults__", (3, first, *Retries.__init__.__defaults__[2:]))
     return folder
 
 
@@ -73,7 +77,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def silo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Silo]:
     """A running server that the environment names."""
     token = "silo_" + "c1" * 20
-    with running_server(f"sqlite:///{tmp_path / 'silo.db'}", token=token) as server:
+    with running_server(sqlite_database(tmp_path / "silo.db"), token=token) as server:
         monkeypatch.setenv("SILO_API_URL", server.base_url)
         monkeypatch.setenv("SILO_API_TOKEN", token)
         with SiloClient(server.base_url, token) as client:

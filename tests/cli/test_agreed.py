@@ -12,6 +12,7 @@ from typing import Any
 
 import jsonschema_rs
 import pytest
+from fault_proxy import FAULTS, fault_proxy
 
 from silo.bom.errors import Exit
 from silo.cli.main import THEMES, build_parser, main
@@ -31,7 +32,7 @@ WITH_PATHS = {
     "bom": "bom @",
     "diff": "diff @",
     "bom-diff": "bom-diff @ @",
-    "where-used": "where-used part.FCStd @",
+    "where-used": "where-used part.FCStd --root @",
     "relink": "relink @ --from a --to b",
     "sync": "sync @",
     "commit": "commit @",
@@ -106,7 +107,7 @@ def test_an_option_that_another_one_makes_useless_is_refused(
 
 
 def test_which_options_exclude_another() -> None:
-    reading = ("--index", "--no-index", "--jobs", "--dask")
+    reading = ("--index", "--no-cache", "--jobs", "--dask")
     assert {(command, other, option) for command, option, other in BESIDE} == {
         *(("bom", "--verify", one) for one in ("--flat", "--resolve", "--csv", "--xlsx", "--why", *reading)),
         *(("bom", "--why", one) for one in ("--flat", "--resolve", "--csv", "--xlsx", "--json", *reading)),
@@ -129,6 +130,7 @@ def test_which_options_need_another() -> None:
     weighing = ("inertia", "mass")
     assert found == {
         ("register", "--yes", "--duplicates"),
+        ("log", "--since", "--until"),
         ("register", "--declare", "--apart"),
         *((command, "--strict", "--allow") for command in weighing),
         *(
@@ -139,7 +141,6 @@ def test_which_options_need_another() -> None:
         ("inertia", "--urdf", "--in-place"),
         ("inertia", "--urdf", "--urdf-out"),
         ("mass", "--push", "--index"),
-        ("mass", "--push", "--no-index"),
         ("bom", "--resolve", "--server"),
         ("bom", "--resolve", "--token"),
         *(
@@ -148,6 +149,18 @@ def test_which_options_need_another() -> None:
             for option in ("--column", "--encoding", "--delimiter", "--decimal", "--mass-unit")
         ),
     }
+
+
+def test_an_option_is_one_word_and_means_one_thing() -> None:
+    """No second spelling, and the same kind of value in each command."""
+    kinds: dict[str, set[tuple[Any, Any]]] = {}
+    for parser in parsers().values():
+        for action in parser._actions:
+            long = [name for name in action.option_strings if name.startswith("--")]
+            assert len(long) <= 1, long
+            for name in long:
+                kinds.setdefault(name, set()).add((action.nargs, action.metavar))
+    assert {name: found for name, found in kinds.items() if len(found) > 1} == {}
 
 
 def test_no_option_can_be_shortened() -> None:
@@ -166,7 +179,7 @@ def test_an_assembly_is_picked_of_a_file_not_of_a_folder(
 
 @pytest.mark.parametrize("words", ["pull A01-4711", "watch --item A01-4711"])
 def test_an_item_that_is_not_there_is_bad_input(run: Any, silo: Any, words: str) -> None:
-    """``watch`` would wait for its events for ever."""
+    """``watch`` would wait for its events forever."""
     done = run(*words.split())
     assert (done.code, done.out) == (Exit.BAD_INPUT, "")
     assert "there is no item A01-4711 on http" in done.err
@@ -174,11 +187,11 @@ def test_an_item_that_is_not_there_is_bad_input(run: Any, silo: Any, words: str)
 
 def test_a_misspelt_file_is_used_by_nobody_and_that_is_no_answer(run: Any, gearbox: Path) -> None:
     """Who reads "No file links to it" deletes the file; one that is gone, and linked to, is answered."""
-    done = run("where-used", gearbox.parent / "parts" / "Cvoer.FCStd", gearbox.parent)
+    done = run("where-used", gearbox.parent / "parts" / "Cvoer.FCStd", "--root", gearbox.parent)
     assert (done.code, done.out) == (Exit.BAD_INPUT, "")
     assert "did you mean parts/Cover.FCStd" in done.err
     (gearbox.parent / "parts" / "Cover.FCStd").unlink()
-    done = run("where-used", gearbox.parent / "parts" / "Cover.FCStd", gearbox.parent)
+    done = run("where-used", gearbox.parent / "parts" / "Cover.FCStd", "--root", gearbox.parent)
     assert (done.code, "TopAssembly.FCStd" in done.out) == (Exit.DONE, True)
 
 
@@ -216,6 +229,10 @@ def test_diff_says_nothing_of_agreement_where_a_file_is_missing(run: Any, silo: 
     assert run("register", gearbox, "--yes").code == 0
     assert run("sync", gearbox, "--recursive").code == 0
     shutil.move(next(gearbox.parent.rglob("*Cover*.FCStd")), gearbox.parent.parent)
+    for words in ([gearbox], [gearbox.parent]):
+        for command in (["bom"], ["diff"], ["diff", "--check"]):
+            codes = [run(*command, *words, *allow).code for allow in ((), ("--allow-missing",))]
+            assert codes == [Exit.UNDONE, Exit.DONE], (command, words)
     for words in ([gearbox], [gearbox.parent], [gearbox, "--check"]):
         done = run("diff", *words)
         assert done.code == Exit.UNDONE
@@ -332,38 +349,88 @@ def test_with_json_a_disk_that_says_no_is_an_object_too(run: Any, gearbox: Path,
     assert "taken" in json.loads(ran.out)["error"]["message"]
 
 
-# Every command that asks a server, with what it needs beside.
-WITH_SERVER = {
-    "bom": "bom @ --resolve",
-    "diff": "diff @",
-    "sync": "sync @",
-    "commit": "commit @",
-    "status": "status @",
-    "register": "register @ --yes",
+# Commands that read a file or ask a server, as docs/headless.md lists them.
+FAULTY = {
+    **{
+        name: WITH_PATHS[name]
+        for name in ("bom", "diff", "sync", "commit", "status", "register", "log", "mass")
+    },
+    "bom --resolve": "bom @ --resolve",
     "pull": "pull A01-0001",
-    "log": "log @",
     "search": "search plate",
     "show": "show A01-0001",
     "whoami": "whoami",
     "doctor": "doctor",
+    "queue retry": "queue retry",
+    "watch": "watch --count 1",
 }
-FAULTS = {"away": ("http://127.0.0.1:9", 3), "token": ("", 3), "address": ("ftp://x", 2)}
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_of_the_server_has_one_exit_code_everywhere(
-    run: Any, silo: Any, gearbox: Path, monkeypatch: pytest.MonkeyPatch, fault: str
+def test_exit_codes_are_those_of_the_table(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It does not answer, it refuses the token, or its address is none; no stack trace."""
+    """Commands by faults; no fault is a stack trace."""
     assert run("register", gearbox, "--yes").code == Exit.DONE
-    url, code = FAULTS[fault]
-    if url:
-        monkeypatch.setenv("SILO_API_URL", url)
-    else:
-        monkeypatch.setenv("SILO_API_TOKEN", "silo_wrong")
-    ended = {}
-    for command, line in WITH_SERVER.items():
-        ran = run(*(str(gearbox) if word == "@" else word for word in line.split()))
-        ended[command] = ran.code
-        assert "Traceback" not in ran.err
-    assert ended == dict.fromkeys(WITH_SERVER, code)
+    assert run("sync", gearbox, "--recursive").code == Exit.DONE
+    url = silo.client.base_url
+    damaged = tmp_path / "damaged.FCStd"
+    damaged.write_bytes(gearbox.read_bytes()[:2000])
+    lacking = tmp_path / "lacking"
+    shutil.copytree(gearbox.parent, lacking)
+    (lacking / "parts" / "Cover.FCStd").unlink()
+    monkeypatch.chdir(tmp_path)
+    with fault_proxy(url) as proxy:
+        proxy.fault = FAULTS["500"]
+        faults = {
+            "no such file": (Path("nowhere.FCStd"), url, silo.token),
+            "damaged file": (damaged, url, silo.token),
+            "linked file gone": (lacking / gearbox.name, url, silo.token),
+            "no server named": (gearbox, "", silo.token),
+            "no address": (gearbox, "ftp://x", silo.token),
+            "server away": (gearbox, "http://127.0.0.1:9", silo.token),
+            "token refused": (gearbox, url, "silo_wrong"),
+            "server fails": (gearbox, proxy.url, silo.token),
+        }
+        rows = [f"| | {' | '.join(faults)} |", "|---" * (len(faults) + 1) + "|"]
+        for command, line in FAULTY.items():
+            codes = []
+            for path, address, token in faults.values():
+                about_server = path == gearbox
+                if about_server if command == "mass" else not about_server and "@" not in line:
+                    codes.append("–")
+                    continue
+                monkeypatch.setenv("SILO_API_URL", address)
+                monkeypatch.setenv("SILO_API_TOKEN", token)
+                ran = run(*(path if word == "@" else word for word in line.split()))
+                assert "Traceback" not in ran.err
+                codes.append(str(ran.code))
+            rows.append(f"| `{command}` | {' | '.join(codes)} |")
+    page = (DOCS / "headless.md").read_text("utf-8")
+    assert "\n".join(rows) in page, "\n".join(rows)
+
+
+def test_several_files_are_taken_one_after_the_other(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path
+) -> None:
+    """The worst exit code; with --json a list; a file that is not there stops all."""
+    assert run("register", gearbox, "--yes").code == Exit.DONE
+    inner = gearbox.with_name("Gearbox.FCStd")
+    ran = run("bom", gearbox, inner, "--json")
+    told = json.loads(ran.out)
+    assert [one["assembly"]["doc_path"] for one in told] == [gearbox.name, inner.name]
+    assert told[1] == run("bom", inner, "--json").json()
+    empty = tmp_path / "empty.FCStd"
+    empty.write_bytes(b"")
+    ran = run("diff", gearbox, empty, inner, "--json")
+    told = json.loads(ran.out)
+    assert (ran.code, len(told), told[1]["error"]["code"]) == (Exit.BAD_INPUT, 3, "bad_document"), ran
+    assert str(empty) in ran.err
+    numbers = [item.part_number for item in silo.client.search_items("", limit=2)]
+    assert run("show", *numbers).out.count("/items/") == 2
+    assert run("bom", gearbox, "nowhere.FCStd").out == ""
+    parts = [gearbox.parent / "parts" / f"{name}.FCStd" for name in ("Cover", "Gear")]
+    told = json.loads(run("where-used", *parts, "--root", gearbox.parent, "--json").out)
+    assert [one["part"] for one in told] == ["parts/Cover.FCStd", "parts/Gear.FCStd"]
+    ran = run("bom", gearbox, inner, "--csv", "-")
+    assert (ran.code, ran.out) == (Exit.BAD_INPUT, "")
+    assert "--csv is for one" in ran.err

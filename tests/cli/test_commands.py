@@ -156,7 +156,7 @@ def test_register_twice_creates_nothing_twice(run: Any, silo: Any, gearbox: Path
 def test_a_mistake_in_the_sites_rules_is_said(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With the line; the parts are registered all the same."""
+    """With the line; the parts are registered anyway."""
     rules = tmp_path / "rules.toml"
     rules.write_text('[[rules]]\nwords = ["bolt"]\ncategory = "Z99"\n')
     monkeypatch.setenv("SILO_CATEGORY_RULES", str(rules))
@@ -274,7 +274,7 @@ def test_sync_names_the_moved_file_by_the_identity_that_the_server_knows(
 
 
 def test_a_component_that_is_back_makes_the_bom_complete_again(run: Any, silo: Any, gearbox: Path) -> None:
-    """The lines agree, so nothing is to be merged; the server must hear all the same."""
+    """The lines agree, so nothing is to be merged; the server must hear anyway."""
     run("register", gearbox, "--yes")
     run("sync", gearbox, "--recursive")
     cover = gearbox.parent / "parts" / "Cover.FCStd"
@@ -461,15 +461,15 @@ def test_a_moved_file_is_suggested_and_relinked(run: Any, gearbox: Path) -> None
 def test_where_used_answers_without_a_server(run: Any, gearbox: Path) -> None:
     """The files that link to it, and the tops above them; also of a file that is gone."""
     bolt = next(path for path in (gearbox.parent / "parts").iterdir() if "Gear" in path.name)
-    ran = run("where-used", bolt, gearbox.parent, "--json")
+    ran = run("where-used", bolt, "--root", gearbox.parent, "--json")
     assert ran.code == 0
     assert ran.json()["tops"] == ["TopAssembly.FCStd"]
     before = ran.json()
-    assert run("where-used", bolt, gearbox.parent, "--json", "--no-index").json() == before
+    assert run("where-used", bolt, "--root", gearbox.parent, "--json", "--no-cache").json() == before
     bolt.unlink()
-    assert run("where-used", bolt, gearbox.parent, "--json").json() == before
-    assert "No file" in run("where-used", gearbox, gearbox.parent).out
-    assert run("where-used", bolt, gearbox.parent / "nowhere").code == 2
+    assert run("where-used", bolt, "--root", gearbox.parent, "--json").json() == before
+    assert "No file" in run("where-used", gearbox, "--root", gearbox.parent).out
+    assert run("where-used", bolt, "--root", gearbox.parent / "nowhere").code == 2
 
 
 def test_a_vault_report_names_what_changed_and_what_moved(

@@ -56,10 +56,10 @@ def test_the_revisions_newest_first_and_which_one_the_file_is(run: Any, history:
 
 def test_what_each_revision_changed_in_the_bom(run: Any, history: str, gearbox: Path) -> None:
     """Against the file before it, read from both files."""
-    told = of_files(run("log", gearbox, "--bom", "--json").json())
+    told = of_files(run("log", gearbox, "--changes", "--json").json())
     assert told[0]["bom"] == "M8x20 Bolt 12 → 16"
     assert told[1]["bom"] == "- Cover 1"
-    text = run("log", gearbox, "--bom").out
+    text = run("log", gearbox, "--changes").out
     assert "- Cover 1" in text
 
 
@@ -85,6 +85,25 @@ def test_a_limit_names_the_others(run: Any, history: str, gearbox: Path) -> None
     ran = run("log", gearbox, "--limit", 1)
     assert "without the cover" not in ran.out
     assert f"… and {count - 1} older; --limit shows more" in ran.out
+
+
+def test_what_changed_in_the_product_since(run: Any, silo: Any, history: str, gearbox: Path) -> None:
+    """Over all levels, by the file or by its part number; in a table and as JSON."""
+    run("sync", gearbox, "--recursive")
+    told = run("log", gearbox, "--since", "2020-01-01", "--json").json()
+    rows = {(row["what"], row["within"], row["part_number"]) for row in told["changes"]}
+    lines = {line.child_part_number for line in silo.client.get_bom(history)}
+    assert {("added", history, child) for child in lines} | {("file", "", history)} <= rows
+    ran = run("log", history, "--since", "2020-01-01", "--until", "2020-01-02")
+    assert (ran.code, "nothing on any level" in ran.out) == (0, True)
+    out = run("log", history, "--since", "2020-01-01").out
+    assert all(child in out for child in lines)
+    for wrong, why, code in (
+        (("--until", "r1"), "--since", 2),
+        (("--since", "yesterday"), "wanted a date", 3),
+    ):
+        ran = run("log", history, *wrong)
+        assert (ran.code, why in ran.err) == (code, True)
 
 
 def test_what_cannot_be_shown_is_an_error_with_a_reason(run: Any, silo: Any, gearbox: Path) -> None:

@@ -18,9 +18,9 @@ from fault_proxy import Fault, Proxy, fault_proxy
 from fcstd_writer import Doc, locals_, part
 
 from silo.bom.errors import InputError
-from silo.cli.common import Progress
+from silo.cli.common import ProgressPrinter
 from silo.fcstd import Library
-from silo.vault.job import NAME, only_job
+from silo.vault.plan import NAME, only_job
 
 BUSY = b'{"error": "busy", "message": "later"}'
 
@@ -78,15 +78,16 @@ def test_a_job_that_is_stopped_while_it_waits_ends_at_once_and_the_next_one_cont
 
 
 def test_a_long_run_says_how_far_it_is(capsys: pytest.CaptureFixture[str]) -> None:
-    """After 5 seconds, then every 10, on standard error."""
+    """After 5 seconds, then every 10, on standard error; while it waits for a person, nothing."""
     now = [0.0]
-    progress = Progress(40, clock=lambda: now[0])
-    for second in range(40):
+    progress = ProgressPrinter("sync", clock=lambda: now[0])
+    for second in range(60):
         now[0] = float(second)
-        progress.begin(f"part {second}")
+        progress.step = f"part {second}" if second < 40 else ""
+        progress.report()
     told = capsys.readouterr()
     assert told.out == ""
-    assert told.err.splitlines() == [f"[{n + 1}/40] part {n}" for n in (5, 15, 25, 35)]
+    assert told.err.splitlines() == [f"silo-mod sync: part {n}, {n} s" for n in (5, 15, 25, 35)]
 
 
 def test_a_git_lfs_pointer_is_named_with_what_fetches_it(
@@ -124,7 +125,7 @@ def test_a_second_job_on_one_folder_says_who_holds_it(
 def test_what_a_killed_job_left_behind_holds_nothing(tmp_path: Path) -> None:
     """The lock is the system's, not the file."""
     code = (
-        "import os, sys; from silo.vault.job import only_job\n"
+        "import os, sys; from silo.vault.plan import only_job\n"
         "with only_job(sys.argv[1]): os.kill(os.getpid(), 9)"
     )
     assert subprocess.run([sys.executable, "-c", code, tmp_path], check=False).returncode == -signal.SIGKILL

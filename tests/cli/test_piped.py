@@ -29,7 +29,7 @@ COMMANDS: dict[str, tuple[Sequence[str], set[str]]] = {
     "diff": (("diff", "vault/top.FCStd", "--recursive"), {"where"}),
     "diff of a folder": (("diff", "vault"), {"where", "unchanged", "object"}),
     "bom-diff": (("bom-diff", "empty", "vault"), {"object", "where"}),
-    "where-used": (("where-used", f"vault/{PART}", "vault"), {"part"}),
+    "where-used": (("where-used", f"vault/{PART}", "--root", "vault"), {"part"}),
     "relink": (("relink", "vault/sub.FCStd", "--from", GONE, "--to", PART, "--dry-run"), {"objects"}),
     "sync": (("sync", "vault/top.FCStd", "--recursive", "--dry-run"), {"top", "where", "object", "summary"}),
     "sync of a folder": (("sync", "vault", "--dry-run"), {"top", "skipped", "where", "object", "cause"}),

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from public_projects import ASSEMBLIES
 
-from silo.bom.walk.standard import standard_uuid
+from silo.bom.standard import standard_uuid
 from silo.fcstd import open_document
 
-PROJECT = Path(__file__).resolve().parents[3] / "shared" / "data" / "assemblies" / "asm4-examples"
+PROJECT = ASSEMBLIES / "asm4-examples"
 SCREW = "ISO 4762 M6×20"
 
 
@@ -49,6 +50,14 @@ def test_one_press_registers_the_screws(run: Any, silo: Any, engine: Path) -> No
         "failed": [],
         "unregistered": [],
     }
+    # Sizes come with a commit, from a child with the geometry kernel.
+    pytest.importorskip("OCP")
+    assert run("commit", engine, "--json").json()["undrawn"] == []
+    found = {one.name: one for one in silo.client.search_items()}
+    assert found["Piston"].properties["size_m"] == [0.09, 0.09, 0.1]
+    assert found["Piston"].origins["size_m"].source == "cad"
+    # Its file holds FreeCAD's icon only, which shows no part.
+    assert silo.client.thumbnail(found["Piston"].part_number) is None
 
 
 def test_a_table_with_standard_parts_can_be_applied_twice(
@@ -58,7 +67,7 @@ def test_a_table_with_standard_parts_can_be_applied_twice(
     table = tmp_path / "plan.csv"
     assert run("register", engine, "--plan", table).code == 0
     text = table.read_text("utf-8-sig")
-    assert f",{SCREW},{SCREW},part," in text
+    assert f",{SCREW},{SCREW},bought,,,part," in text
     table.write_text(text.replace(f",{SCREW},{SCREW},", f",{SCREW},A screw,"), "utf-8")
     refused = run("register", engine, "--apply", table)
     assert (refused.code, "called by its designation" in refused.err) == (2, True)

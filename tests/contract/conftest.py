@@ -18,7 +18,7 @@ TOKEN = "silo_" + "0123456789abcdef" * 2
 
 @pytest.fixture(scope="session")
 def databases(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Databases]:
-    """Empty databases of both kinds."""
+    """Databases of both kinds."""
     made = Databases(tmp_path_factory.mktemp("databases"))
     yield made
     made.close()

@@ -203,8 +203,11 @@ def strict(kind: str, databases: Databases, tmp_path: Path) -> Iterator[RunningS
 
 
 def test_the_last_admin_stays_one(strict: RunningServer) -> None:
-    """Neither demoted nor locked out."""
+    """Neither demoted nor locked out; one who is locked out may lose the role."""
     with Api(strict.base_url, "silo_strict") as api:
+        api.good("POST", "/api/users", {"username": "second", "role": "admin"})
+        api.good("PUT", "/api/users/second", {"active": False})
+        assert api.good("PUT", "/api/users/second", {"role": "viewer"})["role"] == "viewer"
         for change in ({"role": "editor"}, {"active": False}):
             assert "last admin" in api.bad(409, "PUT", "/api/users/chief", change)["message"]
 

@@ -14,6 +14,7 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
+from hunting import over
 from hypothesis import given
 from hypothesis import strategies as st
 from openpyxl import load_workbook
@@ -82,6 +83,7 @@ WAYS: dict[str, Way] = {
 }
 
 
+@over("postgres")  # it refuses more
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("code", [0x01, 0x7F, 0xFDD0, 0xFFFE, 0xFFFF, 0x10FFFF])
 def test_every_way_in_refuses_them_with_one_sentence(api: Api, way: str, code: int) -> None:

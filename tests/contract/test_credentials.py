@@ -8,9 +8,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from hunting import over
 from server_testing import Answer, Api, Databases
 
 from silo_server.run import running_server
+
+pytestmark = over("sqlite")
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +134,13 @@ MAY: list[tuple[str, str, str, dict[str, Any], set[str]]] = [
     ("a lower role", "PUT", "/api/users/OTHER", {"role": "viewer"}, set(KINDS)),
     ("a way out", "PUT", "/api/users/OTHER", {"active": False}, set(KINDS)),
     ("a way back in", "PUT", "/api/users/LOCKED", {"active": True}, {"session", "login link", "token"}),
+    (
+        "the right to approve",
+        "PUT",
+        "/api/users/OTHER",
+        {"approver": True},
+        {"session", "login link", "token"},
+    ),
     ("the name of the server's token", "POST", "/api/auth/tokens", {"name": "SILO_API_TOKEN"}, set()),
 ]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from server_testing import Api, Databases, bom, form_body, wait_until
 
-from silo_server.operation.housekeeping import tidy
+from silo_server.housekeeping import tidy
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
 
@@ -192,7 +192,7 @@ def test_ids_survive_a_restart(kind: str, databases: Databases, tmp_path: Path) 
     ):
         assert events.next().data["part_number"] == "MISSED"
         api.item("AFTER")
-        after = events.next()
+        after = events.next("item.created")
         assert after.data["part_number"] == "AFTER"
         assert after.id is not None
         assert last is not None

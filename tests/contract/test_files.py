@@ -232,7 +232,7 @@ def test_a_bom_that_comes_late_does_not_undo_that_of_a_newer_file(api: Api) -> N
 
 
 def test_the_bom_of_an_older_file_is_known_by_its_content(api: Api) -> None:
-    """A file that was not fetched anew, in a vault that is synced at night, says no revision."""
+    """A file that was not fetched again, in a vault that is synced at night, says no revision."""
     number, bolt, nut = api.items(3)
     for content in (b"one", b"two"):
         upload(api, number, content)

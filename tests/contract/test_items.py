@@ -7,9 +7,11 @@ import hashlib
 import json
 import threading
 import uuid
+from typing import Any
 from urllib.parse import quote
 
 import pytest
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from server_testing import Api, bom, form_body
@@ -160,13 +162,12 @@ def test_look_alikes_of_many_components_in_one_request(api: Api) -> None:
     """By name as people read it or by file; each answer at its question's place; archived items are none."""
     word = uuid.uuid4().hex[:8]
     digest = hashlib.sha256(word.encode()).hexdigest()
-    named, archived, registered, uploaded = (
+    named, archived, uploaded = (
         api.item(f"{word}-{kind}", name=name)
-        for kind, name in (("N", f"Größe {word}"), ("A", f"Größe {word}"), ("R", "other"), ("U", "third"))
+        for kind, name in (("N", f"Größe {word}"), ("A", f"Größe {word}"), ("U", "third"))
     )
+    registered = api.item(f"{word}-R", name="other", properties={"file_sha256": digest.upper()})
     api.good("DELETE", f"/api/items/{archived}")
-    properties = {"file_sha256": digest.upper()}
-    api.good("PATCH", f"/api/items/{registered}/properties", properties)
     body, headers = form_body({"file": ("Part.FCStd", word.encode())})
     api.good("POST", f"/api/items/{uploaded}/file", body=body, headers=headers)
     wanted = [
@@ -270,7 +271,7 @@ def test_no_query_is_an_error(api: Api, query: str) -> None:
 
 
 @given(name=st.text(min_size=1, max_size=40))
-@settings(max_examples=50)
+@settings(max_examples=examples(20))
 def test_an_item_is_found_by_each_word_of_its_name(api: Api, name: str) -> None:
     """Whatever the script: what the index has is what the query asks for, on both databases."""
     words = words_of(name)
@@ -431,3 +432,41 @@ def test_a_text_column_goes_through_every_way(api: Api, column: str) -> None:
     assert f'"name":"{column}"' in json.dumps(api.get("/api/schemas/kindred-rd/form"), separators=(",", ":"))
     too_long = api.bad(400, "PUT", f"/api/items/{number}", {column: "x" * 10_001})
     assert column in str(too_long)
+
+
+def test_what_cad_says_does_not_replace_a_person(api: Api) -> None:
+    """Mass and material keep where they come from: hand and scale win over CAD, CAD over CAD."""
+    number = api.item()
+
+    def say(source: str, **facts: object) -> dict[str, Any]:
+        path = f"/api/items/{number}/properties?source={source}"
+        told: dict[str, Any] = api.good("PATCH", path, facts)
+        return told
+
+    assert "origins" not in api.get(f"/api/items/{number}")
+    made = say("cad", mass_kg=1.5, volume_m3=0.0002, colour="red")
+    assert {name: one["source"] for name, one in made["origins"].items()} == {
+        "mass_kg": "cad",
+        "volume_m3": "cad",
+    }
+    assert say("cad", mass_kg=1.6)["properties"]["mass_kg"] == 1.6
+    weighed = say("scale", mass_kg=1.55)
+    assert weighed["origins"]["mass_kg"]["source"] == "scale"
+    again = say("cad", mass_kg=1.7, volume_m3=0.0003)
+    assert (again["properties"]["mass_kg"], again["properties"]["volume_m3"]) == (1.55, 0.0003)
+    assert again["origins"]["mass_kg"] == weighed["origins"]["mass_kg"]
+    assert say("hand", mass_kg=None)["origins"].keys() == {"volume_m3"}
+    assert say("cad", mass_kg=1.7)["origins"]["mass_kg"]["source"] == "cad"
+    typed = api.good("PUT", f"/api/items/{number}", {"properties": {"mass_kg": 2}})
+    assert typed["origins"]["mass_kg"]["source"] == "hand"
+    whole = {"properties": {"mass_kg": 3, "material": "Steel"}, "source": "cad"}
+    assert api.good("PUT", f"/api/items/{number}", whole)["properties"] == {"mass_kg": 2, "material": "Steel"}
+    assert api.bad(400, "PUT", f"/api/items/{number}", {**whole, "source": "guess"})
+
+
+def test_the_content_of_a_file_is_no_property(api: Api) -> None:
+    """What an older program sends at the registration finds the item, and is shown nowhere."""
+    digest = uuid.uuid4().hex * 2
+    number = api.item(properties={"file_sha256": digest.upper(), "finish": "raw"})
+    assert api.get(f"/api/items/{number}")["properties"] == {"finish": "raw"}
+    assert [one["part_number"] for one in api.get(f"/api/items/search?q={digest}")] == [number]

@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
+from hunting import examples, over
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 from server_testing import Api
@@ -35,7 +36,7 @@ CHECKS = (
 )
 # The stream never ends; its own tests look after it.
 SKIPPED = {("GET", "/api/events")}
-EXAMPLES = 8
+EXAMPLES = examples(6)
 
 # A server makes its database's file, also where only its document is wanted.
 with tempfile.TemporaryDirectory() as _folder:
@@ -63,6 +64,7 @@ def known(server: RunningServer) -> list[str]:
     return [top, sub, leaf]
 
 
+@over("sqlite")
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", OPERATIONS)
 def test_no_answer_is_a_fault_or_undocumented(name: str, server: RunningServer, known: list[str]) -> None:
@@ -84,6 +86,7 @@ def test_no_answer_is_a_fault_or_undocumented(name: str, server: RunningServer, 
                 api.good("PUT", "/api/admin/mode", {"mode": "normal"})
 
 
+@over("postgres")  # it refuses more
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", OPERATIONS)
 def test_no_invalid_request_is_a_fault(name: str, server: RunningServer, known: list[str]) -> None:

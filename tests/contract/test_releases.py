@@ -153,15 +153,32 @@ def test_a_part_is_released_before_the_product_or_with_it(
     ]
 
 
+def test_a_part_in_review_by_itself_holds_up_its_product(
+    api: Api, boss: Api, product: tuple[str, str, str]
+) -> None:
+    """The approval with parts says which part waits, and releases nothing."""
+    top, sub, _ = product
+    api.good("POST", releases(sub), {})
+    api.good("POST", releases(top), {"with_parts": True})
+    message = boss.bad(409, "POST", releases(top, "/A/approval"), {})["message"]
+    assert f"revision A of {sub} is in review since" in message
+    for number in (top, sub):
+        assert [release["status"] for release in api.get(releases(number))["releases"]] == ["review"]
+        assert api.get(releases(number, "/A"))["approvals"] == []
+
+
 def test_a_sync_of_a_released_product_says_which_draft_it_begins(
     api: Api, boss: Api, product: tuple[str, str, str]
 ) -> None:
     """And nothing of it before the first release."""
     top, sub, screw = product
     assert "draft" not in api.merge(top, {sub: 2})
+    assert "draft" not in put_file(api, top, b"1")
     api.good("POST", releases(top), {"with_parts": True})
     boss.good("POST", releases(top, "/A/approval"), {"override": "one line is gone"})
     assert api.merge(top, {sub: 3, screw: 1})["draft"] == {"label": "B", "released": "A"}
+    assert put_file(api, top, b"2")["draft"] == {"label": "B", "released": "A"}
+    assert "draft" not in put_file(api, api.item(), b"3")
 
 
 @pytest.mark.parametrize("label", ["a b", "-x", "x" * 17, "ä", "3", "1e3"])
@@ -179,3 +196,5 @@ def test_labels(api: Api, boss: Api, product: tuple[str, str, str]) -> None:
     assert api.get(releases(top))["draft"] == "A"
     assert "there is P1" in api.bad(404, "GET", releases(top, "/Q"))["message"]
     api.bad(404, "GET", bom(top, "export.csv?release=Q"))
+    assert "frozen revisions, got 'Q'" in api.bad(404, "GET", bom(top, "changes?from=P1&to=Q"))["message"]
+    api.bad(400, "GET", bom(top, "changes.csv?from=P1&to=yesterday+noon"))

@@ -31,8 +31,12 @@ def create(api: Api, item: str, said: dict[str, Any]) -> Answer:
 
 
 def import_csv(api: Api, item: str, said: dict[str, Any]) -> Answer:
-    headers = {"Idempotency-Key": said["key"], "Content-Type": "text/csv"}
-    return api.call("POST", bom(item, "import"), body=said["csv"].encode(), headers=headers)
+    body, headers = said["csv"].encode(), {"Content-Type": "text/csv"}
+    if "name" in said:
+        body, headers = form_body({"file": (said["name"], body)})
+    return api.call(
+        "POST", bom(item, "import"), body=body, headers={**headers, "Idempotency-Key": said["key"]}
+    )
 
 
 # How it is sent, the request, and what another one differs in. LEAF is a part.
@@ -74,6 +78,7 @@ ROWS: list[tuple[Send, dict[str, Any], dict[str, Any]]] = [
     (create, ITEM, {"part_number": "LEAF-2"}),
     (create, {**ITEM, "id": None, "key": "KEY"}, {"name": "Bolt"}),
     (import_csv, IMPORT, {"csv": "Part number,Quantity\nLEAF,4\n"}),
+    (import_csv, {**IMPORT, "name": "robot.csv"}, {"name": "arm.csv"}),
 ]
 
 
@@ -123,6 +128,25 @@ def test_a_key_belongs_to_its_item_and_its_kind(api: Api) -> None:
         assert merge(api, item, said).status == 200
         assert upload(api, item, {"key": "one", "file": ("a", b"x")}).status == 201
         assert import_csv(api, item, {"key": "one", "csv": f"Part number,Quantity\n{leaf},1\n"}).status == 200
+
+
+@pytest.mark.parametrize(
+    ("key", "problem"),
+    [
+        ("", "wanted 1 to 128 characters"),
+        ("k" * 129, "wanted a text of at most 128 characters"),
+        ("a\x9fb", "wanted text without control characters and non-characters, got U+009F"),
+    ],
+    ids=["empty", "too long", "a control character"],
+)
+def test_a_key_is_a_short_text(api: Api, key: str, problem: str) -> None:
+    """Nothing is made under a key that is refused; 128 characters are a key."""
+    before = api.get("/api/items")
+    refused = create(api, "", {"category": "F01", "key": key})
+    assert (refused.status, refused.json()["error"]) == (400, "rejected")
+    assert f"Idempotency-Key: {problem}" in refused.json()["message"]
+    assert api.get("/api/items") == before
+    assert create(api, "", {"category": "F01", "key": uuid.uuid4().hex * 4}).status == 201
 
 
 def test_an_id_that_is_known_is_no_new_item(api: Api) -> None:

@@ -18,8 +18,8 @@ from web_visitor import enter
 from silo.bom.errors import ConflictError
 from silo_server.db.engine import Database
 from silo_server.run import Greeting, RunningServer, prepare, running_server
-from silo_server.services.access import accounts
-from silo_server.services.access.credentials import shown_prefix
+from silo_server.services import access
+from silo_server.services.access import shown_prefix
 from silo_server.settings import Settings
 from silo_server.values import SYSTEM, Role
 
@@ -45,7 +45,7 @@ def test_a_token_that_ends_makes_none_that_lives_longer(api: Api) -> None:
 
 
 def test_no_token_sets_the_password_of_its_account(api: Api) -> None:
-    """Not even one that lives for ever."""
+    """Not even one that lives forever."""
     api.bad(403, "PUT", "/api/auth/password", {"password": "a new password", "current_password": "x"})
     api.bad(403, "PUT", "/api/users/ADMIN", {"password": "a new password"})
 
@@ -130,10 +130,10 @@ def test_two_admins_who_demote_each_other_leave_one(kind: str, databases: Databa
     prepare(db)
     for number in range(8):
         with db.write() as tx:
-            accounts.change_user(tx, "admin", role=Role.ADMIN)
+            access.change_user(tx, "admin", role=Role.ADMIN)
             if number == 0:
-                accounts.create_user(tx, "other", Role.ADMIN)
-            accounts.change_user(tx, "other", role=Role.ADMIN)
+                access.create_user(tx, "other", Role.ADMIN)
+            access.change_user(tx, "other", role=Role.ADMIN)
         gate, refused = threading.Barrier(2), []
 
         def demote(name: str, gate: threading.Barrier = gate, refused: list[str] = refused) -> None:
@@ -142,7 +142,7 @@ def test_two_admins_who_demote_each_other_leave_one(kind: str, databases: Databa
                 if tx.postgres:
                     gate.wait(60)
                 try:
-                    accounts.change_user(tx, name, role=Role.VIEWER)
+                    access.change_user(tx, name, role=Role.VIEWER)
                 except ConflictError:
                     refused.append(name)
 
@@ -152,7 +152,7 @@ def test_two_admins_who_demote_each_other_leave_one(kind: str, databases: Databa
         for thread in threads:
             thread.join(60)
         with db.read() as tx:
-            admins = [user for user in accounts.list_users(tx) if user.role is Role.ADMIN]
+            admins = [user for user in access.list_users(tx) if user.role is Role.ADMIN]
         assert len(admins) == len(refused) == 1
     db.close()
 
@@ -179,7 +179,7 @@ def test_a_server_without_an_admin_starts_and_can_be_got_back(
         assert back.username is not None
         assert back.username.casefold() == name.casefold()
         with db.read() as tx:
-            user = accounts.get_user(tx, name)
+            user = access.get_user(tx, name)
         assert (user.role, user.active) == (Role.ADMIN, True)
         assert back.token
         assert back.login_secret

@@ -115,9 +115,11 @@ def test_a_purchaser_can_order_from_it(api: Api, tree: tuple[str, ...]) -> None:
             "lead_time_days": 14,
             "supplier": "=Bolt & Co",
             "supplier_part_number": "00123",
+            "bought": "yes",
         }
         == flat[leaf]
     )
+    assert flat[other]["bought"] is None
     rows = read(api.call("GET", bom(top, "export.csv?view=indented")).body)
     assert (rows[0]["Unit mass [kg]"], rows[0]["Overall mass [kg]"]) == ("1.00001", "2.00002")
     assert (rows[0]["Unit cost"], rows[0]["Relation type"]) == ("2.4", "component")
@@ -212,7 +214,7 @@ def test_an_archived_part_is_not_imported_but_its_line_can_be_changed(api: Api) 
     assert api.quantities(parent) == {old: 3}
 
 
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "cp1252"])
 def test_files_of_other_spreadsheets(api: Api, encoding: str) -> None:
     """Semicolons with decimal commas, byte-order marks, title lines, cp1252."""
     parent, a = api.items(2)
@@ -293,7 +295,7 @@ def test_our_own_workbook_changes_nothing(api: Api) -> None:
     [
         (lambda book: setattr(book["BOM"].row_dimensions[3], "hidden", True), "these lines are hidden: 3"),
         (lambda book: setattr(book["BOM"]["B3"], "font", Font(strike=True)), "lines are struck out: 3"),
-        (lambda book: book.copy_worksheet(book["BOM"]), "the sheets “BOM”, “BOM Copy” each hold a BOM"),
+        (lambda book: book.copy_worksheet(book["BOM"]), "sheets “BOM”, “BOM Copy” each hold such a table"),
     ],
     ids=["hidden", "struck out", "two"],
 )
@@ -354,3 +356,80 @@ def test_a_flat_export_is_no_import(api: Api, tree: tuple[str, ...]) -> None:
     before = api.lines(tree[0])
     api.good("POST", bom(tree[0], "import"), body=indented)
     assert api.lines(tree[0]) == before
+
+
+KICAD = (
+    '"Reference","Value","Footprint","Datasheet","Qty","DNP","MPN","Manufacturer"\n'
+    '"C1,C2","100n","Capacitor_SMD:C_0603_1608Metric","~","2","","{mpn}","Murata"\n'
+    '"R1-R3","10k","Resistor_SMD:R_0603_1608Metric","~","3","","",""\n'
+    '"R9","10k","Resistor_SMD:R_0603_1608Metric","~","1","DNP","",""\n'
+    '"R4","10k","Resistor_SMD:R_0603_1608Metric","~","1","","",""\n'
+)
+
+
+def test_a_bom_of_kicad_makes_its_parts_and_finds_them_again(api: Api) -> None:
+    """By the maker's number, else by value and footprint; what is not fitted is left out."""
+    parent = api.item(item_type="assembly")
+    mpn = f"GRM-{parent}"
+    text = KICAD.format(mpn=mpn).replace("10k", f"10k-{parent}").encode()
+    checked = api.good("POST", bom(parent, "import?dry_run=true"), body=text)
+    assert [row["status"] for row in checked["rows"]] == ["error", "error", "skip", "error"]
+    assert "does not exist" in checked["problems"][0]
+    # A row that is there again is a problem of its own, until somebody says that it is to be added up.
+    checked = api.good("POST", bom(parent, "import?dry_run=true&make=R01"), body=text)
+    assert [row["status"] for row in checked["rows"]] == ["add", "add", "skip", "error"]
+    assert "stands here twice" in checked["problems"][0]
+    assert api.lines(parent) == {}
+    query = "import?make=R01&add_up=true"
+    api.bad(400, "POST", bom(parent, "import?make=NOPE"), body=text)
+    done = api.good("POST", bom(parent, query), body=text)
+    assert done["counts"] == {"add": 2, "change": 0, "same": 0, "skip": 2, "error": 0}
+    lines = {line["child_name"]: line for line in api.lines(parent).values()}
+    resistor = lines[f"10k-{parent} R_0603_1608Metric"]
+    assert (resistor["quantity"], resistor["reference_designators"]) == (4, ["R1-R3", "R4"])
+    capacitor = next(line for name, line in lines.items() if name.startswith("100n"))
+    item = api.get(f"/api/items/{capacitor['child_part_number']}")
+    assert item["properties"] == {"manufacturer": "Murata", "manufacturer_part_number": mpn}
+    assert (item["sourcing_type"], item["category"]) == ("purchased", "R01")
+    # The same file again makes nothing.
+    again = api.good("POST", bom(parent, query), body=text)
+    assert again["counts"] == {"add": 0, "change": 0, "same": 2, "skip": 2, "error": 0}
+    # A second part of that name: nobody knows which one is meant.
+    api.item(name=f"10k-{parent} R_0603_1608Metric")
+    problems = api.good("POST", bom(parent, f"{query}&dry_run=true"), body=text)["problems"]
+    assert ["give the part number" in one for one in problems] == [True, True]
+
+
+def test_designators_count_where_a_file_has_no_quantities(api: Api) -> None:
+    """One row per value, with ranges."""
+    parent = api.item(item_type="assembly")
+    text = f'Ref;Value\n"R1-R3, R7";one {parent}\n"J1";two {parent}\n'.encode()
+    api.good("POST", bom(parent, "import?make=R01"), body=text)
+    assert sorted(api.quantities(parent).values()) == [1, 4]
+
+
+def test_rows_of_one_part_are_added_up_exactly(api: Api) -> None:
+    """As decimals; rows that count in another unit are no such rows; numbers that are unknown are made."""
+    parent, a = api.items(2)
+    text = f"PN,Name,Qty,Unit\n{a},,0.1,m\n{a},,0.2,m\nX-{a},A cover,1,\nx-{a.lower()},,2,\n"
+    done = api.good("POST", bom(parent, "import?make=M01&add_up=1"), body=text.encode())
+    assert done["counts"] == {"add": 2, "change": 0, "same": 0, "skip": 2, "error": 0}
+    assert api.quantities(parent) == {a: 0.3, f"X-{a}": 3}
+    assert api.get(f"/api/items/X-{a}")["name"] == "A cover"
+    text = f"PN,Qty,Unit\n{a},1,m\n{a},2,kg\n"
+    problems = api.good("POST", bom(parent, "import?dry_run=1&add_up=1"), body=text.encode())["problems"]
+    assert len(problems) == 1
+    # A row without a readable quantity is a problem of its own, and no row is added to it.
+    text = f"PN,Qty\n{a},many\n{a},2\n"
+    (problem,) = api.good("POST", bom(parent, "import?dry_run=1&add_up=1"), body=text.encode())["problems"]
+    assert problem.startswith("row 2: ")
+    assert "many" in problem
+    # In a file with semicolons, a company may write a thousand and more with a point: a person is asked.
+    (problem,) = api.good("POST", bom(parent, "import?dry_run=1"), body=f"PN;Qty\n{a};1.125".encode())[
+        "problems"
+    ]
+    assert "can be read as 1125 or 1.125" in problem
+    # A number that nobody may have is a problem of its row, and nothing is made.
+    text = f"PN,Qty\n{a}-new,1\n{'x' * 99},2\n"
+    api.bad(400, "POST", bom(parent, "import?make=M01"), body=text.encode())
+    api.bad(404, "GET", f"/api/items/{a}-new")

@@ -59,7 +59,7 @@ def test_a_folder_with_the_name_of_a_document_is_refused(tmp_path: Path) -> None
 
 @pytest.mark.usefixtures("needs_pipes")
 def test_a_named_pipe_does_not_hang(tmp_path: Path) -> None:
-    """Opening a pipe that nobody writes to would wait for ever."""
+    """Opening a pipe that nobody writes to would wait forever."""
     os.mkfifo(tmp_path / "pipe.FCStd")
     assert "no regular file" in refused(tmp_path / "pipe.FCStd")
 

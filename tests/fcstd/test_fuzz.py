@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from fcstd_writer import Doc, container, locals_, part
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,7 +21,7 @@ from silo.fcstd import Library, Limits, stamp
 
 LIMITS = Limits(document_xml=1 << 20, packed=1 << 20, side_entry=1 << 16, objects=1000)
 
-relaxed = settings(max_examples=250)
+relaxed = settings(max_examples=examples(80))
 
 
 def top() -> Doc:

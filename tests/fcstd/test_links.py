@@ -14,8 +14,8 @@ from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
 from silo.bom.links import extract
 from silo.fcstd import FcstdObject, Library, Limits, open_document
-from silo.fcstd.library import Contents
-from silo.fcstd.locate import refusal
+from silo.fcstd.library import FileContents
+from silo.files import refusal
 
 
 def problem(folder: Path, file: str, name: str = "Box", *, root: Path | None = None) -> LinkProblem:
@@ -299,7 +299,7 @@ def test_a_copy_on_change_source(tmp_path: Path) -> None:
     assert link.LinkCopyOnChangeSource.Document.FileName.endswith("part.FCStd")
 
 
-class _Rewriting(Contents):
+class _Rewriting(FileContents):
     """A session in which somebody saves the file between the first look and the second."""
 
     def _read(self, path):  # type: ignore[no-untyped-def]
@@ -323,7 +323,7 @@ def test_a_damaged_file_is_read_once(tmp_path: Path) -> None:
     path.write_bytes(part().bytes()[:300])
     looks: list[str] = []
 
-    class Counting(Contents):
+    class Counting(FileContents):
         def _read(self, path):  # type: ignore[no-untyped-def]
             looks.append(path)
             return super()._read(path)

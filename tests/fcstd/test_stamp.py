@@ -411,7 +411,7 @@ def test_a_file_is_stamped_under_any_of_its_spellings(tmp_path: Path) -> None:
 
 @LINUX
 def test_a_folder_that_cannot_be_synced_is_no_failure() -> None:
-    """/proc says EINVAL, as some shares do: the file was written all the same."""
+    """/proc says EINVAL, as some shares do: the file was written anyway."""
     sync_folder("/proc/self")
     with pytest.raises(OSError, match="No such file"):
         sync_folder("/proc/self/nothing")

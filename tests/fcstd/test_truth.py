@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from public_projects import ASSEMBLIES
 
 from silo.bom.findings import FindingCode
 from silo.bom.links import extract
@@ -18,14 +19,13 @@ from silo.bom.report import flat_lines
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "assemblies"
-TRUTHS = sorted(DATA.glob("*/truth/*.json"))
+TRUTHS = sorted(ASSEMBLIES.glob("*/truth/*.json"))
 
 
 def test_the_data_is_there() -> None:
     """Without the data nothing below runs; that must be seen."""
     if not TRUTHS:
-        pytest.skip(f"no assemblies with ground truth in {DATA}")
+        pytest.skip(f"no assemblies with ground truth in {ASSEMBLIES}")
     assert len(TRUTHS) == 7
 
 

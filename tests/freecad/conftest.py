@@ -17,7 +17,17 @@ if str(Path(__file__).parent) not in sys.path:
 from freecad_cases.machines import WANTED
 
 
-@pytest.fixture(name="freecad", scope="module", params=WANTED)
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """The window's tests run in the versions that their file names (``VERSIONS``), else in all."""
+    if (
+        metafunc.module.__name__.rpartition(".")[2].startswith("test_gui")
+        and "freecad" in metafunc.fixturenames
+    ):
+        versions = getattr(metafunc.module, "VERSIONS", WANTED)
+        metafunc.parametrize("freecad", versions, indirect=True, scope="module")
+
+
+@pytest.fixture(name="freecad", scope="module")
 def _freecad(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A FreeCAD with a window and a server, kept for all tests of a file; each version in turn."""
     from gui_cases.window import window

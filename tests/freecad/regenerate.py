@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Write the committed fixtures anew, with every FreeCAD of this machine::
+"""Write the committed fixtures again, with every FreeCAD of this machine::
 
     .venv/bin/python tests/freecad/regenerate.py
 
@@ -27,7 +27,7 @@ CONTROL_BUILDER = "1.0"
 def main() -> int:
     found = machines.freecads()
     if missing := [version for version in machines.WANTED if version not in found]:
-        print(f"not written anew, for want of FreeCAD {', '.join(missing)}", file=sys.stderr)
+        print(f"not written again, for want of FreeCAD {', '.join(missing)}", file=sys.stderr)
     corpora.ARCHIVES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
         for version, freecad in found.items():

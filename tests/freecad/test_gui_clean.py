@@ -3,19 +3,26 @@
 
 from __future__ import annotations
 
+import ast
 from typing import Any
 
 import pytest
+from freecad_cases.machines import ENDS, REPOSITORY
 from gui_cases.window import Window
 
-from silo.workbench import commands
+VERSIONS = ENDS
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
+# The names of the commands, read and not imported: there is no FreeCAD here.
 COMMANDS = sorted(
-    value
-    for name, value in vars(commands).items()
-    if name.isupper() and isinstance(value, str) and name not in ("OWN_COMMIT", "FALLBACK", "INSTALL")
+    node.value.value
+    for node in ast.parse((REPOSITORY / "mods/silo/workbench/start.py").read_text("utf-8")).body
+    if isinstance(node, ast.Assign)
+    and isinstance(node.targets[0], ast.Name)
+    and isinstance(node.value, ast.Constant)
+    and node.targets[0].id not in ("OWN_COMMIT", "INSTALL")
+    and str(node.value.value).startswith(("Silo_", "Origin_"))
 )
 
 

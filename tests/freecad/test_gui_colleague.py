@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
+from freecad_cases.machines import ENDS
 from gui_cases.window import Window
+
+VERSIONS = ENDS
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
@@ -146,12 +149,13 @@ def test_get_this_revision_fetches_a_copy_with_its_links(day: Day) -> None:
     assert day.bob["got"] == [["Bolts", True], ["Plate", True]]
 
 
-def test_edited_files_are_replaced_by_a_press_of_their_own(day: Day) -> None:
-    """Before that they are left alone and named; a copy of the edit is kept."""
+def test_a_new_version_over_edits_is_a_question(day: Day) -> None:
+    """Until then the file is left alone and named; a copy of the edit is kept."""
     assert "Taken.FCStd has edits that are not in Silo; it was left alone." in day.bob["left_alone"]
     assert day.bob["untouched"]
     assert day.bob["replaced"] == ["Bolts", "Plate"]
     assert day.bob["edit_kept"]
+    assert day.bob["opened_in_place"]
 
 
 def test_the_line_of_news_stays_readable(day: Day) -> None:

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 from freecad_cases import machines
-from freecad_cases.machines import REPOSITORY, WANTED, wheel
+from freecad_cases.machines import REPOSITORY, WANTED
 from gui_cases.window import Window, window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
@@ -97,46 +96,6 @@ def test_a_forks_commit_is_hooked_and_not_replaced(version: str, tmp_path: Path)
     assert counts == ["+1 added", "~1 qty changed", "~1 qty changed", "~1 qty changed"]
 
 
-@pytest.mark.parametrize("version", WANTED)
-def test_missing_packages_are_installed_by_one_button(version: str, tmp_path: Path) -> None:
-    """FreeCAD starts as ever, and the workbench is there; the first time pip finds nothing."""
-    with window(version, tmp_path, dependencies=False) as freecad:
-        freecad.packages.mkdir(parents=True)
-        wheels = tmp_path / "wheels"
-        wheels.mkdir()
-        for name, version_ in (("requests", "2.99"), ("pydantic", "2.99")):
-            wheel(wheels, name, version_)
-        # The roots of other Debian releases have no pip; this one serves every Python that is new enough.
-        pip = importlib.util.find_spec("pip")
-        assert pip is not None
-        assert pip.origin is not None
-        shutil.copytree(Path(pip.origin).parent, tmp_path / "with-pip" / "pip")
-        env = {
-            "PIP_NO_INDEX": "1",
-            "SILO_TEST_PIP": str(tmp_path / "with-pip"),
-            "SILO_TEST_WHEELS": str(wheels),
-        }
-        said = freecad.run("bare.py", env=env)
-    (line,) = said["report"]
-    by_hand = (
-        "Silo needs the Python packages requests, pydantic. Install them with silo-mod "
-        f"install-addon, or with: python{freecad.freecad.python} -m pip install --target "
-        f'"{freecad.packages}" requests pydantic – then start FreeCAD again.'
-    )
-    assert line.endswith(by_hand)
-    # And that is where this FreeCAD looks for them.
-    assert said["on_path"]
-    assert said["buttons"] == ["Install What Silo Needs…"]
-    assert "requests, pydantic" in said["before"][0]
-    assert said["during"] == [True, False]
-    assert "could not be installed: pip could not install" in said["failed"][0]
-    assert said["failed"][0].endswith(by_hand)
-    assert said["again"] == "Try again"
-    assert said["after"] == [f"The packages are in {freecad.packages}. Start FreeCAD again to use Silo."]
-    assert not said["button"]
-    assert (freecad.packages / "requests" / "__init__.py").is_file()
-
-
 BESIDE = """
 import FreeCADGui as Gui
 
@@ -187,6 +146,7 @@ def test_beside_the_real_silos_workbench(version: str, tmp_path: Path) -> None:
     assert said["theirs"] == ["their Silo_BOM", "their Silo_Settings", "their Silo_Commit"]
     assert said["ours"] == [
         "Commit to Silo",
+        "Project",
         "Open from Silo…",
         "History…",
         "Compare BOM with Silo…",
@@ -201,7 +161,7 @@ def test_beside_the_real_silos_workbench(version: str, tmp_path: Path) -> None:
     assert said["whats_this"]
     # No other command of FreeCAD has our keys, in any workbench that a designer uses.
     ours = {keys: text for text, keys in said["shortcuts"].items() if keys}
-    assert sorted(ours) == [f"Ctrl+Alt+{key}" for key in "ABMRS"]
+    assert sorted(ours) == [f"Ctrl+Alt+{key}" for key in "ABMPRS"]
     assert ours["Ctrl+Alt+R"] == "Register Parts…"
     found = said["commands_of_keys"]
     assert "Ctrl+Z" in found

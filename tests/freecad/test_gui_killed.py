@@ -6,7 +6,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from freecad_cases.machines import NEWEST
 from gui_cases.window import Window
+
+VERSIONS = NEWEST
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 

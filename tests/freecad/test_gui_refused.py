@@ -9,7 +9,10 @@ from typing import Any
 
 import pytest
 import requests
+from freecad_cases.machines import NEWEST
 from gui_cases.window import TOKEN, Window
+
+VERSIONS = NEWEST
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 

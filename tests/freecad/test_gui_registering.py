@@ -72,7 +72,7 @@ def test_a_read_only_file_has_its_own_row_state_and_the_rest_goes_on(said: dict[
 
 
 def test_a_file_open_in_another_freecad_is_not_registered_unasked(said: dict[str, Any]) -> None:
-    """That one would overwrite the identity with its next save; the person may do it all the same."""
+    """That one would overwrite the identity with its next save; the person may do it anyway."""
     name, kind, category, checked, note = said["offered"]["Construction.FCStd"]
     assert (name, kind, checked) == ("Construction", "part", False)
     assert note == "open in another FreeCAD: close it there first, or saving there undoes this"

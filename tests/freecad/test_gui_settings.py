@@ -95,8 +95,9 @@ def test_the_environment_wins_and_the_page_says_so(page: dict[str, Any]) -> None
 
 
 def test_texts_pass_through_qt_translators(page: dict[str, Any]) -> None:
-    """A translation file for the context "Silo" is all that is needed."""
+    """FreeCAD loads ours for its language, and any other for the context "Silo"."""
     assert page["translated"] == "COMMIT TO SILO"
+    assert page["german"] == ["Teilenummer", "In Silo einchecken"]
 
 
 def test_the_dock_is_where_the_user_left_it(page: dict[str, Any]) -> None:

@@ -87,6 +87,7 @@ def test_the_same_again_posts_nothing(day: Told) -> None:
         "The file is in Silo already",
         "1 component has no Silo part number [Register Parts…]",
         "Cover",
+        f"Open in {day.number('Gearbox')}: incomplete: 1 unregistered",
         "[View in Silo →]",
     ]
 

@@ -18,6 +18,7 @@ import pytest
 from freecad_cases import corpora, machines
 from freecad_cases.machines import REPOSITORY, WANTED, FreeCAD
 from real_silo import TOKEN, Moods, RealSilo, real_silo
+from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.cli.main import main
@@ -70,7 +71,7 @@ def vault(
     token = "silo_" + uuid.uuid4().hex
     for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME"):
         monkeypatch.setenv(name, str(tmp_path / "home"))
-    with running_server(f"sqlite:///{tmp_path / 'silo.db'}", token=token) as server:
+    with running_server(sqlite_database(tmp_path / "silo.db"), token=token) as server:
         env = {"SILO_API_URL": server.base_url, "SILO_API_TOKEN": token}
         for name, value in env.items():
             monkeypatch.setenv(name, value)
@@ -281,7 +282,7 @@ def test_wrong_arguments_are_told_in_plain_words(vault: Vault, version: str, tmp
 
 @pytest.mark.parametrize("version", WANTED)
 def test_a_server_that_does_not_answer_is_told_as_such(vault: Vault, version: str, tmp_path: Path) -> None:
-    """Exit code 3, and the reports are written all the same."""
+    """Exit code 3, and the reports are written anyway."""
     away = replace(vault, env={**vault.env, "SILO_API_URL": "http://127.0.0.1:9"})
     args = {"tops": ["vault/top.FCStd"], "json": "out.json", "report": "out.md"}
     done = headless(machines.need(version), away, args, tmp_path, dependencies=True)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The matrix: every fixture and public assembly, in every FreeCAD, three ways that must agree.
 
-Fixtures are built anew with each FreeCAD. Then each FreeCAD opens what it and all others built and the walker
+Each FreeCAD builds the fixtures. Then each FreeCAD opens what it and all others built and the walker
 walks the live objects; the FCStd reader reads the same files; the truth is written by hand. One process per
 FreeCAD reads everything.
 """

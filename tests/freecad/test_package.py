@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
-from freecad_cases.machines import REPOSITORY, WANTED, need, wheel
-from gui_cases.window import window
+from freecad_cases.machines import REPOSITORY, WANTED, need, wheel, wheels_of
+from gui_cases.window import Window, window
 
 from silo import FREECAD_PACKAGES
 
@@ -40,6 +43,9 @@ def test_freecad_reads_what_we_mean(read: dict[str, Any]) -> None:
     told = read["freecad"]
     assert (told["name"], told["license"], told["freecad_min"]) == ("Silo", "LGPL-2.1-or-later", "0.20.0")
     assert told["supports"]
+    # No address of the project is public yet, and none is invented.
+    assert told["urls"] == []
+    assert read["version"] == "0.20" or re.fullmatch(r"\d{4}-\d\d-\d\d", told["date"])
     assert told["people"] == ["silo-mod contributors"] * 2
     name, classname, folder, icon = told["workbench"]
     assert (name, classname, folder) == ("Silo", "SiloModWorkbench", "./")
@@ -93,31 +99,126 @@ def test_a_clone_in_mod_works(version: str, tmp_path: Path) -> None:
     assert f"Only {clone}" in line
 
 
-@pytest.mark.parametrize("version", WANTED)
-@pytest.mark.parametrize("fits", [True, False])
-def test_install_addon_ends_with_an_import_inside_freecad(version: str, fits: bool, tmp_path: Path) -> None:
-    """From a folder of wheels; one of them may be for another Python, which pip does not see."""
-    freecad = need(version)
-    for name in FREECAD_PACKAGES:
-        wheel(tmp_path, name, "2.99", "" if fits else "raise ImportError('made for another Python')")
-    env = {**os.environ, **freecad.profile(tmp_path / "home"), "SILO_HOME": str(tmp_path / "silo")}
-    env |= {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(tmp_path)}
-    run = subprocess.run(
-        [sys.executable, "-m", "silo.cli.main", "install-addon", "--json", "--freecadcmd", freecad.command],
+def installed(
+    program: Sequence[str], freecadcmd: str, env: Mapping[str, str]
+) -> subprocess.CompletedProcess[str]:
+    """Run ``silo-mod install-addon``, without an index of packages."""
+    return subprocess.run(
+        [*program, "install-addon", "--json", "--freecadcmd", freecadcmd],
         capture_output=True,
         text=True,
-        env=env,
+        env={**os.environ, "PIP_NO_INDEX": "1", **env},
         check=False,
     )
-    if not fits:
-        assert run.returncode == 2
-        assert "FreeCAD cannot import them: requests: ImportError: made for another Python" in run.stderr
-        return
-    assert run.returncode == 0, run.stderr
-    told = json.loads(run.stdout)
-    assert told["freecad"] == f"FreeCAD {version} with Python {freecad.python}"
-    assert (tmp_path / "home" / "Mod" / "silo-mod" / "package.xml").is_file()
-    assert (Path(told["packages"]) / "requests" / "__init__.py").is_file()
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_packages_for_another_python_are_no_success(version: str, tmp_path: Path) -> None:
+    """pip does not see it, so install-addon ends with an import inside FreeCAD."""
+    freecad = need(version)
+    for name in FREECAD_PACKAGES:
+        wheel(tmp_path, name, "2.99", "raise ImportError('made for another Python')")
+    env = {**freecad.profile(tmp_path / "home"), "SILO_HOME": str(tmp_path / "silo")}
+    program = [sys.executable, "-m", "silo.cli.main"]
+    run = installed(program, freecad.command, {**env, "PIP_FIND_LINKS": str(tmp_path)})
+    assert run.returncode == 2
+    assert "FreeCAD cannot import them: requests: ImportError: made for another Python" in run.stderr
+
+
+@pytest.fixture(name="from_wheel", scope="module")
+def _from_wheel(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """``silo-mod`` as the wheel has it, in a folder of its own."""
+    folder = tmp_path_factory.mktemp("wheel")
+    source, site = folder / "source", folder / "site"
+    names = ("mods", "examples", "docs", "package.xml", "Init.py", "InitGui.py", "LICENSE", "README.md")
+    without = shutil.ignore_patterns("__pycache__", "*.egg-info")
+    source.mkdir()
+    for name in (*names, "setup.py", "pyproject.toml"):
+        copy = shutil.copytree if (REPOSITORY / name).is_dir() else shutil.copyfile
+        copy(REPOSITORY / name, source / name, **({"ignore": without} if copy is shutil.copytree else {}))
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    build = ["wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", str(folder), str(source)]
+    subprocess.run([*pip, *build], check=True)
+    (made,) = folder.glob("*.whl")
+    subprocess.run([*pip, "install", "--no-deps", "--no-index", "--target", str(site), str(made)], check=True)
+    main = "from silo.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    return [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(site)!r}); {main}"]
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_from_the_wheel_to_a_commit(version: str, from_wheel: list[str], tmp_path: Path) -> None:
+    """In a clean user folder, by the window's button and by one command, to a revision in Silo."""
+    wheels = tmp_path / "wheels"
+    wheels.mkdir()
+    with window(version, tmp_path, dependencies=False) as freecad:
+        wheels_of(freecad.freecad.dependencies, wheels)
+        addon = freecad.home / "Mod" / "silo-mod"
+        addon.unlink()
+        freecad.packages.mkdir(parents=True)
+
+        # Without an index the add-on is there, and its packages are not.
+        run = installed(from_wheel, freecad.freecad.command, freecad.environment())
+        assert (run.returncode, "pip could not install" in run.stderr) == (2, True), run.stderr
+        # The roots of other Debian releases have no pip; this one serves every Python that is new enough.
+        pip = importlib.util.find_spec("pip")
+        assert pip is not None
+        assert pip.origin is not None
+        shutil.copytree(Path(pip.origin).parent, tmp_path / "with-pip" / "pip")
+        env = {"SILO_TEST_PIP": str(tmp_path / "with-pip"), "SILO_TEST_WHEELS": str(wheels)}
+        said = freecad.run("bare.py", env={**env, "PIP_NO_INDEX": "1"})
+        assert committed(freecad, "Bracket") == 1
+
+        shutil.rmtree(freecad.packages)
+        env = {**freecad.environment(), "PIP_FIND_LINKS": str(wheels)}
+        run = installed(from_wheel, freecad.freecad.command, env)
+        assert run.returncode == 0, run.stderr
+        told = json.loads(run.stdout)
+        assert told["freecad"] == f"FreeCAD {version} with Python {freecad.freecad.python}"
+        assert told["packages"] == str(freecad.packages)
+        assert committed(freecad, "Lever") == 1
+
+    (line,) = said["report"]
+    by_hand = (
+        "Silo needs the Python packages requests, pydantic. Install them with silo-mod "
+        f"install-addon, or with: python{freecad.freecad.python} -m pip install --target "
+        f'"{freecad.packages}" requests pydantic – then start FreeCAD again.'
+    )
+    assert line.endswith(by_hand)
+    # And that is where this FreeCAD looks for them.
+    assert said["on_path"]
+    assert said["buttons"] == ["Install What Silo Needs…"]
+    assert (len(said["pane"]), said["mends"]) == (1, ["Install What Silo Needs…"])
+    assert "requests, pydantic" in said["pane"][0]
+    assert "requests, pydantic" in said["before"][0]
+    assert said["during"] == [True, False]
+    assert "could not be installed: pip could not install" in said["failed"][0]
+    assert said["failed"][0].endswith(by_hand)
+    assert said["again"] == "Try again"
+    assert said["after"] == [f"The packages are in {freecad.packages}. Start FreeCAD again to use Silo."]
+    assert not said["button"]
+
+
+def committed(freecad: Window, name: str) -> int:
+    """Commit a new part in the window of the installed add-on; return its revisions with a file in Silo."""
+    said = freecad.run("installed.py", env={"SILO_PART": name})
+    assert os.path.normpath(said["from"]) == str(freecad.home / "Mod" / "silo-mod" / "mods" / "silo")
+    assert len(said["committed"]) == 1
+    with freecad.server.client() as client:
+        (item,) = client.search_items(name)
+        return sum(bool(one.file_name) for one in client.revisions(item.part_number))
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_another_package_of_our_name_is_named_in_the_pane(version: str, tmp_path: Path) -> None:
+    """Ours does not start then, and says where the other one lies."""
+    with window(version, tmp_path) as freecad:
+        foreign = freecad.home / "Mod" / "A-foreign"
+        (foreign / "silo").mkdir(parents=True)
+        (foreign / "silo" / "__init__.py").touch()
+        (foreign / "Init.py").write_text("import silo\n")
+        said = freecad.run("foreign.py")
+    (text,) = said["pane"]
+    assert str(foreign / "silo") in text
 
 
 SMOKE = """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Random projects, built anew by each FreeCAD: what its geometry shows = our reader = our live walker = what
+"""Random projects, built again by each FreeCAD: what its geometry shows = our reader = our live walker = what
 is weighed. And ``bom --verify`` agrees with each. A landing builds the same twelve projects per FreeCAD.
 ``SILO_RANDOM_PROJECTS=500`` asks for as many more, the first with the seed ``SILO_RANDOM_SEED``, which
 otherwise changes from run to run and is printed.
@@ -27,8 +27,8 @@ from silo.bom.report import flat_lines
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.freecads import run_freecad
-from silo.inertia.geometry.freecad.files import Entries, StoredFacts, Unpacked, measured_files
-from silo.inertia.geometry.freecad.walk import Leaf, Walk, assembled, one_by_one
+from silo.inertia.geometry.fcstd import Entries, StoredFacts, Unpacked, measured_files
+from silo.inertia.geometry.freecad import Leaf, Walk, assembled, one_by_one
 from silo.inertia.geometry.graph import ReadOptions
 from silo.inertia.geometry.measured import Measured
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from freecad_cases import machines
 from freecad_cases.machines import REPOSITORY, WANTED, FreeCAD
+from public_projects import ASSEMBLIES
 
 from silo.bom.errors import InputError
 from silo.inertia.geometry import ReadOptions, read
@@ -23,7 +24,6 @@ PLACES = REPOSITORY / "tests" / "inertia" / "geometry" / "freecad" / "freecad_sh
 MATERIALS = Path(__file__).with_name("shape_cases") / "materials.py"
 MEASURE = MATERIALS.with_name("measure.py")
 # Resolved, for FreeCAD names a file that a link leads to by its own place.
-PUBLIC = (REPOSITORY.parent / "shared").resolve() / "data" / "assemblies"
 
 VOLUME = 1e-7
 """Relative: how well both engines agree on real parts whose edges meet."""
@@ -137,7 +137,7 @@ TOPS = {
 @pytest.mark.parametrize("top", TOPS)
 def test_public_assemblies(top: str, freecad: FreeCAD, in_freecad: Callable[[Path], Assembly]) -> None:
     """Real parts: the same masses from FreeCAD's objects as from the files."""
-    path = PUBLIC / top
+    path = ASSEMBLIES / top
     if not path.exists():
         pytest.skip(f"{path} is not there")
     if freecad.short not in TOPS[top]:

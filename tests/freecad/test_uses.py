@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Projects as people build them: each way of use that real files have, counted as a person would.
 
-Built anew by each FreeCAD. The reader, the live walker, what is weighed and FreeCAD's own view agree on each.
+Each FreeCAD builds them. The reader, the live walker, what is weighed and FreeCAD's own view agree on each.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import flat_lines
 from silo.bom.roots import choose_assembly
-from silo.bom.walk.standard import STANDARD_PARTS
+from silo.bom.standard import STANDARD_PARTS
 from silo.fcstd import Library
 from silo.freecads import run_freecad
-from silo.inertia.geometry.freecad.files import Entries, StoredFacts
-from silo.inertia.geometry.freecad.walk import Walk
+from silo.inertia.geometry.fcstd import Entries, StoredFacts
+from silo.inertia.geometry.freecad import Walk
 from silo.inertia.geometry.graph import Child, unfold
 
 pytestmark = pytest.mark.freecad

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from bodies import placement
 
-from silo.inertia.bom import BOMParser, BomTable
+from silo.inertia.bom import BomTable
+from silo.inertia.bom.parser import BOMParser
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Assembly, Instance, Prototype
@@ -37,6 +38,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items if NO_KERNEL else ():
         if any(item.path.is_relative_to(here / name) for name in NEED_KERNEL):
             item.add_marker(pytest.mark.skip(reason=NO_KERNEL))
+
+
+@pytest.fixture(autouse=True)
+def _children_are_warm(warm: None) -> None:
+    """What reads in a child does not load the kernel anew; with ``cold`` it does."""
+
+
+@pytest.fixture(name="cold")
+def _cold(warm: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Children start as users have them."""
+    monkeypatch.delenv("SILO_WARM_READER", raising=False)
 
 
 STEP_FILES = Path(__file__).parents[2] / "../shared/data/step"

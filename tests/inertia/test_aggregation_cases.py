@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from bodies import box, cylinder
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -32,7 +33,7 @@ places = st.tuples(
     st.tuples(*[st.floats(-3, 3)] * 3),
 )
 layouts = st.lists(places, min_size=1, max_size=10)
-quietly = settings(max_examples=40)
+quietly = settings(max_examples=examples(15))
 
 
 def build(layout: list[Any], outer: np.ndarray | None = None) -> Assembly:
@@ -98,7 +99,7 @@ def test_case_38_one_part_alone(compute: Fixture, name: str, mass: float) -> Non
 @given(layouts)
 def test_case_39_links_sum_up_to_the_assembly(compute: Fixture, layout: list[Any]) -> None:
     """The links together are the assembly, however the parts are dealt out."""
-    from silo.inertia.core import combine
+    from silo.inertia.model import combine
 
     report = compute(build(layout), BOM)
     close(combine([link.props for link in report.links.values()]), report.total)

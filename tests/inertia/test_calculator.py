@@ -15,8 +15,8 @@ from silo.inertia import (
     InertiaReport,
     compute_link_inertials,
 )
-from silo.inertia.core import combine
 from silo.inertia.geometry import ReadOptions
+from silo.inertia.model import combine
 
 ARM = Path(__file__).parents[2] / "examples" / "arm"
 

@@ -8,7 +8,7 @@ import pytest
 from bodies import box, cylinder, placement, sphere
 
 from silo.bom.errors import InputError
-from silo.inertia.core import (
+from silo.inertia.model import (
     InertialProperties,
     MassProps,
     TensorProblem,

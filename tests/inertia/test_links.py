@@ -20,7 +20,7 @@ from silo.inertia.calculator import Task, calculate
 from silo.inertia.links import FrameChoice, as_link_map, claim, link_map, matches, origin_frame, read_link_map
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Instance
-from silo.inertia.output.urdf import Urdf
+from silo.inertia.urdf import Urdf
 
 Fixture = Callable[..., Any]
 PART = box("p", 0.1, 0.1, 0.1)

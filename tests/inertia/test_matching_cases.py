@@ -136,6 +136,15 @@ def test_sub_assembly_mass_is_spread_where_its_parts_have_none(
     assert codes(report) == ["sub_assembly_mass_shared"] * 2
 
 
+def test_a_sub_assembly_mass_that_its_known_parts_use_up_leaves_the_others_alone(
+    assemble: Fixture, compute: Fixture, part: Fixture
+) -> None:
+    """A rotor with a row of its own weighs as much as the motor: that says nothing of the case."""
+    asm = assemble(("arm/motor/rotor", cube("rotor")), ("arm/motor/case", cube("case", 0.02)))
+    report = compute(asm, HEAD + "1,1,,,0.900 kg,motor\n2,1,,,0.900 kg,rotor\n")
+    assert part(report, "case").source is Source.DEFAULT_DENSITY
+
+
 def test_sub_assembly_mass_is_used_per_occurrence(assemble: Fixture, compute: Fixture) -> None:
     """Two motors weigh twice as much as one."""
     rotor = cube("rotor")
@@ -350,3 +359,33 @@ def test_two_parts_of_one_count_are_not_told_apart_by_it(assemble: Fixture, comp
     report = compute(asm, HEAD + "1,2,,steel,7.85 g,b\n2,3,,steel,62.80 g,b\n")
     masses = {p.products: p.mass for _, p in report.parts()}
     assert masses == {("large",): pytest.approx(62.8e-3), ("small",): pytest.approx(7.85e-3)}
+
+
+@pytest.mark.parametrize(
+    "evidence", [{}, {"c": 6, "d": 3}, {"c": 6}], ids=["no evidence", "contradicting evidence", "per parent"]
+)
+def test_quantities_of_a_structured_bom_are_read_both_ways_unless_other_parts_agree(
+    assemble: Fixture, compute: Fixture, codes: Fixture, evidence: dict[str, int]
+) -> None:
+    """Two arms with 3 large and 1 small "b" each: the file has 6 and 2, which the row's quantity is not."""
+    counts = {cube("b", 0.02, key="large"): 6, cube("b", key="small"): 2}
+    counts |= {cube(name, 0.03): pieces for name, pieces in evidence.items()}
+    asm = assemble(*((f"arm/{p.key}{i}", p) for p, pieces in counts.items() for i in range(pieces)))
+    rows = "".join(f"1.{number},3,,steel,,{name}\n" for number, name in enumerate(evidence, start=3))
+    report = compute(asm, HEAD + f"1,2,,,,arm\n1.1,1,,,2.00 g,b\n1.2,3,,,9.00 g,b\n{rows}")
+    masses = {p.products: p.mass for _, p in report.parts() if p.name == "b"}
+    assert masses == {("large",): pytest.approx(9e-3), ("small",): pytest.approx(2e-3)}
+    assert "ambiguous" not in codes(report)
+
+
+@pytest.mark.parametrize(
+    ("witness", "more", "room"), [(3, 2, False), (3, 0, True), (6, 2, True), (6, 4, True), (6, 5, False)]
+)
+def test_a_used_row_takes_another_spelling_as_far_as_its_quantity_goes(
+    assemble: Fixture, compute: Fixture, codes: Fixture, witness: int, more: int, room: bool
+) -> None:
+    """Two arms, 4 bolts by the row: 4 in all if the witness's 3 pieces are those of the row, else 8."""
+    counts = {cube("bolt"): 4, cube("Bolt", key="other"): more, cube("witness"): witness}
+    asm = assemble(*((f"arm/{p.key}{i}", p) for p, pieces in counts.items() for i in range(pieces)))
+    report = compute(asm, HEAD + "1,2,,,,arm\n1.1,4,,steel,,bolt\n1.2,3,,steel,,witness\n")
+    assert ("not_in_bom" not in codes(report, "Bolt")) == room

@@ -13,7 +13,7 @@ from bodies import box
 from silo.bom.errors import AuthError, NotFoundError, ServerFaultError, SiloError
 from silo.inertia.masses import Options
 from silo.inertia.model import Note
-from silo.inertia.output.push import describe, plan_push, push
+from silo.inertia.push import describe, plan_push, push
 
 Fixture = Callable[..., Any]
 HEAD = "Part number,Quantity,Material,Mass,Name\n"

@@ -14,7 +14,7 @@ import pytest
 from silo.inertia.calculator import read_geometry
 from silo.inertia.geometry import ReadOptions
 from silo.inertia.model import Assembly, GeometryCode, leaf_products
-from silo.inertia.output.text import snippets, writable
+from silo.inertia.output import snippets, writable
 from silo.inertia.report import Source
 
 Fixture = Callable[..., Any]

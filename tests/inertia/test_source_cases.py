@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -87,14 +88,29 @@ def test_step_density_is_compared_and_used_only_when_asked(
     assert codes(asked, "x") == ["not_in_bom"]
 
 
+@pytest.mark.parametrize(
+    ("stated", "density", "told"),
+    [
+        ({"step_material": "Brass"}, 8500, []),
+        ({"step_material": "Brass", "step_density": 8400.0}, 8400, []),
+        ({"step_material": "tin can"}, 1000, ["no_bom"]),  # it may be a can
+        ({"step_material": "unobtainium"}, 1000, ["no_bom"]),
+    ],
+)
 def test_a_named_material_of_the_file_gets_the_tables_density(
-    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+    assemble: Fixture,
+    compute: Fixture,
+    part: Fixture,
+    codes: Fixture,
+    stated: dict[str, Any],
+    density: float,
+    told: list[str],
 ) -> None:
-    """Without a BOM the file's material is what there is."""
-    asm = assemble(("l/x", cube("x", step_material="Brass")))
+    """Without a BOM the file's material is what there is, if it is understood without doubt."""
+    asm = assemble(("l/x", cube("x", **stated)))
     report = compute(asm, None, options=_options(1000.0, step_density=True))
-    assert part(report, "x").mass == pytest.approx(8500 * V)
-    assert codes(report) == []
+    assert part(report, "x").mass == pytest.approx(density * V)
+    assert codes(report) == told
 
 
 def test_without_a_bom(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
@@ -153,6 +169,14 @@ def test_the_order_of_sub_assemblies_does_not_matter(assemble: Fixture, compute:
     rows = "1,1,,,2.000 kg,unit\n1.1,1,,,0.900 kg,motor\n1.2,1,,,1.100 kg,case\n"
     report = compute(asm, HEAD + rows)
     assert report.total.mass == pytest.approx(2.0)
+
+
+def test_the_inner_of_two_sub_assemblies_gives_its_mass_first(assemble: Fixture, compute: Fixture) -> None:
+    """The outer one shares what is left among the parts of its own."""
+    asm = assemble(("outer/inner/a", cube("a")), ("outer/b", cube("b")))
+    report = compute(asm, HEAD + "1,1,,,3 kg,outer\n2,1,,,1 kg,inner\n")
+    masses = {part.name: part.mass for link in report.links.values() for part in link.parts}
+    assert masses == pytest.approx({"a": 1.0, "b": 2.0})
 
 
 def test_a_sub_assemblys_material_on_a_part_without_a_solid(
@@ -265,10 +289,48 @@ def test_a_mass_in_another_unit_is_in_doubt_also_where_the_material_is_known(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:
     """Only what is in doubt is not pushed: 7.85 g for a litre of steel differs, and nothing weighs that."""
-    from silo.inertia.output.push import plan_push
+    from silo.inertia.push import plan_push
 
     asm = assemble(("l/a", cube("a", 0.1)))
     report = compute(asm, HEAD + "1,1,P-1,steel,7.85 g,a\n")
     assert codes(report) == ["mass_differs", "mass_implausible"]
     assert plan_push(report).items == ()
     assert codes(compute(asm, HEAD + "1,4,P-1,steel,31.4 kg,a\n"), "a") == ["row_total", "count_differs"]
+
+
+def test_without_a_bom_a_part_without_a_solid_is_one_warning(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """That there is no BOM changes nothing for it, nor does a density in the file: there is no volume."""
+    for stated in (None, 7850.0):
+        asm = assemble(("l/x", replace(shape_only("x"), step_density=stated)))
+        report = compute(asm, options=_options(1000.0, step_density=True))
+        assert codes(report) == ["no_volume", "zero_mass_link"]
+
+
+def test_what_a_row_s_mass_is_held_against() -> None:
+    """The largest reading of a quantity; totals only if all rows of several pieces that can be checked are.
+
+    A density in the file is in doubt beyond what the material itself varies by.
+    """
+    from silo.inertia.masses import GivenMass, density_doubts, looks_like_totals
+    from silo.inertia.materials import Material
+
+    assert [GivenMass(1, 0.1, frozenset(q)).pieces for q in ((), (1.0, 4.0))] == [1, 4]
+    rows = (True, 2, True), (True, 1, False), (False, 5, False), (True, 3, False)
+    assert [looks_like_totals(rows[:n]) for n in (0, 1, 3, 4)] == [False, True, True, False]
+    part = cube("p", step_density=840)
+    for spread, wanted in ((0.0, ["step_density_differs"]), (0.3, ["density_varies"])):
+        used = Material("wood", 700, spread=spread)
+        assert [note.code for note in density_doubts(part, used)] == wanted
+
+
+def test_a_wire_beside_its_solid_cannot_be_weighed_alone(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """It is no part of its own: its weight is refused with a warning, and is in no sum."""
+    solid, wire = cube("plate", key="s"), shape_only("plate", key="w")
+    asm = assemble(("l/1", solid, None, "l/plate"), ("l/2", wire, None, "l/plate"))
+    report = compute(asm, HEAD + "1,1,,,1.00 g,plate\n", weights={"l/2": "5 g"})
+    assert report.total.mass == pytest.approx(0.001)
+    assert codes(report) == ["target_mass_differs"]

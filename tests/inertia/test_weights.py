@@ -11,6 +11,7 @@ import pytest
 from silo.bom.errors import InputError
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.geometry.together import Mesh, mesh_solid
+from silo.inertia.masses import Options
 from silo.inertia.model import Assembly, Instance, Prototype
 from silo.inertia.report import Source
 
@@ -69,6 +70,16 @@ def test_a_component_keeps_its_weight_in_a_weighed_link() -> None:
     assert run({"product:small": "5 g"}).bodies["arm"].mass == pytest.approx(0.013)
 
 
+@pytest.mark.parametrize("order", [("arm", "arm/small"), ("arm/small", "arm")])
+def test_a_component_keeps_its_weight_in_a_weighed_component(order: tuple[str, str]) -> None:
+    """The inner component is weighed first, in whatever order the weights are given."""
+    weights = {"arm": "20 g", "arm/small": "5 g"}
+    report = run({name: weights[name] for name in order}, {"robot": ["arm", "base"]})
+    masses = {part.name: part.mass for part in report.links["robot"].parts}
+    assert masses == pytest.approx({"small": 0.005, "large": 0.015, "rod": 0.0, "cube": 0.001})
+    assert "target_mass_differs" not in codes(report)
+
+
 def test_a_part_without_mass_and_volume_gets_its_weight_as_a_point() -> None:
     """A cable that nobody modelled."""
     assert run({"arm/rod": "1 g"}).bodies["arm"].mass == pytest.approx(0.010)
@@ -81,10 +92,27 @@ def test_a_map_says_it_too() -> None:
     assert run({"arm": "9 g"}, links).bodies["arm"].mass == pytest.approx(0.009)
 
 
-@pytest.mark.parametrize("weights", [{"arm": "4 g", "arm/large": "5 g"}, {"leg": "1 kg"}])
-def test_weights_that_contradict_each_other_are_reported(weights: dict[str, str]) -> None:
-    """More in its parts than in the whole; nothing of this name."""
-    assert "target_mass_differs" in codes(run(weights))
+def test_parts_without_a_mass_share_a_weight_by_volume() -> None:
+    """Nobody knows their material: 1 and 8 cm³, and a rod without volume."""
+    task = Task(options=Options(unknown_is_zero=True), links=LINKS, weights={"arm": "9 g"})
+    report = calculate(assembly(), None, task)
+    masses = {part.name: part.mass for part in report.links["arm"].parts}
+    assert masses == pytest.approx({"small": 0.001, "large": 0.008, "rod": 0.0})
+
+
+@pytest.mark.parametrize(
+    ("weights", "said"),
+    [
+        ({"arm": "4 g", "arm/large": "5 g"}, True),  # more in its parts than in the whole
+        ({"arm": "5 g", "arm/large": "5 g"}, True),  # nothing is left for the others
+        ({"leg": "1 kg"}, True),  # nothing of this name
+        ({"base": "4 g", "base/cube": "5 g"}, True),  # all of its parts are weighed
+        ({"base": "4 g", "base/cube": "4.1 g"}, False),  # within the doubt of a scale
+    ],
+)
+def test_weights_that_contradict_each_other_are_reported(weights: dict[str, str], said: bool) -> None:
+    """What was weighed first counts."""
+    assert ("target_mass_differs" in codes(run(weights))) == said
 
 
 @pytest.mark.parametrize("text", ["heavy", "-1 kg", "0", ""])

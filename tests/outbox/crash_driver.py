@@ -28,21 +28,22 @@ from silo.fcstd import stamp
 from silo.outbox.entry import Commit, State, new_key
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
-from silo.registering.items import register
-from silo.registering.journal import Journal
+from silo.registering.items import Journal, register
 
 CATEGORIES = {"A01": "Mechanical assembly", "M01": "Machined parts"}
 LONGEST_LIFE_S = 0.3
 
 
 class Life:
-    """One client, from its start to its sudden end."""
+    """One client, from its start to its sudden end; ``place`` is where it keeps what is its own."""
 
-    def __init__(self, url: str, token: str, folder: Path, chance: random.Random) -> None:
-        self.folder, self.chance = folder, chance
+    def __init__(
+        self, url: str, token: str, folder: Path, chance: random.Random, place: Path | None = None
+    ) -> None:
+        self.folder, self.chance, self.place = folder, chance, place or folder
         self.items = json.loads((folder / "items.json").read_text())
-        self.store = Store(folder / "outbox.sqlite3")
-        self.journal = Journal(folder / "registrations")
+        self.store = Store(self.place / "outbox.sqlite3")
+        self.journal = Journal(self.place / "registrations")
         self.client = SiloClient(url, token, retries=Retries(tries=1))
 
     def live(self) -> None:
@@ -77,8 +78,8 @@ class Life:
             file=held,
             extraction=extraction,
         )
-        self.store.stage(commit)
-        self.note({"item": name, "key": key, "bom": extraction is not None})
+        self.store.stage(commit, self.client.base_url)
+        self.note({"item": name, "key": key, "bom": extraction is not None, "folder": str(self.folder)})
         self.store.finish(key)
 
     def send(self) -> None:
@@ -105,7 +106,7 @@ class Life:
             self.note({"trouble": f"{path.name}: {result.error}"})
 
     def note(self, data: dict[str, object]) -> None:
-        with (self.folder / "acked.jsonl").open("a") as file:
+        with (self.place / "acked.jsonl").open("a") as file:
             file.write(json.dumps(data) + "\n")
 
 

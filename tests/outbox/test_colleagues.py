@@ -312,6 +312,30 @@ def test_a_server_that_was_set_back_gets_all_that_is_newer_by_one_press(vault: V
     assert not any("on top of" in r.comment for r in vault.silo.revisions(vault.number))
 
 
+def test_what_a_person_sent_past_a_set_back_keeps_nothing_back(vault: Vault) -> None:
+    """The older one is out of date then, and a press for all sends the rest."""
+    sent(vault, b"one", b"two", b"three")
+    restored(vault, 1)
+    mine(vault, b"four", b"three", bom=False)
+    newest = mine(vault, b"five", b"four", bom=False)
+    vault.send()
+    vault.outbox.retry(newest.id)
+    vault.send()
+    mine(vault, b"six", b"five", bom=False)
+    vault.send(force=True)
+    assert vault.files() == [b"one", b"five", b"six"]
+    assert held(vault).superseded
+
+
+def test_a_commit_that_is_discarded_while_its_file_goes_sends_no_bom(vault: Vault) -> None:
+    """And the others go as before."""
+    entry = mine(vault, b"one")
+    once(vault, "upload_file", lambda: vault.outbox.discard(entry.id))
+    vault.send()
+    assert (vault.waiting(), vault.files(), vault.lines()) == ((), [b"one"], {})
+    assert list(vault.outbox.copies.iterdir()) == []
+
+
 def test_after_a_set_back_a_colleagues_commit_is_a_question_all_the_same(vault: Vault) -> None:
     """Retry all does not send over it."""
     sent(vault, b"one", b"two")
@@ -516,7 +540,8 @@ def test_a_restore_between_the_look_and_the_merge_is_caught_by_the_server(vault:
     assert (vault.waiting(), vault.files(), vault.lines()) == ((), [b"one"], {"F01-0001": 3})
 
 
-def test_a_file_that_went_once_more_is_found_below_a_colleagues(vault: Vault) -> None:
+@pytest.mark.parametrize("cut", [False, True], ids=["at once", "cut off before the upload"])
+def test_a_file_that_went_once_more_is_found_below_a_colleagues(vault: Vault, cut: bool) -> None:
     """The server was restored to before all of its files, the answer to our upload lost, and somebody went on
     from it: the numbers of before say nothing."""
     sent(vault, b"one")
@@ -525,15 +550,19 @@ def test_a_file_that_went_once_more_is_found_below_a_colleagues(vault: Vault) ->
     vault.send()
     restored(vault, 0)
     vault.outbox.retry(entry.id)
+    if cut:
+        once(vault, "revisions", lambda: once(vault, "revisions", lose))
+        vault.send()
+        assert vault.files() == []
     once(vault, "upload_file", lose, after=True)
-    vault.send()
+    vault.send(force=cut)
     theirs(vault, b"three", 1)
     vault.send(force=True)
     assert (vault.waiting(), vault.files(), vault.lines()) == ((), [b"two", b"three"], {})
 
 
 def test_a_server_without_revisions_gets_the_file_once(vault: Vault) -> None:
-    """It cannot say whether the file is still there; its BOM is sent all the same."""
+    """It cannot say whether the file is still there; its BOM is sent anyway."""
 
     class Bare(FakeSilo):
         def revisions(self, *_arguments: object, **_more: object) -> list[Revision]:

@@ -342,7 +342,7 @@ def test_a_refused_file_does_not_keep_the_bom(vault: Vault) -> None:
 
 
 def test_a_part_that_is_registered_after_the_refusal_is_in_the_bom_of_the_retry(vault: Vault) -> None:
-    """What was refused is resolved anew, not sent again as it was."""
+    """What was refused is resolved again, not sent again as it was."""
     stranger = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
     vault.commit(vault.snapshot(vault.part("Bolt", 1), vault.part("New", identity=stranger)))
     on(vault.silo, "merge_bom", RejectedError("not now"))

@@ -11,6 +11,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.fcstd import Library
@@ -39,7 +40,7 @@ def test_every_commit_is_in_silo_once(tmp_path: Path, rounds: int, seed: int, mo
     for name in ("vault", "new"):
         (tmp_path / name).mkdir()
     with (
-        run.running_server(f"sqlite:///{tmp_path / 'silo.db'}", token="silo_crash") as server,
+        run.running_server(sqlite_database(tmp_path / "silo.db"), token="silo_crash") as server,
         SiloClient(server.base_url, server.token) as client,
     ):
         made = {

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 from fault_proxy import FAULTS, Proxy, fault_proxy
+from real_silo import MIXTURES, MOODS, TOKEN, Item, Moods, mixed, real_silo
+from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.api.policy import Retries
@@ -30,7 +32,7 @@ def _proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proxy]:
     run = pytest.importorskip("silo_server.run", reason="the embedded server needs the extra 'server'")
     folder = tmp_path_factory.mktemp("faults")
     with (
-        run.running_server(f"sqlite:///{folder / 'silo.db'}", token="silo_faults") as server,
+        run.running_server(sqlite_database(folder / "silo.db"), token="silo_faults") as server,
         fault_proxy(server.base_url) as proxy,
     ):
         yield proxy
@@ -63,7 +65,7 @@ def test_one_item_in_trouble(tmp_path: Path, proxy: Proxy, client: SiloClient, n
                 )
             )
     proxy.fault, proxy.item = FAULTS[name], items["Bad"].part_number
-    for _ in range(3):
+    for _ in range(1 if name == "slow" else 3):
         # Again and again, as the timer does: no try may make another revision.
         report = send_all(store, client, force=True)
         assert report.stopped_by is None
@@ -80,6 +82,112 @@ def test_one_item_in_trouble(tmp_path: Path, proxy: Proxy, client: SiloClient, n
         sizes = [r.file_size for r in client.revisions(item.part_number) if r.file_name]
         assert len(sizes) == 2, label
         assert [line.quantity for line in client.get_bom(item.part_number)] == [2], label
+
+
+# Fault of an upload → what of the commit is in Silo then: its files, the lines of its BOM.
+UPLOADS = {
+    "drop before": (0, 0),
+    "drop after": (1, 0),
+    "502 before": (0, 0),
+    "502 after": (1, 0),
+    "cut": (1, 0),
+    "500": (0, 0),
+    "501": (0, 1),
+    "no route": (0, 1),
+    "503": (0, 1),
+    "no storage": (0, 1),
+    "403": (0, 1),
+    "409": (0, 1),
+    "413": (0, 1),
+    "422": (0, 1),
+}
+OF_ALL = ("401", "login", "429", "503 later", "read-only")
+"""Faults that end the run: nothing else arrives either."""
+
+
+@pytest.mark.parametrize("moods", MIXTURES, ids=lambda names: ", ".join(names) or "default")
+def test_what_still_arrives_in_each_mood_of_a_silo(tmp_path: Path, moods: tuple[str, ...]) -> None:
+    """Of each commit whose upload has a fault, and of the one after them; then everything, each once."""
+    store, commits = Store(tmp_path / "outbox.sqlite3"), dict[str, Item]()
+    with (
+        real_silo(mixed(moods)) as silo,
+        SiloClient(silo.url, TOKEN, retries=Retries(tries=1), timeout=60) as client,
+    ):
+        before = [""] if silo.moods.upload == "presigned" else []  # the form, which it does not take
+
+        def commit(label: str) -> None:
+            item = commits[label] = silo.make("A01", label, "assembly")
+            path = tmp_path / f"{label}.FCStd"
+            path.write_bytes(label.encode() * 100)
+            head = BomEntry(str(path), silo_uuid=item.id, is_assembly=True)
+            extraction = Extraction(head, (BomEntry("/v/Bolt.FCStd", silo_uuid=bolt.id),))
+            store.add(Commit(str(path), 0.0, label, item.id, file=path, extraction=extraction), silo.url)
+
+        def arrived() -> dict[str, tuple[int, int]]:
+            return {label: (len(item.files), len(item.lines)) for label, item in commits.items()}
+
+        bolt = silo.make("F01", "Bolt")
+        commit("first")
+        upload = f"POST /api/items/{commits['first'].part_number}/file"
+        for fault in OF_ALL:
+            silo.faults_of = {upload: [*before, fault]}
+            report = send_all(store, client, force=True)
+            assert (report.stopped_by is not None, arrived()) == (True, {"first": (0, 0)}), fault
+        for label in (*UPLOADS, "last"):
+            commit(label)
+        silo.faults_of = {
+            f"POST /api/items/{commits[fault].part_number}/file": [*before, fault] for fault in UPLOADS
+        }
+        send_all(store, client, force=True)
+        assert arrived() == {"first": (1, 1), **UPLOADS, "last": (1, 1)}
+        for entry in store.entries():
+            if entry.state is State.HELD:
+                store.retry(entry.id)
+        report = send_all(store, client, force=True)
+        assert (report.held, report.failed, store.entries()) == ([], [], ())
+        assert set(arrived().values()) == {(1, 1)}
+
+
+@pytest.mark.parametrize("fault", [*OF_ALL, "drop before", "drop after", "502 after", "cut", "500", "403"])
+def test_a_merge_by_single_lines_that_breaks_off_is_ended_by_the_next_sending(
+    tmp_path: Path, fault: str
+) -> None:
+    """At whichever of its requests: each line is there once, and what a person wrote stays."""
+    store = Store(tmp_path / "outbox.sqlite3")
+    with (
+        real_silo(Moods(merge="missing")) as silo,
+        SiloClient(silo.url, TOKEN, retries=Retries(tries=1), timeout=60) as client,
+    ):
+        children = [silo.make("F01", f"Bolt {number}") for number in range(4)]
+        changed, manual, *_added = (child.part_number for child in children)
+        kept = [
+            {"child_part_number": changed, "quantity": 9, "source": "assembly"},
+            {"child_part_number": manual, "quantity": 9, "source": "manual"},
+        ]
+        tops = [silo.make("A01", f"Top {number}", "assembly") for number in range(5)]
+        requests = ("POST {}/merge", "GET {}", "POST {}", "POST {}", f"PUT {{}}/{changed}")
+        silo.faults_of = {}
+        for number, (top, request) in enumerate(zip(tops, requests, strict=True)):
+            top.lines = [dict(line) for line in kept]
+            lines = tuple(BomEntry(f"/v/{one.id}.FCStd", silo_uuid=one.id) for one in children)
+            head = BomEntry("/v/Top.FCStd", silo_uuid=top.id, is_assembly=True)
+            store.add(Commit("", 0.0, "Top", top.id, extraction=Extraction(head, lines)), silo.url)
+            at = request.format(f"/api/items/{top.part_number}/bom")
+            silo.faults_of[at] = ["", fault] if number == 3 else [fault]
+        for _ in range(len(tops) + 1):
+            send_all(store, client, force=True)
+            for entry in store.entries():
+                if entry.state is State.HELD:
+                    store.retry(entry.id)
+        assert (store.entries(), [left for left in silo.faults_of.values() if left]) == ((), [])
+        expected = [(changed, 1), (manual, 9), *((child.part_number, 1) for child in children[2:])]
+        for top in tops:
+            assert [(one["child_part_number"], one["quantity"]) for one in top.lines] == expected
+
+
+def test_each_mood_is_in_a_mixture() -> None:
+    """Else nobody would see that it is tried no more."""
+    assert {name for names in MIXTURES for name in names} == {*MOODS}
 
 
 def test_a_clock_that_is_set_back_holds_nothing_up(tmp_path: Path, proxy: Proxy, client: SiloClient) -> None:

@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from silo.api.config import Pause
 from silo.api.policy import Reply, Where, error_of
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import (
     AuthError,
     BusyError,
+    MissingRevisionError,
     NotFoundError,
     NotSentError,
     ReadOnlyError,
@@ -262,3 +265,50 @@ def test_success_ends_the_pause(desk: Desk) -> None:
         waits.append(0.0 if report.pause is None else report.pause.left(desk.now))
         desk.now += 1000
     assert waits == [5.0, 10.0, 0.0, 5.0]
+
+
+def test_a_pause_that_the_server_named_is_ended_by_a_person_only(desk: Desk) -> None:
+    """A new login ends the pause of a wrong token, and only that; Retry all ends both."""
+    server, now = desk.silo.base_url, desk.now
+    busy = Pause(now + 600, "busy", "busy", told=True)
+    for pause, left in ((Pause(now + 600, "wrong token", "auth"), None), (busy, busy)):
+        desk.store.set_pause(server, pause)
+        desk.store.resume(server, told=False)
+        assert desk.store.pause(server) == left
+    desk.store.resume(server)
+    assert desk.store.pause(server) is None
+
+
+@pytest.mark.parametrize("choice", ["retry", "discard"])
+def test_what_a_person_decides_of_a_commit_ends_the_pause_of_its_item(desk: Desk, choice: str) -> None:
+    """That of this item, here; the next commit of it is sent at once."""
+    one, other = desk.numbers[:2]
+    for number in (one, other):
+        desk.commit(number)
+        desk.store.set_pause(desk.silo.base_url, Pause(desk.now + 600, "500"), number.casefold())
+    getattr(desk.store, choice)(desk.store.entries()[0].id)
+    desk.commit(one, 2)
+    desk.send()
+    assert [entry.part_number for entry in desk.store.entries()] == [other]
+
+
+def test_retry_all_sends_nothing_that_is_meant_for_another_server(desk: Desk) -> None:
+    """Also what that one has lost, which the next press there sends."""
+    desk.commit(desk.numbers[0])
+    entry = desk.store.entries()[0]
+    newer = json.dumps({"revision_number": 1, "set_back": True})
+    desk.store.update(entry.id, state=State.HELD, newer=newer, server="http://there/api")
+    desk.send(force=True)
+    assert [one.state for one in desk.store.entries()] == [State.HELD]
+
+
+def test_a_bom_alone_whose_revision_is_not_there_is_held(desk: Desk) -> None:
+    """There is no file that could be sent again."""
+    number = desk.numbers[0]
+    desk.commit(number)
+    entry = desk.store.entries()[0]
+    request = desk.store.bom(entry.id)[1]
+    desk.store.discard(entry.id)
+    desk.store.add(Commit("", desk.now, number, part_number=number, request=request))
+    desk.mood = lambda name: _raise(MissingRevisionError("no such file")) if name == "merge_bom" else None
+    assert [(one.state, one.file_left) for one in desk.send().held] == [(State.HELD, False)]

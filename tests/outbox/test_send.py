@@ -12,10 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.api.policy import Backoff, Retries
-from silo.api.wire import MergeEntry, MergeRequest, MergeResult, Revision, SourceDocument
+from silo.api.wire import (
+    MergeEntry,
+    MergeRequest,
+    MergeResult,
+    ProductSummary,
+    Revision,
+    SourceDocument,
+)
 from silo.bom.errors import (
     AuthError,
     CancelledError,
@@ -365,7 +373,7 @@ def test_a_retry_after_mending_goes_through(outbox: Outbox, silo: FakeSilo) -> N
 
 
 def test_pauses_grow_and_keep_the_order(outbox: Outbox, silo: FakeSilo, clock: Clock) -> None:
-    """The second commit of an assembly waits for the first; others continue."""
+    """The second commit of an assembly waits for the first; others continue. What arrived ends the growth."""
     outbox.put(silo.base_url, TOP, bom=bom(1))
     outbox.put(silo.base_url, TOP, bom=bom(2))
     outbox.put(silo.base_url, OTHER, bom=bom(9))
@@ -384,8 +392,12 @@ def test_pauses_grow_and_keep_the_order(outbox: Outbox, silo: FakeSilo, clock: C
     fail(silo, "merge_bom", ServerFaultError("500"), times=1)
     clock.now += 1
     assert (len(outbox.send(silo).failed), left()) == (1, 20)
-    assert len(outbox.send(silo, force=True).sent) == 2
+    clock.now += 20
+    assert len(outbox.send(silo).sent) == 2
     assert log_of(silo, TOP) == ["1", "2"]
+    outbox.put(silo.base_url, TOP, bom=bom(3))
+    fail(silo, "merge_bom", ServerFaultError("500"), times=1)
+    assert (len(outbox.send(silo).failed), left()) == (1, 10)
 
 
 @pytest.mark.parametrize(
@@ -501,7 +513,7 @@ def test_a_copy_without_a_row_is_in_view(outbox: Outbox, silo: FakeSilo, model: 
 def embedded(tmp_path: Path) -> Iterator[SiloClient]:
     run = pytest.importorskip("silo_server.run", reason="the embedded server needs the extra 'server'")
     with (
-        run.running_server(f"sqlite:///{tmp_path / 'silo.db'}", token="silo_outbox") as server,
+        run.running_server(sqlite_database(tmp_path / "silo.db"), token="silo_outbox") as server,
         SiloClient(server.base_url, server.token, retries=Retries(tries=1)) as client,
     ):
         client.create_item("kindred-rd", "A01", "Top", item_type="assembly")
@@ -510,7 +522,7 @@ def embedded(tmp_path: Path) -> Iterator[SiloClient]:
 
 
 def test_it_sends_to_the_embedded_server(outbox: Outbox, embedded: SiloClient, model: Path) -> None:
-    """File and BOM over real HTTP, with the entry's progress."""
+    """File and BOM over real HTTP, with the entry's progress; then what the server keeps of the product."""
     seen: list[tuple[int, int]] = []
     outbox.put(embedded.base_url, TOP, file=model, comment="c1", bom=bom(4))
     report = outbox.send(embedded, on_progress=lambda entry, done, total: seen.append((done, total)))
@@ -519,6 +531,26 @@ def test_it_sends_to_the_embedded_server(outbox: Outbox, embedded: SiloClient, m
     revision = embedded.revisions(TOP)[0]
     assert (revision.comment, revision.file_checksum) == ("c1", hashlib.sha256(b"first state").hexdigest())
     assert [(line.child_part_number, line.quantity) for line in embedded.get_bom(TOP)] == [(BOLT, 4)]
+    (sent,) = report.sent
+    assert sent.summary is not None
+    assert (sent.summary.parts, sent.summary.mass_missing.first) == (1, [BOLT])
+
+
+def test_a_silo_without_summaries_is_asked_once(outbox: Outbox, silo: FakeSilo) -> None:
+    """In each sending, however many BOMs arrive; a file alone asks nothing."""
+    asked: list[str] = []
+
+    class Spy(FakeSilo):
+        def get_summary(self, part_number: str, /) -> ProductSummary | None:
+            asked.append(part_number)
+            return super().get_summary(part_number)
+
+    spy = Spy()
+    spy.items = silo.items
+    for number in (TOP, OTHER, TOP):
+        outbox.put(silo.base_url, number, bom=bom(1))
+    assert [sent.summary for sent in outbox.send(spy).sent] == [None] * 3
+    assert asked == [TOP]
 
 
 def test_the_names_of_a_commit_go_along(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
@@ -543,10 +575,8 @@ def test_the_names_of_a_commit_go_along(outbox: Outbox, silo: FakeSilo, model: P
     assert (seen["idempotency_key"], seen["sync_id"], seen["sha256"]) == (entry.key, entry.key, entry.sha256)
 
 
-def test_what_was_seen_of_the_old_server_says_nothing_of_the_new_one(
-    outbox: Outbox, silo: FakeSilo, model: Path
-) -> None:
-    """The old one had five revisions; on the new one this very file is there already, as the first."""
+def unsent_beside_five(outbox: Outbox, silo: FakeSilo, model: Path) -> Any:
+    """Return a commit that did not arrive at a server, which has five older revisions of the item."""
     for number in range(5):
         model.write_bytes(b"older %d" % number)
         silo.upload_file(TOP, model)
@@ -554,12 +584,84 @@ def test_what_was_seen_of_the_old_server_says_nothing_of_the_new_one(
     entry = outbox.put(silo.base_url, TOP, file=model)
     fail(silo, "upload_file", UnreachableError("gone"))
     outbox.send(silo)
+    return entry
+
+
+def test_what_was_seen_of_the_old_server_says_nothing_of_the_new_one(
+    outbox: Outbox, silo: FakeSilo, model: Path
+) -> None:
+    """The old one had five revisions; on the new one this very file is there already, as the first."""
+    entry = unsent_beside_five(outbox, silo, model)
     moved = FakeSilo("http://moved.example")
     moved.create_item("kindred-rd", "A01", "Top")
     moved.upload_file(TOP, model)
     outbox.retry(entry.id, server=moved.base_url)
     outbox.send(moved)
     assert (len(moved.revisions(TOP)), outbox.entries()) == (1, ())
+
+
+def test_an_upload_to_a_new_server_that_loses_its_answer_is_found_there(
+    outbox: Outbox, silo: FakeSilo, model: Path
+) -> None:
+    """Its numbers are lower than those that the old one had reached, and it knows no names of requests."""
+    entry = unsent_beside_five(outbox, silo, model)
+
+    class Plain(FakeSilo):
+        def upload_file(self, *arguments: Any, idempotency_key: str | None = None, **more: Any) -> Revision:
+            return super().upload_file(*arguments, **more)
+
+    moved = Plain("http://moved.example")
+    moved.create_item("kindred-rd", "A01", "Top")
+    outbox.retry(entry.id, server=moved.base_url)
+
+    def lose(name: str) -> None:
+        if name == "upload_file" and len(moved.revisions(TOP)) == 1:
+            moved.upload_file(TOP, model.with_name("Other.FCStd"))
+            raise UnreachableError("gone")
+
+    model.with_name("Other.FCStd").write_bytes(b"a colleague's")
+    moved.after = lose
+    outbox.send(moved)
+    outbox.send(moved, force=True)
+    assert (len(moved.revisions(TOP)), outbox.entries()) == (2, ())
+
+
+def test_a_bom_that_moves_to_another_server_takes_its_file_along(
+    outbox: Outbox, silo: FakeSilo, model: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither server keeps checksums; the number that the file had on the old one is another file's there."""
+    read = FakeSilo.revisions
+
+    def without_checksums(self: FakeSilo, *arguments: Any, **more: Any) -> Any:
+        return [one.model_copy(update={"file_checksum": None}) for one in read(self, *arguments, **more)]
+
+    monkeypatch.setattr(FakeSilo, "revisions", without_checksums)
+    entry = outbox.put(silo.base_url, TOP, file=model, bom=bom(1))
+    fail(silo, "merge_bom", ServerFaultError("500"))
+    outbox.send(silo)
+    assert [one.file_left for one in outbox.entries()] == [False]
+    moved = FakeSilo("http://moved.example")
+    for category, name in (("A01", "Top"), ("F01", "Bolt")):
+        moved.create_item("kindred-rd", category, name)
+    other = model.with_name("Other.FCStd")
+    other.write_bytes(b"another file")
+    moved.upload_file(TOP, other)
+    outbox.retry(entry.id, server=moved.base_url)
+    outbox.send(moved)
+    assert outbox.entries() == ()
+    assert [one.file_name for one in moved.revisions(TOP)] == [model.name, other.name]
+
+
+def test_a_file_of_another_name_is_no_question_for_whoever_names_the_item(
+    outbox: Outbox, silo: FakeSilo, model: Path
+) -> None:
+    """The name is asked about where the identity in the file says which item it is: "Save As" copies that."""
+    silo.upload_file(TOP, model)
+    other = model.with_name("Renamed.FCStd")
+    other.write_bytes(b"another state")
+    outbox.put(silo.base_url, TOP, file=other)
+    assert len(outbox.send(silo).sent) == 1
+    assert [one.file_name for one in silo.revisions(TOP)][:2] == ["Renamed.FCStd", model.name]
 
 
 def test_an_entry_that_is_not_copied_yet_keeps_its_place(outbox: Outbox, silo: FakeSilo, model: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import json
 import os
 import shutil
 import sqlite3
@@ -26,9 +27,10 @@ from silo.api.files import standing
 from silo.api.wire import Revision
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
-from silo.outbox.entry import Commit, Entry, State, new_key
+from silo.files import seen_as
+from silo.outbox.entry import VERSION, Commit, Entry, State, new_key
 from silo.outbox.send import send_all
-from silo.outbox.store import VERSION, OutboxError, Store, seen
+from silo.outbox.store import OutboxError, Store
 from silo.platform import replacing, stamp_of
 from silo.testing import FakeSilo
 from vault import died
@@ -261,7 +263,7 @@ def test_a_lost_database_costs_no_commit(
     REMEDIES[remedy](store)
     after = store if running else Store(store.path)
     if running and damage in ("another program's", "cut off", "damaged pages"):
-        with suppress(OutboxError):  # said once; the next call makes it anew
+        with suppress(OutboxError):  # said once; the next call makes it again
             after.entries()
     told = {entry.key: entry for entry in after.entries()}
     lost_all = damage in ("format 5", "format 6") and remedy != "nothing"
@@ -299,6 +301,8 @@ def test_a_description_that_is_lost_with_the_database_is_in_view(store: Store, d
         damage(store.copies / f"{entry.key}.json")
         (found,) = [one for one in Store(store.path).entries() if one.key == entry.key]
         assert (found.state, "Save a copy" in found.reason, found.file_left) == (State.HELD, True, True)
+        kept = [file.read_bytes() for file in store.path.parent.glob("kept-aside/*/*.json")]
+        assert kept == [b"{half"] * number
         target = document.with_name(f"saved {number}.FCStd")
         store.save_copy(found.id, target)
         assert target.read_bytes() == b"first"
@@ -308,13 +312,45 @@ def test_a_description_that_is_lost_with_the_database_is_in_view(store: Store, d
         assert [*store.copies.iterdir()] == []
 
 
-def test_what_ended_does_not_come_back(store: Store, document: Path) -> None:
+@pytest.mark.parametrize("damage", ["nothing", "deleted", "a newer format"])
+def test_what_ended_does_not_come_back(store: Store, document: Path, damage: str) -> None:
     """Killed after the mark that a commit has ended, before its row and its copy are gone."""
     entry = store.add(commit(document))
     store._described(entry.key).rename(store.copies / f"{entry.key}.gone")
+    DAMAGES.get(damage, lambda _store: None)(store)
     after = Store(store.path)
+    assert damage == "nothing" or after.entries() == ()
     after.sweep()
     assert (after.entries(), [*after.copies.iterdir()]) == ((), [])
+
+
+def test_a_database_that_is_lost_twice_costs_no_commit(store: Store, document: Path) -> None:
+    """Its first format had no descriptions; what is read of it has them then."""
+    store.add(commit(document))
+    of_format(6, described=False)(store)
+    before = Store(store.path).entries()
+    DAMAGES["deleted"](store)
+    assert Store(store.path).entries() == before
+    assert [entry.state for entry in before] == [State.WAITING]
+
+
+def test_commits_of_one_number_are_both_kept_in_their_order(store: Store, document: Path) -> None:
+    """Two programs had a database each for a while."""
+    for key in ("a", "b", "c"):
+        store.add(commit(document, key))
+    described = store._described("b")
+    described.write_text(json.dumps(json.loads(described.read_text()) | {"id": 1}))
+    DAMAGES["deleted"](store)
+    assert [entry.key for entry in Store(store.path).entries()] == ["a", "b", "c"]
+
+
+def test_a_copy_of_a_description_brings_nothing_back(store: Store, document: Path) -> None:
+    """It has another name than the commit in it: a person is asked about that name only."""
+    entry = store.add(commit(document))
+    shutil.copy(store._described(entry.key), store._described("another"))
+    store.discard(entry.id)
+    store.sweep()
+    assert [(one.key, one.state) for one in store.entries()] == [("another", State.HELD)]
 
 
 def test_a_commit_that_ends_while_the_database_is_made_is_no_lost_one(
@@ -475,7 +511,7 @@ def test_a_damaged_copy_is_not_sent(store: Store, document: Path, content: bytes
 
 
 def test_a_bom_that_cannot_be_parsed_is_held(store: Store, document: Path) -> None:
-    """The file goes all the same."""
+    """The file goes anyway."""
     silo = FakeSilo()
     item = silo.create_item("kindred-rd", "A01", "Top")
     entry = store.add(Commit(str(document), 1.0, identity=item.id, request='{"entries": 5}'))
@@ -632,8 +668,8 @@ def test_a_second_name_that_is_written_to_in_place_is_no_commit(store: Store, do
 def test_a_revision_that_a_person_saw_is_known_however_its_checksum_is_written(written: str) -> None:
     checksum = written.format("AB" * 32)
     theirs = Revision(revision_number=2, file_name="A.FCStd", file_checksum=checksum)
-    assert standing([theirs], "", seen=seen({"revision_number": 2, "file_checksum": checksum})).newer is None
-    assert standing([theirs], "", seen=seen({"revision_number": 2, "file_checksum": "cd" * 32})).newer
+    assert standing([theirs], "", seen=seen_as(2, checksum)).newer is None
+    assert standing([theirs], "", seen=seen_as(2, "cd" * 32)).newer
 
 
 def test_a_folder_that_takes_nothing_is_listed_truthfully(
@@ -740,6 +776,39 @@ def test_a_second_name_with_another_number_is_no_other_file(
     document.write_bytes(b"second")
     entry = store.add(replace(commit(document, key, held), stamp=stamp))
     assert (entry.state, (store.copies / entry.copy).read_bytes()) == (State.WAITING, b"first")
+
+
+class Overtaken(Store):
+    """Another program makes the copy in the moment before this one."""
+
+    def _copied(self, source: Path, copy: Path, stamp: str) -> tuple[str, int]:
+        Store(self.path).finish(copy.stem)
+        return super()._copied(source, copy, stamp)
+
+
+def test_a_copy_that_another_program_makes_meanwhile_is_no_trouble(store: Store, document: Path) -> None:
+    """Its second name is gone then, and nothing is said of a disk."""
+    key = new_key()
+    held = store.hold(str(document), key)
+    sha256 = Overtaken(store.path).add(commit(document, key, held)).sha256
+    (entry,) = store.entries()
+    assert (entry.state, entry.reason, entry.sha256) == (State.WAITING, "", sha256)
+    assert sha256 == hashlib.sha256(b"first").hexdigest()
+
+
+@pytest.mark.parametrize("name", ["part.json", "part.gone", "part.JSON", ".json"])
+def test_a_file_that_is_called_like_a_description_is_a_file(store: Store, document: Path, name: str) -> None:
+    """Its copy neither replaces the description nor ends the commit, also if the database is lost."""
+    path = document.with_name(name)
+    path.write_bytes(b"{}")
+    entry = store.add(commit(path))
+    for file in database(store):
+        file.unlink()
+    again = Store(store.path)
+    again.sweep()
+    (found,) = again.entries()
+    assert (found.key, found.state, found.file_name) == (entry.key, State.WAITING, name)
+    assert again.verified(found).read_bytes() == b"{}"
 
 
 # -- a disk without hard links ---------------------------------------------------------------------

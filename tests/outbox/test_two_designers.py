@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.api.wire import Item
@@ -42,7 +43,7 @@ Client = SiloClient | FakeSilo
 @pytest.fixture(name="server", scope="module")
 def _server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SiloClient]:
     run = pytest.importorskip("silo_server.run", reason="the embedded server needs the extra 'server'")
-    database = f"sqlite:///{tmp_path_factory.mktemp('silo') / 'silo.db'}"
+    database = sqlite_database(tmp_path_factory.mktemp("silo") / "silo.db")
     with (
         run.running_server(database, token="silo_two") as server,
         SiloClient(server.base_url, server.token) as client,

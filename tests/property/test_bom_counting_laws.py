@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fakes import Doc, ForwardingLink, edit
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -23,7 +24,7 @@ from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
 from silo.bom.model import BomEntry
 from silo.bom.report import flat_counts
-from silo.bom.walk.standard import STANDARD_PARTS
+from silo.bom.standard import STANDARD_PARTS
 
 Key = tuple[str, str]
 
@@ -339,7 +340,7 @@ def tangles(draw: st.DrawFn) -> Any:
     return assemblies[0]
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(60))
 @given(tangles(), st.randoms(use_true_random=False))
 def test_also_tangles_are_order_free_and_end(asm: Any, random: Any) -> None:
     """Rings are cut at the same place, and reported in the same words, whatever the order."""

@@ -27,9 +27,9 @@ from desk import Desk, Document, Documents, Office, Silo
 from silo.bom.errors import SiloError, UnreachableError
 from silo.outbox.entry import Entry, State
 from silo.outbox.store import Store
-from silo.workbench.commit.flow import Answer, Choice, CommitFlow, Look, Theirs, of_held
+from silo.workbench.commit.flow import Choice, CommitAnswer, CommitFlow, Look, Theirs, of_held
 from silo.workbench.commit.opened import Base, Opened
-from silo.workbench.commit.plan import Plan, Row
+from silo.workbench.commit.plan import CommitPlan, DocumentRow
 from silo.workbench.revisions.flow import RevisionFlow
 from silo.workbench.session.session import Session
 
@@ -227,14 +227,14 @@ class Designer(Office):
         doc = self.doc(self.world.random.choice(("Top", "Top", "Sub")))
         self.commits.start(doc)
 
-    def decide(self, planned: Plan, look: Look) -> Answer | None:
+    def decide(self, planned: CommitPlan, look: Look) -> CommitAnswer | None:
         """The dialog: once Silo was looked at, this person decides each row as a die falls."""
         answers: list[Mapping[str, Theirs]] = []
         look(answers.append)
         self.settle(turns=False)
         seen = answers[-1] if answers else {}
-        rows: list[Row] = []
-        choices: list[tuple[Row, Theirs, Choice]] = []
+        rows: list[DocumentRow] = []
+        choices: list[tuple[DocumentRow, Theirs, Choice]] = []
         for row in planned.rows:
             theirs = seen.get(row.path)
             if theirs is None:
@@ -247,7 +247,7 @@ class Designer(Office):
                 rows.append(replace(row, on_top=theirs.newer or {}))
             elif chance < 0.7:
                 choices.append((row, theirs, Choice.TAKE))
-        return Answer(tuple(rows), "dialog", choices=tuple(choices))
+        return CommitAnswer(tuple(rows), "dialog", choices=tuple(choices))
 
     def sync(self) -> None:
         """A question of the pane was answered: the BOM alone is sent. That of a file that was saved since its

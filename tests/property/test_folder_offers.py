@@ -8,17 +8,18 @@ from tempfile import TemporaryDirectory
 
 import pytest
 from fcstd_writer import Doc, locals_, part
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from public_projects import ASSEMBLIES
 
 from silo.bom.model import Extraction, walk_entries
 from silo.files import documents_in
-from silo.registering.on_disk import whole_folder
+from silo.registering.orders import whole_folder
 from silo.vault.index import Index
 from silo.vault.plan import make_plan
-from silo.vault.reading import Question, Reading
+from silo.vault.reading import Question, VaultReader
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "assemblies"
 # Per assembly what it links to: a part, a screw of the library, or an assembly after it.
 LINKS = st.lists(
     st.lists(st.tuples(st.sampled_from(["part", "screw", "next"]), st.integers(0, 3)), max_size=4)
@@ -29,7 +30,7 @@ def lost(folder: Path) -> set[tuple[str, str]]:
     """What an assembly of the folder has, and the folder does not offer."""
     tops = documents_in([str(folder)])
     with Index(None) as index:
-        reading = Reading(index, None)
+        reading = VaultReader(index, None)
         plan = make_plan(tops, reading)
         whole, unused = whole_folder(plan, reading, str(folder))
         offered = {entry.key for entry in whole.entries if entry.doc_path not in unused}
@@ -39,7 +40,7 @@ def lost(folder: Path) -> set[tuple[str, str]]:
 
 
 @given(LINKS)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(15), deadline=None)
 def test_a_folder_offers_at_least_the_union_of_its_assemblies(
     assemblies: list[list[tuple[str, int]]],
 ) -> None:
@@ -69,7 +70,7 @@ def test_a_folder_offers_at_least_the_union_of_its_assemblies(
         assert lost(folder) == set()
 
 
-@pytest.mark.parametrize("project", sorted(DATA.glob("*/")), ids=lambda path: path.name)
+@pytest.mark.parametrize("project", sorted(ASSEMBLIES.glob("*/")), ids=lambda path: path.name)
 def test_real_projects_offer_what_their_assemblies_use(project: Path) -> None:
     """Standard parts of a library file were taken for a file that no assembly uses."""
     assert lost(project) == set()

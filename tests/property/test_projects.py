@@ -19,19 +19,20 @@ from typing import Any
 
 import pytest
 from fcstd_writer import Doc, Raw, locals_, text
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from public_projects import ASSEMBLIES
 
 from silo.bom.errors import InputError
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
-from silo.fcstd.locate import Found, Locator
-from silo.files import documents_in
+from silo.files import FoundFile, Locator, documents_in
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
-from silo.registering.on_disk import proposals_for, register_all
+from silo.registering.orders import proposals_for, register_all
 from silo.testing import FakeSilo
 from silo.vault.project import (
     Belonging,
@@ -44,7 +45,6 @@ from silo.vault.project import (
 )
 from silo.vault.pull import fetched, place
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "assemblies"
 PROJECTS = {
     "alarm_clock/parts": 20,
     "asm4-examples/Asm4_Example1": 1,
@@ -83,8 +83,8 @@ def below(path: str, root: Path) -> dict[str, dict[str, bool]]:
         if at in found:
             continue
         targets = {name: locator.find(name, (os.path.dirname(one),)) for name in recorded_paths(one)}
-        found[at] = {name: isinstance(target, Found) for name, target in targets.items()}
-        left += [target.real for target in targets.values() if isinstance(target, Found)]
+        found[at] = {name: isinstance(target, FoundFile) for name, target in targets.items()}
+        left += [target.real for target in targets.values() if isinstance(target, FoundFile)]
     return found
 
 
@@ -132,10 +132,10 @@ def check_it_comes_back(root: Path, found: Belonging, silo: FakeSilo, scratch: P
 @pytest.mark.parametrize("name", PROJECTS)
 def test_a_real_project_comes_back_whole(name: str, tmp_path: Path) -> None:
     """Registered as its owner would do it: parts and assemblies, also several in a file."""
-    if not (DATA / name).is_dir():
-        pytest.skip(f"{DATA / name} is not here; NOT tested")
+    if not (ASSEMBLIES / name).is_dir():
+        pytest.skip(f"{ASSEMBLIES / name} is not here; NOT tested")
     root = tmp_path / "project"
-    shutil.copytree(DATA / name, root, copy_function=shutil.copyfile)
+    shutil.copytree(ASSEMBLIES / name, root, copy_function=shutil.copyfile)
     for folder, _, _ in os.walk(root):
         os.chmod(folder, 0o755)  # the data are read-only
     silo, store = FakeSilo(), Store(tmp_path / "outbox.sqlite3")
@@ -204,7 +204,7 @@ def text_property(value: str) -> Raw:
     return Raw("App::PropertyString", f'<String value="{text(value)}"/>')
 
 
-@settings(max_examples=200 if os.environ.get("SILO_LONG") else 15, deadline=None)
+@settings(max_examples=examples(8), deadline=None)
 @given(st.integers(0, 2**32))
 def test_a_random_project_comes_back_whole(seed: int) -> None:
     """Libraries, sheets and files of several items have no item, and come with what links to them."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
+from hunting import examples
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -192,7 +193,7 @@ class Silo(RuleBasedStateMachine):
             line |= {"override": False, "cad": None}
             self.accepted[number] = open_now[number]
         if before == self.model and action is not Action.REMOVE:
-            # A reason was written on the line, which the model does not keep; it is a change all the same.
+            # A reason was written on the line, which the model does not keep; it is a change anyway.
             self.version += self._version() - self.version
         self.changed(before)
 
@@ -314,7 +315,7 @@ def test_the_server_behaves_like_the_model(kind: str) -> None:
             run_state_machine_as_test(
                 machine,
                 settings=settings(
-                    max_examples=15,
+                    max_examples=examples(6),
                     stateful_step_count=20,
                     suppress_health_check=list(HealthCheck),
                 ),

@@ -11,13 +11,11 @@ from silo.api.wire import Item
 from silo.bom.errors import RejectedError
 from silo.bom.model import BomEntry
 from silo.bom.resolve import propose
-from silo.registering.items import Registration
-from silo.registering.journal import Journal
-from silo.registering.modelled import Modelled
-from silo.registering.offer import Candidate, State
-from silo.registering.orders import Order, carry_out
+from silo.registering.items import Journal, Registration
+from silo.registering.offer import Candidate, ComponentState, Learnt, LearntChoice, Modelled
+from silo.registering.orders import Order, carry_out, take_back
 from silo.testing import FakeSilo
-from silo.workbench.session.jobs import Control
+from silo.workbench.session import Control
 
 
 def carried_out(
@@ -27,7 +25,7 @@ def carried_out(
     entry = BomEntry(str(folder / "machine.FCStd"), object_name="Motor", label="Motor", quantity=2)
     article = Modelled(entry, ("Motor", "Motor001"), "shape", source)
     proposal = propose(entry, {"M01": "Machined part"}, shares_file=True)
-    candidate = Candidate(proposal, State.READY, article=article)
+    candidate = Candidate(proposal, ComponentState.READY, article=article)
     order = Order(candidate, "Motor", "part", "M01", apart=apart)
     done: list[Registration] = []
     written: dict[tuple[str, ...], str] = {}
@@ -73,3 +71,60 @@ def test_no_second_item_is_made_where_nobody_knows_whether_there_is_one(tmp_path
     (result,), written = carried_out(silo, tmp_path, source=str(source))
     assert "not today" in str(result.error)
     assert (written, list(silo.search_items(""))) == ({}, [])
+
+
+def test_a_choice_is_learnt_for_the_same_words_in_the_same_folder(tmp_path: Path) -> None:
+    """The choice with the most words counts, then the newest; other folders and other words learn nothing."""
+    learnt = Learnt(tmp_path / "learnt.json")
+
+    def entry(folder: str, name: str) -> BomEntry:
+        return BomEntry(str(tmp_path / folder / f"{name}.FCStd"), label=name)
+
+    def choose(folder: str, name: str, category: str) -> None:
+        learnt.learn([(entry(folder, name), name, LearntChoice((), category, "purchased", "Misumi"))])
+
+    choose("a", "Widget 7", "R27")
+    choose("a", "Widget cover", "M03")
+    choose("b", "Gizmo", "E03")
+    choose("a", "Widget 8", "R25")
+    choose("a", "Widget left", "M05")
+    choose("a", "42", "X99")  # no word to know it by
+    again = Learnt(tmp_path / "learnt.json")
+    asked = [("a", "Widget 99"), ("a", "Left widget cover"), ("b", "Widget"), ("a", "Gizmo"), ("a", "42")]
+    found = [again.of(entry(folder, name), name) for folder, name in asked]
+    assert [one and one.category for one in found] == ["R25", "M05", None, None, None]
+    assert again.recent == ("X99", "M05", "R25", "E03", "M03", "R27")
+    (tmp_path / "learnt.json").write_text('{"%s": [{"words": 3}], "": 5}' % (tmp_path / "a"))
+    broken = Learnt(tmp_path / "learnt.json")
+    assert (broken.of(entry("a", "Widget"), "Widget"), broken.recent) == (None, ())
+
+
+def test_undo_leaves_what_others_use(tmp_path: Path) -> None:
+    """Items of standard parts, of identities that the files had before, and those that were joined."""
+    silo = FakeSilo()
+    done = []
+    for entry, found in (
+        (BomEntry("", silo_uuid="bolt", standard="ISO 4762 M4x16"), False),
+        (BomEntry("/v/foreign.FCStd", silo_uuid="other"), False),
+        (BomEntry("/v/joined.FCStd"), True),
+        (BomEntry("/v/new.FCStd"), False),
+    ):
+        order = Order.of(Candidate(propose(entry, {"M01": "Machined part"}), ComponentState.READY))
+        item = silo.create_item("kindred-rd", "M01", entry.doc_path)
+        done.append((order, Registration(order.proposal, item.part_number, item.id, found=found)))
+    restored: list[str] = []
+    take_back(
+        done,
+        silo,
+        Journal(tmp_path / "journal"),
+        lambda candidate: restored.append(candidate.entry.doc_path),
+        control=Control(lambda _detail, _fraction: None),
+        back=lambda _order, _error: None,
+    )
+    assert restored == ["/v/new.FCStd", "/v/joined.FCStd"]
+    left = {
+        order.candidate.entry.doc_path
+        for order, result in done
+        if silo.get_item_by_uuid(str(result.item_id)) is not None
+    }
+    assert left == {"", "/v/foreign.FCStd", "/v/joined.FCStd"}

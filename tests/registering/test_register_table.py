@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from silo.bom.errors import InputError
 from silo.bom.model import BomEntry
 from silo.bom.resolve import Proposal
-from silo.registering.offer import Candidate, Contents, Offer, State
-from silo.registering.table import read_table, write_table
+from silo.registering.offer import Candidate, CandidateFiles, ComponentState, Offer
+from silo.registering.orders import read_table, write_table
 
 CATEGORIES = {"M01": "Machined part"}
 
 
 def candidate(name: str = "Bracket") -> Candidate:
     entry = BomEntry("/v/Bracket.FCStd", object_name="Body", label=name, document_label=name)
-    return Candidate(Proposal(entry, name, "part", "M01"), State.READY)
+    return Candidate(Proposal(entry, name, "part", "M01"), ComponentState.READY)
 
 
 @pytest.mark.parametrize(
@@ -134,11 +134,13 @@ def test_the_twin_of_a_file_is_the_first_other_file_with_its_content(files: list
     """Several candidates of one file are no twins; what has no content is like nothing."""
     found = [
         Candidate(
-            Proposal(BomEntry(path, object_name=str(n)), str(n), "part", "M01"), State.READY, sha256=sha
+            Proposal(BomEntry(path, object_name=str(n)), str(n), "part", "M01"),
+            ComponentState.READY,
+            sha256=sha,
         )
         for n, (path, sha) in enumerate(files)
     ]
-    contents = Contents()
+    contents = CandidateFiles()
     for one in found:
         contents.add(one)
     for one in found:

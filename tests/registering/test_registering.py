@@ -15,10 +15,10 @@ from silo.bom.errors import ServerFaultError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.resolve import Categories, Proposal
-from silo.registering.offer import Candidate, Offer, Seen, State, offer
+from silo.registering.offer import Candidate, ComponentState, Offer, OpenedFile, offer
 from silo.testing import FakeSilo
 from silo.workbench.register.flow import EditedRow
-from silo.workbench.session.jobs import Control
+from silo.workbench.session import Control
 
 CONTROL = Control(lambda _detail, _fraction: None)
 
@@ -32,12 +32,16 @@ def part(folder: Path, name: str, content: bytes = b"", *, uuid: str | None = No
 
 
 def offered(
-    silo: FakeSilo, folder: Path, *entries: BomEntry, findings: tuple[Finding, ...] = (), **states: State
+    silo: FakeSilo,
+    folder: Path,
+    *entries: BomEntry,
+    findings: tuple[Finding, ...] = (),
+    **states: ComponentState,
 ) -> dict[str, Candidate]:
     """Candidates by name; the assembly itself has its number already."""
     top = silo.create_item("kindred-rd", "A01", "Top", item_type="assembly")
     head = BomEntry(str(folder / "Top.FCStd"), silo_uuid=top.id, label="Top", is_assembly=True, level=0)
-    seen = {e.doc_path: Seen(states.get(e.label, State.READY)) for e in entries}
+    seen = {e.doc_path: OpenedFile(states.get(e.label, ComponentState.READY)) for e in entries}
     found: Offer = offer(Extraction(head, entries, findings), seen, silo, "kindred-rd", CONTROL)
     return {Path(c.entry.doc_path).stem: c for c in found.candidates}
 
@@ -104,7 +108,7 @@ def test_where_the_server_cannot_be_searched_the_offer_says_so(tmp_path: Path) -
             raise ServerFaultError("the index is broken")
 
     head = part(tmp_path, "Base Part")
-    seen = {head.doc_path: Seen(State.READY)}
+    seen = {head.doc_path: OpenedFile(ComponentState.READY)}
     found = offer(Extraction(head, ()), seen, Deaf(), "kindred-rd", CONTROL)
     assert len(found.candidates) == 1
     assert found.unsearched == "the index is broken"
@@ -128,9 +132,9 @@ def test_states_that_need_a_person_are_not_checked(tmp_path: Path) -> None:
         tmp_path,
         *entries,
         **{
-            "Fixed part": State.READ_ONLY,
-            "Half part": State.PARTIAL,
-            "Open part": State.ELSEWHERE,
+            "Fixed part": ComponentState.READ_ONLY,
+            "Half part": ComponentState.PARTIAL,
+            "Open part": ComponentState.ELSEWHERE,
         },
     )
     assert {name: c.wanted for name, c in found.items()} == {
@@ -186,7 +190,7 @@ def test_a_document_whose_item_has_a_file_of_another_name_is_asked_about(
     item = silo.create_item("kindred-rd", "M01", "Plate")
     silo.upload_file(item.part_number, _file(tmp_path / "Plate.FCStd", b"short"))
     top = part(tmp_path, name, uuid=item.id)
-    seen = {top.doc_path: Seen(State.READY)}
+    seen = {top.doc_path: OpenedFile(ComponentState.READY)}
     found = offer(Extraction(top, ()), seen, silo, "kindred-rd", CONTROL)
     assert [c.same_as for c in found.candidates] == ([item.part_number] if asked else [])
 
@@ -208,19 +212,19 @@ MARK = '<Item key="SiloUUID{}" value="0b5e7a8c-8a53-4b4c-9a56-9f1f3c1c1d11"/>'
 @pytest.mark.parametrize(
     ("meta", "saved", "state"),
     [
-        ("", "2026-11-21T10:00:00Z", State.READY),
-        ("", "2026-11-21T10:00:05Z", State.NEWER),
-        (MARK.format(""), "2026-11-21T10:00:00Z", State.NEWER),
-        (MARK.format("/Body"), "2026-11-21T10:00:00Z", State.NEWER),
-        (MARK.format("/Other"), "2026-11-21T10:00:00Z", State.READY),
+        ("", "2026-11-21T10:00:00Z", ComponentState.READY),
+        ("", "2026-11-21T10:00:05Z", ComponentState.NEWER),
+        (MARK.format(""), "2026-11-21T10:00:00Z", ComponentState.NEWER),
+        (MARK.format("/Body"), "2026-11-21T10:00:00Z", ComponentState.NEWER),
+        (MARK.format("/Other"), "2026-11-21T10:00:00Z", ComponentState.READY),
     ],
 )
 def test_a_file_that_changed_since_it_was_opened_is_not_overwritten(
-    tmp_path: Path, meta: str, saved: str, state: State
+    tmp_path: Path, meta: str, saved: str, state: ComponentState
 ) -> None:
     """Saved by somebody else, or registered from the command line: the open document knows neither."""
     entry = fcstd(tmp_path, "Part", meta, saved)
-    seen = {entry.doc_path: Seen(State.READY, "2026-11-21T10:00:00Z")}
+    seen = {entry.doc_path: OpenedFile(ComponentState.READY, "2026-11-21T10:00:00Z")}
     silo = FakeSilo()
     head = BomEntry(str(tmp_path / "Top.FCStd"), label="Top", is_assembly=True, level=0)
     found = offer(Extraction(head, (entry,)), seen, silo, "kindred-rd", CONTROL)
@@ -241,7 +245,7 @@ def test_a_part_of_another_server_is_not_checked_to_begin_with() -> None:
     entry = BomEntry("/v/bracket.FCStd", object_name="Body", label="Bracket", document_label="Bracket")
     known = replace(entry, silo_uuid="aaaaaaaa-2222-4333-8444-555555555555")
     here, elsewhere = (
-        Candidate(Proposal(one, "Bracket", "part", "M01"), State.READY) for one in (entry, known)
+        Candidate(Proposal(one, "Bracket", "part", "M01"), ComponentState.READY) for one in (entry, known)
     )
     assert (here.foreign, here.wanted, elsewhere.foreign, elsewhere.wanted) == (False, True, True, False)
     assert not replace(elsewhere, same_as="M01-0001").foreign

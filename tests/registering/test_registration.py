@@ -36,8 +36,15 @@ from silo.bom.model import BomEntry
 from silo.bom.resolve import propose
 from silo.fcstd import Library, stamp
 from silo.platform import hold_lock
-from silo.registering.items import REGISTRATION_PROPERTY, Registration, component_key, finished, register
-from silo.registering.journal import RESERVED, Journal
+from silo.registering.items import (
+    REGISTRATION_PROPERTY,
+    RESERVED,
+    Journal,
+    Registration,
+    component_key,
+    finished,
+    register,
+)
 
 ENTRY = BomEntry(doc_path="/v/bracket.FCStd", object_name="Body", document_label="Bracket")
 PROPOSAL = propose(ENTRY, {"A01": "Mechanical assembly", "M01": "Machined parts"})
@@ -569,7 +576,7 @@ def test_if_the_folder_cannot_say_what_is_begun_the_file_does(tmp_path: Path) ->
 
     shared.api.create_item = between  # type: ignore[method-assign]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("silo.registering.journal.replacing", refused)
+        patch.setattr("silo.registering.items.replacing", refused)
         done = shared.register("first")
     assert (done.error, seen) == (None, [done.item_id])
 
@@ -622,7 +629,7 @@ def test_a_copy_gets_an_identity_of_its_own(tmp_path: Path) -> None:
 
 
 def test_an_intent_that_an_earlier_run_began_stays_after_a_refusal(journal: Journal) -> None:
-    """That run's item may be there all the same, under a name that this one's question did not find."""
+    """That run's item may be there anyway, under a name that this one's question did not find."""
     api, files = Items(), Files()
     api.before = UnreachableError("gone")
     register(PROPOSAL, api, journal, files.stamp)

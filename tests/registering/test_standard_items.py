@@ -11,10 +11,9 @@ import pytest
 
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.resolve import Proposal, crowded_files
-from silo.bom.walk.standard import standard_uuid
-from silo.bom_sync import resolve
+from silo.bom.standard import standard_uuid
+from silo.bom_sync import Memory, by_description, find_items, resolve
 from silo.registering.items import register_standard
-from silo.standard_items import Memory, by_description, find_items
 from silo.testing import FakeSilo
 
 SCREW = "ISO 4762 M4×16"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from server_testing import Api, Databases
+from server_testing import Api, Databases, sqlite_database
 from web_visitor import Visitor, visitors_of
 
 from silo_server.db.engine import Database
@@ -20,7 +20,7 @@ KINDS = ["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)]
 
 @pytest.fixture(scope="session")
 def databases(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Databases]:
-    """Empty databases of both kinds."""
+    """Databases of both kinds."""
     made = Databases(tmp_path_factory.mktemp("databases"))
     yield made
     made.close()
@@ -28,8 +28,14 @@ def databases(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Databases]:
 
 @pytest.fixture(params=KINDS)
 def url(request: pytest.FixtureRequest, databases: Databases) -> str:
-    """An empty database, once of each kind."""
+    """A database at the newest schema, once of each kind."""
     return databases.new(str(request.param))
+
+
+@pytest.fixture(params=KINDS)
+def empty_url(request: pytest.FixtureRequest, databases: Databases) -> str:
+    """A database without a schema, once of each kind."""
+    return databases.empty(str(request.param))
 
 
 @pytest.fixture
@@ -45,7 +51,7 @@ def db(url: str, tmp_path: Path) -> Iterator[Database]:
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
     """A server over an empty database."""
     folder = tmp_path_factory.mktemp("pages")
-    with running_server(f"sqlite:///{folder / 'silo.db'}", token=TOKEN) as running:
+    with running_server(sqlite_database(folder / "silo.db"), token=TOKEN) as running:
         yield running
 
 

@@ -17,9 +17,9 @@ from sqlalchemy import text
 
 from silo.bom.errors import ConfigError
 from silo.cli.main import main
+from silo_server import backup
 from silo_server.db.engine import Database
 from silo_server.db.tables import metadata
-from silo_server.operation import backup
 from silo_server.run import running_server
 from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
@@ -37,6 +37,11 @@ def fill(api: Api) -> str:
     api.merge(parent, {child: n + 1 for n, child in enumerate(children[1:])}, sync_id="two")
     api.good("PUT", bom(parent, children[1]), {"quantity": 7, "notes": "by hand"})
     upload(api, parent, b"first")
+    offer = {"supplier": "Bolt", "prices": [{"price": "0.10"}], "currency": "USD"}
+    api.good("PUT", f"/api/items/{children[0]}/suppliers", {"supplier_parts": [offer]})
+    ordered = {"part_number": children[0], "quantity": "2.50", "price": "0.10", "currency": "USD"}
+    api.good("POST", f"/api/items/{parent}/orders", {"parts": [ordered]})
+    api.good("PUT", "/api/rates", {"currency": "EUR", "rates": {"USD": "0.9"}})
     return parent
 
 
@@ -86,9 +91,10 @@ def test_what_was_saved_comes_back_on_either_database(
         send_document(api, parent, b"of two parts")
         backup.back_up(settings, tmp_path / "saved")
         lines, history = api.get(bom(parent)), api.get(bom(parent, "history"))
+        rates = api.get("/api/rates")
         before = tables(url, tmp_path)
     assert backup.verify(tmp_path / "saved").missing_files == []
-    other = databases.new(to)
+    other = databases.empty(to)
     backup.restore(Settings(database_url=other, files_dir=tmp_path / "other"), tmp_path / "saved")
     after = tables(other, tmp_path)
     assert {n: after[n] for n in after if n not in VOLATILE} == {
@@ -100,6 +106,7 @@ def test_what_was_saved_comes_back_on_either_database(
     ):
         assert api.get(bom(parent)) == lines
         assert api.get(bom(parent, "history")) == history
+        assert api.get("/api/rates") == rates
         assert api.call("GET", f"/api/items/{parent}/file").body == b"first"
         assert api.call("GET", f"/api/documents/{BOTH}/file").body == b"of two parts"
         told = api.get(f"/api/documents/{BOTH}")
@@ -144,7 +151,7 @@ def test_a_restore_lets_nobody_in_who_was_sent_away(url: str, databases: Databas
         api.good("PUT", "/api/users/ann", {"active": False})
         backup.restore(settings, tmp_path / "saved", replace=True)
         assert api.as_(None).call("POST", "/api/auth/login", login).status == 401
-    other = Settings(database_url=databases.new("sqlite"), files_dir=tmp_path / "other")
+    other = Settings(database_url=databases.empty("sqlite"), files_dir=tmp_path / "other")
     backup.restore(other, tmp_path / "saved", report=said.append)
     assert any("tokens that were revoked" in line and "as they were before" in line for line in said)
 
@@ -280,7 +287,7 @@ def test_a_damaged_backup_is_refused_before_anything_is_touched(saved: Path, tmp
 def test_what_the_server_lost_is_named_and_the_rest_is_saved(
     db: Database, saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A damaged file in the store: exit code 1 and its hash; the backup can be restored all the same."""
+    """A damaged file in the store: exit code 1 and its hash; the backup can be restored anyway."""
     store = tmp_path / "files"
     file = next(path for path in store.rglob("*") if path.is_file())
     file.write_bytes(b"damaged")
@@ -301,7 +308,7 @@ def test_a_backup_that_fails_leaves_nothing(tmp_path: Path, databases: Databases
     missing = Settings(database_url=f"sqlite:///{tmp_path / 'none.db'}")
     with pytest.raises(ConfigError, match="there is no database"):
         backup.back_up(missing, tmp_path / "saved")
-    foreign = Settings(database_url=databases.new("sqlite"))
+    foreign = Settings(database_url=databases.empty("sqlite"))
     db = Database(foreign)
     with db.engine.begin() as connection:
         connection.execute(text("CREATE TABLE items (id INTEGER)"))

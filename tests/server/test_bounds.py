@@ -15,7 +15,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from server_testing import Api, bom, merge_body
+from server_testing import Api, bom, merge_body, sqlite_database
 from sqlalchemy import event
 
 import silo_server
@@ -24,7 +24,7 @@ from silo.bom.headers import Role
 from silo_server.db.engine import Database, Turnstile, Tx, insert_rows
 from silo_server.db.tables import bom_lines, items
 from silo_server.run import running_server
-from silo_server.services.bom import review, transfer, tree
+from silo_server.services.bom import imports, review, tree
 from silo_server.services.bom.lines import state_columns
 from silo_server.services.bom.merge import merge_bom, read_merge_order, remember_refusal
 from silo_server.services.items import NewItem, archive_item, create_item, get_item
@@ -143,18 +143,18 @@ def test_a_structure_that_would_fill_the_memory_is_not_read(url: str, tmp_path: 
 def test_a_file_that_breaks_off_shows_what_can_be_read_of_it() -> None:
     """A quote too many in one row: the person sees the header, and can say which column is which."""
     data = b'Part number,Quantity\nA,1\n"B" x,2\n'
-    assert transfer.first_lines(data, ",") == [["Part number", "Quantity"], ["A", "1"]]
+    assert imports.first_lines(data, ",") == [["Part number", "Quantity"], ["A", "1"]]
 
 
 def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
     """The header is looked for near the top; what stands at the end of such a file does not matter."""
     rows = b"a;b,c\td\n" * 5000
     with pytest.raises(RejectedError, match="found none"):
-        transfer.read_csv(rows + b'"never closed', 20_000)
+        imports.read_csv(rows + b'"never closed', 20_000)
     with pytest.raises(TooLargeError):
-        transfer.read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
-    late = b"x\n" * (transfer.HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
-    assert transfer.read_csv(late, 20)[0][1]["part_number"] == "A"
+        imports.read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
+    late = b"x\n" * (imports.HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
+    assert imports.read_csv(late, 20)[0][1]["part_number"] == "A"
 
 
 @pytest.mark.parametrize(
@@ -172,12 +172,12 @@ def test_two_columns_of_one_meaning_that_differ_are_refused(
     """Neither is taken in silence; a person's choice of columns is, and so is what says the same twice."""
     data = f"A title\n{header}\n{differ}\n".encode()
     with pytest.raises(RejectedError, match=r"both mean the .* in row 3 they say") as caught:
-        transfer.read_csv(data, 20)
+        imports.read_csv(data, 20)
     assert len(caught.value.problems) == 1
-    layout = transfer.Layout(",", 1, {Role.PART_NUMBER: 0, Role.QUANTITY: 1})
-    assert transfer.read_csv(data, 20, layout)[0][1]["part_number"] == "A"
+    layout = imports.Layout(",", 1, {Role.PART_NUMBER: 0, Role.QUANTITY: 1})
+    assert imports.read_csv(data, 20, layout)[0][1]["part_number"] == "A"
     for row in agree:
-        assert len(transfer.read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1
+        assert len(imports.read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1
 
 
 def test_guesses_that_come_at_once_are_all_counted(url: str, tmp_path: Path) -> None:
@@ -259,7 +259,7 @@ def test_half_a_request_is_not_waited_for_for_ever(
     tmp_path: Path, sent: list[bytes], answered: bytes
 ) -> None:
     """The server hangs up by itself; it says why where there was a request to answer."""
-    url = f"sqlite:///{tmp_path / 'x.db'}"
+    url = sqlite_database(tmp_path / "x.db")
     settings = Settings(database_url=url, request_head_seconds=0.6, request_body_seconds=0.6)
     with running_server(url, token="silo_half", settings=settings) as server:
         parts = urlsplit(server.base_url)

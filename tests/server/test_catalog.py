@@ -8,7 +8,7 @@ import re
 import pytest
 
 from silo.bom.errors import NotFoundError, RejectedError
-from silo_server.schema.catalog import ITEM_TYPES, describe_form, find_schema, schemas
+from silo_server.schema import ITEM_TYPES, describe_form, find_schema, schemas
 
 
 def test_kindred_rd_has_the_known_categories() -> None:

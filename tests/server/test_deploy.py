@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from server_testing import Api, reserved_port, wait_until
+from server_testing import Api, reserved_port, sqlite_database, wait_until
 
 from silo.cli.main import build_parser
 from silo_server.run import RunningServer, running_server
@@ -104,7 +104,7 @@ def nginx(config: str, folder: Path) -> Iterator[None]:
 def test_nginx_passes_pages_and_events_on(tmp_path: Path, sub_path: str) -> None:
     """The file as it is but for TLS, ports, and the sub-path as its comment says."""
     os.chmod(tmp_path, 0o755)
-    settings = Settings(database_url=f"sqlite:///{tmp_path / 'x.db'}", root_path=sub_path)
+    settings = Settings(database_url=sqlite_database(tmp_path / "x.db"), root_path=sub_path)
     with (
         reserved_port() as port,
         running_server(settings.database_url, token=TOKEN, settings=settings) as server,

@@ -5,21 +5,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from server_testing import Api
-from sqlalchemy.exc import DataError, IntegrityError, OperationalError
+from server_testing import Api, sqlite_database
+from sqlalchemy import event
+from sqlalchemy.exc import DataError, DisconnectionError, IntegrityError, OperationalError
 
 from silo_server.db.engine import Database
 from silo_server.run import RunningServer, create_app, prepare, running_server
-from silo_server.services.access.accounts import Role, list_users
+from silo_server.services.access import Role, list_users
 from silo_server.settings import Settings
 
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[RunningServer]:
     """A server over a database of its own."""
-    with running_server(f"sqlite:///{tmp_path / 'x.db'}", token="silo_failures") as running:
+    with running_server(sqlite_database(tmp_path / "x.db"), token="silo_failures") as running:
         yield running
 
 
@@ -66,21 +68,27 @@ def test_the_log_names_the_request_and_what_the_database_said(
     assert "secret" not in caplog.text
 
 
+def connect_again(*_connection: Any) -> None:
+    """Have the pool close the connection that it gives out, and make a new one."""
+    raise DisconnectionError
+
+
 def test_a_database_that_is_away_is_503_and_not_ready(tmp_path: Path) -> None:
     """``/health`` still answers, ``/ready`` says no, requests may be sent again later."""
     path = tmp_path / "x.db"
-    with running_server(f"sqlite:///{path}", token="silo_failures") as running:
+    with running_server(sqlite_database(path), token="silo_failures") as running:
         server = running.app.state.server
         with Api(running.base_url, "silo_failures") as api:
             api.item("BEFORE")
-            server.db.engine.dispose()
             away = path.rename(tmp_path / "away.db")
             path.mkdir()  # where the file was is now something that is no database
+            event.listen(server.db.engine, "checkout", connect_again)
             try:
                 assert api.bad(503, "GET", "/api/items/BEFORE")["error"] == "busy"
                 assert api.call("GET", "/ready").status == 503
                 assert api.get("/health")["mode"] == "degraded"
             finally:
+                event.remove(server.db.engine, "checkout", connect_again)
                 path.rmdir()
                 away.rename(path)
             assert api.get("/api/items/BEFORE")["part_number"] == "BEFORE"
@@ -92,7 +100,9 @@ def test_a_store_that_cannot_be_written_is_degraded(tmp_path: Path) -> None:
     blocked = tmp_path / "blocked"
     blocked.write_text("a file where the folder should be")
     with (
-        running_server(f"sqlite:///{tmp_path / 'x.db'}", token="silo_failures", files_dir=blocked) as running,
+        running_server(
+            sqlite_database(tmp_path / "x.db"), token="silo_failures", files_dir=blocked
+        ) as running,
         Api(running.base_url, None) as api,
     ):
         answer = api.call("GET", "/ready")

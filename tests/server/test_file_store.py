@@ -60,12 +60,17 @@ def test_an_upload_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
     assert [path for path in store.root.rglob("*") if path.is_file()] == []
 
 
+# As FreeCAD saves it if no 3D view is open.
+ICON = PNG + b"\0\0\0\x0dIHDR" + b"\0\0\0\x40" * 2
+
+
 def test_thumbnails_are_taken_with_care(tmp_path: Path) -> None:
-    """A PNG of sane size, or nothing: bombs, other types and broken zips are no pictures."""
+    """A PNG of sane size, or nothing: bombs, other types, broken zips and FreeCAD's icon are no pictures."""
     path = tmp_path / "f"
     for content, expected in (
         (fcstd(PNG + b"ok"), PNG + b"ok"),
         (fcstd(b"<svg/>"), None),
+        (fcstd(ICON), None),
         (fcstd(PNG + b"\0" * (MAX_THUMBNAIL + 1)), None),
         (fcstd(PNG)[:-30], None),
         (b"no zip", None),

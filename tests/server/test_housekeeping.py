@@ -15,13 +15,13 @@ from typing import Any
 
 import pytest
 from large_boms import fcstd_with_picture, form_file
-from server_testing import Api, bom, wait_until
+from server_testing import Api, bom, run_alone, sqlite_database, wait_until
 from sqlalchemy import func, select, text
 
+from silo_server.backup import back_up
 from silo_server.db.engine import Database
 from silo_server.db.tables import answers, audit, bom_changes, events, sessions
-from silo_server.operation.backup import back_up
-from silo_server.operation.housekeeping import keep_tidy, last_run, tidy
+from silo_server.housekeeping import keep_tidy, last_run, tidy
 from silo_server.run import prepare, running_server
 from silo_server.services.revisions import FileStore
 from silo_server.services.search import rebuild_index
@@ -69,7 +69,7 @@ def test_an_error_is_logged_at_once_and_the_next_run_comes(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Not when the server stops, and not by ending the loop; the run that failed is shown as such."""
-    url = f"sqlite:///{tmp_path / 'silo.db'}"
+    url = sqlite_database(tmp_path / "silo.db")
     now = datetime.now(UTC)
 
     def clock() -> datetime:
@@ -85,7 +85,7 @@ def test_an_error_is_logged_at_once_and_the_next_run_comes(
         store = Odd(tmp_path / "files", lambda: loop.call_soon_threadsafe(ending.set))
         await asyncio.wait_for(keep_tidy(db, store, ending), 60)
 
-    asyncio.run(work())
+    run_alone(work())
     assert [text in caplog.text for text in ("odd 1", "odd 2")] == [True, True]
     with db.read() as tx:
         run = last_run(tx)

@@ -10,26 +10,25 @@ from uuid import uuid4
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, MetaData, Table, inspect, select, text
 
 from silo.bom.errors import ConfigError
 from silo.cli.main import main
+from silo_server import backup
 from silo_server.db.engine import Database
-from silo_server.db.migrate import alembic_config, upgrade
+from silo_server.db.migrate import STEPS, upgrade
 from silo_server.db.tables import metadata
-from silo_server.operation import backup
 from silo_server.run import prepare
 from silo_server.settings import Settings
 
 FIRST = "0007"
-REVISIONS = [one.revision for one in ScriptDirectory.from_config(alembic_config()).walk_revisions()][::-1]
+REVISIONS = list(STEPS)
 
 
 @pytest.fixture
-def first(url: str, tmp_path: Path) -> Any:
+def first(empty_url: str, tmp_path: Path) -> Any:
     """A database of the first schema, with a row in each table."""
-    db = Database(Settings(database_url=url, files_dir=tmp_path))
+    db = Database(Settings(database_url=empty_url, files_dir=tmp_path))
     upgrade(db, FIRST)
     with db.write() as tx:
         fill(tx.conn)
@@ -72,9 +71,9 @@ def _row(table: Table) -> dict[str, object]:
     return {**row, **own.get(table.name, {})}
 
 
-def test_the_migrations_make_the_tables(url: str) -> None:
+def test_the_migrations_make_the_tables(empty_url: str) -> None:
     """What the migrations build and what the code expects do not differ in anything."""
-    db = Database(Settings(database_url=url))
+    db = Database(Settings(database_url=empty_url))
     upgrade(db)
     differences, tables = _differences(db)
     db.close()

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from openpyxl import load_workbook
 from server_testing import Api, bom, merge_body
 from web_visitor import Visitor
 
@@ -77,17 +78,22 @@ def test_what_is_open_below_is_in_every_view(
     for view in ("flat", "flat print"):
         assert not of_part or f"⚠ {of_part}</span>" in pages[view]
     flat = api.get(bom(top, "flat"))
-    assert {**flat["open"], **flat["incomplete"]} == {sub: of_bom}
+    kept = api.get(bom(top, "summary"))
+    for told in (flat, kept):
+        assert {**told["open"], **told["incomplete"]} == {sub: of_bom}
     assert api.get(bom(top, "review"))["below"] == {sub: of_bom}
     (row,) = (row for row in flat["flat_bom"] if row["part_number"] == part)
     gone = row["total_quantity"] if state == "gone" else None
     assert (row.get("unreferenced_quantity"), row.get("in_conflict")) == (gone, state == "disputed" or None)
+    for view in ("single", "indented", "flat"):
+        book = load_workbook(io.BytesIO(api.call("GET", bom(top, f"export.xlsx?view={view}")).body))
+        assert f"{sub} {of_bom}" in str(book.active["A1"].value)
+        assert f"{sub} {of_bom}" in api.call("GET", bom(top, f"export.csv?view={view}")).body.decode()
     for view, words in (("indented", of_line), ("flat", of_part)):
         made = api.get(bom(top, f"export.json?view={view}"))
         assert any(f"{sub} {of_bom}" in note for note in made["notes"])
         (line,) = (one for one in made["lines"] if one["part_number"] == part)
         assert (line["open"] or "") == words
-        assert f"{sub} {of_bom}" in api.call("GET", bom(top, f"export.csv?view={view}")).body.decode()
 
 
 def test_a_part_that_cad_has_in_one_place_and_no_more_in_another(api: Api) -> None:

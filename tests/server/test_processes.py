@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from server_testing import Api, Databases, ServerProcess, wait_until
+from server_testing import Api, Databases, ServerProcess, sqlite_database, wait_until
 
 from silo.bom.errors import ConfigError
 from silo.cli.main import main
@@ -37,7 +37,7 @@ def test_notify_carries_events_to_the_other_server(databases: Databases, tmp_pat
 
 
 def test_the_poll_carries_events_where_nobody_tells(url: str, tmp_path: Path) -> None:
-    """Another process over the same file, or a lost notification: the log is looked at all the same."""
+    """Another process over the same file, or a lost notification: the log is looked at anyway."""
     settings = Settings(database_url=url, poll_seconds=0.05)
     with (
         running_server(url, token=TOKEN, files_dir=tmp_path, settings=settings) as one,
@@ -97,7 +97,7 @@ def test_worker_processes_share_a_socket_and_events_cross(databases: Databases, 
 @pytest.mark.slow
 def test_workers_end_with_their_parent(tmp_path: Path) -> None:
     """A parent that was killed leaves no workers behind that serve on."""
-    server = ServerProcess(f"sqlite:///{tmp_path / 'x.db'}", tmp_path, TOKEN, workers=2)
+    server = ServerProcess(sqlite_database(tmp_path / "x.db"), tmp_path, TOKEN, workers=2)
     with Api(server.base_url, TOKEN) as api:
         api.item()
         server.kill()
@@ -119,7 +119,7 @@ def test_a_server_ends_when_it_is_asked_to_though_somebody_listens(
 ) -> None:
     """SIGTERM or Ctrl-C with open event streams: they are ended, the exit is clean."""
     with (
-        ServerProcess(f"sqlite:///{tmp_path / 'x.db'}", tmp_path, TOKEN) as server,
+        ServerProcess(sqlite_database(tmp_path / "x.db"), tmp_path, TOKEN) as server,
         Api(server.base_url, TOKEN) as api,
         api.events() as events,
     ):
@@ -131,9 +131,9 @@ def test_a_server_ends_when_it_is_asked_to_though_somebody_listens(
     assert code in ((0, -signal.SIGTERM) if by == signal.SIGTERM else (0,))
 
 
-def test_two_servers_may_start_at_once(url: str, tmp_path: Path) -> None:
+def test_two_servers_may_start_at_once(empty_url: str, tmp_path: Path) -> None:
     """Both bring the new database up to date; one waits for the other."""
-    servers = [ServerProcess(url, tmp_path, TOKEN) for _ in range(2)]
+    servers = [ServerProcess(empty_url, tmp_path, TOKEN) for _ in range(2)]
     try:
         for server in servers:
             with Api(server.base_url, TOKEN) as api:

@@ -15,7 +15,7 @@ from server_testing import Api, Databases, bom, form_body
 from web_visitor import Visitor, visitors_of
 
 from silo.bom.errors import ConfigError
-from silo_server.operation import backup
+from silo_server import backup
 from silo_server.run import running_server
 from silo_server.services import releases
 from silo_server.settings import Settings
@@ -122,7 +122,7 @@ def test_a_release_is_the_same_after_a_backup_into_either_database(
         release(api, top)
         before = as_frozen(api, top)
         backup.back_up(settings, tmp_path / "saved")
-    other = Settings(database_url=databases.new(to), files_dir=tmp_path / "other")
+    other = Settings(database_url=databases.empty(to), files_dir=tmp_path / "other")
     backup.restore(other, tmp_path / "saved")
     with (
         running_server(other.database_url, token=TOKEN, settings=other) as server,
@@ -207,7 +207,7 @@ def test_the_pages_of_a_release(url: str, tmp_path: Path) -> None:
         assert viewer.post(f"{path}/A/end", status="withdrawn").status == 403
         assert editor.post(f"{path}/A/end", status="gone").status == 400
         api.good("PUT", "/api/users/viewer", {"approver": True})
-        assert "Release it all the same" in page_of(viewer, path)
+        assert "Release it anyway" in page_of(viewer, path)
         assert viewer.post(f"{path}/A/approval", override="a trial").status == 303
         assert "revision <bdi>A</bdi> released" in page_of(viewer, f"/items/{top}")
         api.merge(items[1], {items[3]: 5})

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
-from server_testing import Api, Databases, ServerProcess, form_body, wait_until
+from server_testing import Api, Databases, ServerProcess, form_body, sqlite_database, wait_until
 
 from silo.bom.errors import ConfigError
 from silo_server.run import RunningServer, running_server
@@ -26,7 +26,7 @@ TOKEN = "silo_requests_0123456789abcdef"
 def settings(tmp_path: Path) -> Settings:
     """A server below a sub-path, with a log of its requests."""
     return Settings(
-        database_url=f"sqlite:///{tmp_path / 'x.db'}",
+        database_url=sqlite_database(tmp_path / "x.db"),
         request_log=True,
         root_path="/plm/silo",
         trusted_proxies="127.0.0.1",

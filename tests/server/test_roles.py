@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
-from server_testing import Api
+from server_testing import Api, sqlite_database
 
 from silo_server.run import create_app, routers, running_server
 from silo_server.settings import Settings
@@ -56,12 +56,29 @@ TABLE: dict[tuple[str, str], str] = {
     ("GET", "/api/items/{part_number}"): VIEWER,
     ("PUT", "/api/items/{part_number}"): EDITOR,
     ("PATCH", "/api/items/{part_number}/properties"): EDITOR,
+    ("GET", "/api/items/{part_number}/suppliers"): VIEWER,
+    ("PUT", "/api/items/{part_number}/suppliers"): EDITOR,
+    ("POST", "/api/suppliers/import"): EDITOR,
+    ("GET", "/api/items/{part_number}/order"): VIEWER,
+    ("GET", "/api/items/{part_number}/order.csv"): VIEWER,
+    ("GET", "/api/items/{part_number}/order.xlsx"): VIEWER,
+    ("GET", "/api/items/{part_number}/orders"): VIEWER,
+    ("POST", "/api/items/{part_number}/orders"): EDITOR,
+    ("POST", "/api/items/{part_number}/orders/{order_id}/take-back"): EDITOR,
+    ("GET", "/api/rates"): VIEWER,
+    ("PUT", "/api/rates"): ADMIN,
     ("GET", "/api/items/{part_number}/releases"): VIEWER,
     ("POST", "/api/items/{part_number}/releases"): EDITOR,
     ("GET", "/api/items/{part_number}/releases/{label}"): VIEWER,
     # These two need the right to approve, or an editor who withdraws (tests/contract/test_releases.py).
     ("POST", "/api/items/{part_number}/releases/{label}/approval"): VIEWER,
     ("POST", "/api/items/{part_number}/releases/{label}/end"): VIEWER,
+    ("POST", "/api/models/missing"): VIEWER,  # a look-up with a long list
+    ("PUT", "/api/models/{sha256}/geometry"): EDITOR,
+    ("PUT", "/api/models/{sha256}/structure"): EDITOR,
+    ("GET", "/api/models/{sha256}/geometry"): VIEWER,
+    ("GET", "/api/models/{sha256}/structure"): VIEWER,
+    ("GET", "/api/items/{part_number}/scene"): VIEWER,
     ("DELETE", "/api/items/{part_number}"): EDITOR,
     ("POST", "/api/items/{part_number}/unarchive"): EDITOR,
     ("POST", "/api/generate-part-number"): EDITOR,
@@ -143,7 +160,7 @@ def callers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Api]
     """A caller per role, and one without a token ("nobody")."""
     folder = tmp_path_factory.mktemp("roles")
     with (
-        running_server(f"sqlite:///{folder / 'roles.db'}", token="silo_roles") as server,
+        running_server(sqlite_database(folder / "roles.db"), token="silo_roles") as server,
         Api(server.base_url, "silo_roles") as api,
     ):
         made = {"nobody": api.as_(None), ADMIN: api}
@@ -157,7 +174,7 @@ def callers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Api]
 
 def token_by_session(server: object, api: Api, cookie: str) -> str:
     """A token of the user whose session this is, made with the session's CSRF secret."""
-    from silo_server.services.access.logins import actor_by_session
+    from silo_server.services.access import actor_by_session
 
     db = server.app.state.server.db  # type: ignore[attr-defined]
     actor = actor_by_session(db, cookie.partition("=")[2], "")

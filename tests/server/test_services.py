@@ -19,16 +19,18 @@ from silo.bom.errors import AuthError, ConflictError, RejectedError
 from silo.bom.headers import plain_cell, safe_cell
 from silo_server.db.engine import Database, insert_rows, one_of, update_rows
 from silo_server.db.tables import answers, items, users
-from silo_server.services.access.accounts import create_user
-from silo_server.services.access.credentials import (
+from silo_server.services.access import (
     Token,
+    actor_by_session,
     actor_by_token,
+    create_login_link,
     create_own_token,
     create_token,
+    create_user,
     revoke_token,
     secret_of_form,
+    use_login_link,
 )
-from silo_server.services.access.logins import actor_by_session, create_login_link, use_login_link
 from silo_server.services.bom.lines import state_to_json, stored_state
 from silo_server.services.bom.merge import quantity_problem, read_merge_order
 from silo_server.services.bom.review import check_state, edited_state

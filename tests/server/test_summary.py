@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What is kept of a product is what is counted anew, whatever two people do to what is in it."""
+"""What is kept of a product is what is counted again, whatever two people do to what is in it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hunting import examples
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from server_testing import Databases, merge_body
@@ -171,7 +172,9 @@ def check_by_rows(tx: Tx, item: Any, told: Summary) -> None:
         assert {c: float(v) for c, v in told.worth.costs.items()} == pytest.approx(dict(cost.totals))
 
 
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=examples(3), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(seed_of=st.integers(0, 2**32))
 def test_what_is_kept_is_what_is_counted_anew(prepared: Database, seed_of: int) -> None:
     """Random changes of two people, looks at random products between them, keeping at any moment."""

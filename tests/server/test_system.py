@@ -9,10 +9,10 @@ from pathlib import Path
 from urllib.parse import quote, urlsplit
 
 import pytest
-from server_testing import Api, ServerProcess, bom
+from server_testing import Api, ServerProcess, bom, sqlite_database
 from web_visitor import Visitor
 
-from silo_server.operation.backup import back_up
+from silo_server.backup import back_up
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
 
@@ -54,7 +54,7 @@ def test_the_page_is_for_administrators(visitors: dict[str, Visitor]) -> None:
 def test_a_server_ends_though_an_upload_is_half_done(tmp_path: Path) -> None:
     """The half is dropped; the server does not wait for the rest, as it would for ten seconds."""
     with (
-        ServerProcess(f"sqlite:///{tmp_path / 'x.db'}", tmp_path, TOKEN) as server,
+        ServerProcess(sqlite_database(tmp_path / "x.db"), tmp_path, TOKEN) as server,
         Api(server.base_url, TOKEN) as api,
     ):
         number = api.item()

@@ -11,20 +11,20 @@ import signal
 import socket
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import psycopg
 import pytest
-from server_testing import Api, Databases, bom, wait_until
+from server_testing import Api, Databases, bom, run_alone, wait_until
 from sqlalchemy import make_url
 
 from silo.bom.errors import RejectedError
-from silo_server.background import Later, Probe
-from silo_server.db.engine import WRITERS_WAITING, Database
+from silo_server.db.engine import WRITERS_WAITING, Database, Tx
+from silo_server.housekeeping import Later, Probe
 from silo_server.run import running_server
-from silo_server.services.access import credentials
+from silo_server.services import access
 from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
 
@@ -103,22 +103,69 @@ def test_many_may_ask_for_the_health_at_once(db: Database, tmp_path: Path) -> No
     async def ask_together() -> None:
         await asyncio.gather(*(ask() for _ in range(8)))
 
-    asyncio.run(ask_together())
+    run_alone(ask_together())
     probe.stop()
 
 
 def test_the_last_use_of_a_token_is_noted_when_it_can_be(db: Database) -> None:
     """Reading with a token needs no write; what could not be noted is noted later."""
     with db.read() as tx:
-        token = credentials.list_tokens(tx)[0]
-    assert credentials.actor_by_token(db, "silo_test", "") is not None
+        token = access.list_tokens(tx)[0]
+    assert access.actor_by_token(db, "silo_test", "") is not None
     assert list(db.token_uses) == [token.id]
     with db.read() as tx:
-        assert credentials.list_tokens(tx)[0].last_used_at is None
-    credentials.note_token_uses(db)
+        assert access.list_tokens(tx)[0].last_used_at is None
+    access.note_token_uses(db)
     assert db.token_uses == {}
     with db.read() as tx:
-        assert credentials.list_tokens(tx)[0].last_used_at is not None
+        assert access.list_tokens(tx)[0].last_used_at is not None
+
+
+class Meanwhile(Database):
+    """Something happens while a change is written down."""
+
+    then: Callable[[], object]
+
+    @contextlib.contextmanager
+    def write(self, *more: Any, **named: Any) -> Iterator[Tx]:
+        with super().write(*more, **named) as tx:
+            yield tx
+            self.then()
+
+
+def test_a_use_that_comes_while_others_are_written_down_is_noted_next(db: Database) -> None:
+    """It is not taken for one of them."""
+    busy = Meanwhile(db.settings)
+    busy.token_uses[1] = "2026-01-01"
+    busy.then = lambda: busy.token_uses.update({1: "2026-01-02"})
+    for left, noted in (({1: "2026-01-02"}, "2026-01-01"), ({}, "2026-01-02")):
+        access.note_token_uses(busy)
+        with busy.read() as tx:
+            assert (access.list_tokens(tx)[0].last_used_at, busy.token_uses) == (noted, left)
+    busy.close()
+
+
+def test_what_no_request_waits_for_is_tried_again_after_any_error(
+    db: Database, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its thread lives on, also after an error that nobody thought of."""
+    monkeypatch.setattr("silo_server.housekeeping.LATER_SECONDS", 0.0)
+    busy = Meanwhile(db.settings)
+    tried: list[int] = []
+
+    def fail() -> None:
+        tried.append(1)
+        raise ZeroDivisionError
+
+    busy.then = fail
+    busy.token_uses[1] = "2026-01-01"
+    later = Later(busy)
+    later.start()
+    wait_until(lambda: len(tried) > 1, "another try")
+    later.stop()
+    later._thread.join(60)
+    assert "cannot be kept" in caplog.text
+    busy.close()
 
 
 def test_a_server_that_stops_does_not_wait_for_a_write_that_hangs(tmp_path: Path) -> None:
@@ -248,7 +295,10 @@ def put_back(url: str, saved: Path, *, save: bool) -> None:
     if url.startswith("sqlite"):
         path = url.removeprefix("sqlite:///")
         source, target = (path, saved) if save else (saved, path)
-        with sqlite3.connect(source) as old, sqlite3.connect(target) as new:
+        with (
+            contextlib.closing(sqlite3.connect(source)) as old,
+            contextlib.closing(sqlite3.connect(target)) as new,
+        ):
             old.backup(new)
         return
     plain = make_url(url).set(drivername="postgresql").render_as_string(hide_password=False)

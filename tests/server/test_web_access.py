@@ -13,13 +13,13 @@ from urllib.parse import unquote, urlencode
 
 import pytest
 from fastapi.routing import APIRoute
-from server_testing import Api
+from server_testing import Api, sqlite_database
 from starlette.datastructures import FormData
 from web_visitor import FORM, HTML, ROLES, Visitor, enter, link_of
 
 from silo_server.run import running_server
 from silo_server.settings import Settings
-from silo_server.web.forms import Kept, kept_form, unpacked
+from silo_server.web.forms import UnsentForm, kept_form, unpacked
 from silo_server.web.pages import ROUTERS
 
 TOKEN = "silo_pages"
@@ -29,6 +29,7 @@ PUBLIC = "public"
 TABLE = {
     ("GET", "/login"): PUBLIC,
     ("POST", "/login"): PUBLIC,
+    ("POST", "/language"): PUBLIC,
     ("GET", "/login/link/{secret}"): PUBLIC,
     ("POST", "/login/link/{secret}"): PUBLIC,
     ("GET", "/login/program"): VIEWER,
@@ -41,6 +42,10 @@ TABLE = {
     ("GET", "/items/{part_number}/print"): VIEWER,
     ("POST", "/waiting/decide"): EDITOR,
     ("POST", "/waiting/undo"): EDITOR,
+    ("POST", "/waiting/assign"): EDITOR,
+    ("GET", "/mine"): VIEWER,
+    ("POST", "/mine/follow"): VIEWER,
+    ("POST", "/mine/seen"): VIEWER,
     ("GET", "/items/new"): EDITOR,
     ("POST", "/items/new"): EDITOR,
     ("GET", "/items/{part_number}/edit"): EDITOR,
@@ -74,6 +79,16 @@ TABLE = {
     ("GET", "/system"): ADMIN,
     ("GET", "/items/{part_number}/changes"): VIEWER,
     ("GET", "/documents/{uuid}"): VIEWER,
+    ("GET", "/items/{part_number}/suppliers"): VIEWER,
+    ("POST", "/items/{part_number}/suppliers"): EDITOR,
+    ("POST", "/items/{part_number}/suppliers/undo"): EDITOR,
+    ("GET", "/items/{part_number}/order"): VIEWER,
+    ("POST", "/items/{part_number}/order"): EDITOR,
+    ("POST", "/items/{part_number}/order/{order_id}/take-back"): EDITOR,
+    ("GET", "/suppliers"): VIEWER,
+    ("POST", "/suppliers/check"): EDITOR,
+    ("POST", "/suppliers/import"): EDITOR,
+    ("POST", "/suppliers/rates"): ADMIN,
     ("GET", "/items/{part_number}/releases"): VIEWER,
     ("POST", "/items/{part_number}/releases"): EDITOR,
     ("GET", "/items/{part_number}/releases/{label}"): VIEWER,
@@ -92,7 +107,7 @@ def fill(path: str) -> str:
 @pytest.fixture(scope="module")
 def closed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visitor]:
     """An admin at a server that was started read-only."""
-    url = f"sqlite:///{tmp_path_factory.mktemp('closed') / 'silo.db'}"
+    url = sqlite_database(tmp_path_factory.mktemp("closed") / "silo.db")
     settings = Settings(database_url=url, read_only=True)
     with running_server(url, token=TOKEN, settings=settings) as running, Api(running.base_url, TOKEN) as api:
         yield enter(api, ADMIN)
@@ -169,6 +184,33 @@ def test_a_login_form_from_another_site_is_refused(api: Api) -> None:
         "POST", "/login", body=body, headers={**FORM, **HTML, "Sec-Fetch-Site": "same-origin"}
     )
     assert answer.status == 401
+
+
+def test_a_page_speaks_the_language_of_its_reader(api: Api) -> None:
+    """By the browser, then by the choice; what the API says stays English."""
+    nobody = api.as_(None)
+
+    def title(path: str = "/login", **headers: str) -> tuple[str, str]:
+        answer = nobody.call("GET", path, headers={**HTML, **headers})
+        text = answer.body.decode()
+        assert answer.headers["content-language"] in text.partition("<head>")[0]
+        assert {"accept-language", "cookie"} <= set(answer.headers["vary"].lower().split(", "))
+        return answer.headers["content-language"], text.partition("<h1>")[2].partition("<")[0]
+
+    german = {"Accept-Language": "de-CH, en;q=0.5"}
+    assert title() == ("en", "Log in")
+    assert title(**german) == ("de", "Anmelden")
+    body = urlencode({"language": "en", "next": "/login?next=/items"}).encode()
+    chosen = nobody.call("POST", "/language", body=body, headers={**FORM, **HTML, **german})
+    assert (chosen.status, chosen.headers["location"]) == (303, "/login?next=/items")
+    cookie = chosen.headers["set-cookie"].partition(";")[0]
+    assert title(**german, Cookie=cookie) == ("en", "Log in")
+    for wrong in (b"language=", b"language=../../de", b""):
+        assert nobody.call("POST", "/language", body=wrong, headers={**FORM, **HTML}).status == 400
+    elsewhere = {**FORM, **HTML, "Sec-Fetch-Site": "cross-site"}
+    assert nobody.call("POST", "/language", body=body, headers=elsewhere).status == 403
+    plain = nobody.call("GET", "/api/items/nothing", headers=german)
+    assert plain.body == nobody.call("GET", "/api/items/nothing").body
 
 
 @pytest.mark.usefixtures("visitors")
@@ -301,7 +343,7 @@ def test_a_new_secret_is_shown_once(visitors: dict[str, Visitor]) -> None:
 def test_a_kept_form_leads_nowhere_else() -> None:
     """Its address is one of this server."""
     for path in ("https://elsewhere", "//elsewhere", "/\\elsewhere", "javascript:alert(1)"):
-        kept = unpacked(Kept(path, [("a", "b")]).packed)
+        kept = unpacked(UnsentForm(path, [("a", "b")]).packed)
         assert kept is not None
         assert kept.path == "/"
 

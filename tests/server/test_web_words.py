@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -17,12 +18,14 @@ from silo_server.web.render import (
     bdi,
     closed,
     isolate,
+    language_for,
     mass,
     money,
     quantity,
     segment,
     sentence,
     size,
+    translated,
     when,
 )
 
@@ -188,3 +191,62 @@ def test_numbers_in_texts_sort_as_numbers(names: list[str]) -> None:
     assert arranged(names[::-1], "name", keys) == names
     known = [name for name in names if name]
     assert arranged(names, "-name", keys) == [*known[::-1], *names[len(known) :]]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "accepted", "language"),
+    [
+        ("", "", "en"),
+        ("", "de", "de"),
+        ("", "de-AT,de;q=0.9,en;q=0.5", "de"),
+        ("", "en-US,en;q=0.9,de;q=0.8", "en"),
+        ("", "fr, de;q=0.2, en;q=0.4", "en"),
+        ("", "fr,de;q=0", "en"),
+        ("", "de;q=x,en;q=2,;,", "en"),
+        ("en", "de", "en"),
+        ("de", "en", "de"),
+        ("tlh", "de", "de"),
+    ],
+)
+def test_the_language_of_a_page(chosen: str, accepted: str, language: str) -> None:
+    """What a person chose, else what the browser asks for, by its weights."""
+    assert language_for(chosen, accepted) == language
+
+
+@pytest.mark.parametrize(
+    ("template", "texts", "german"),
+    [
+        ("<h1>Users</h1>", ["Users"], "<h1>USERS</h1>"),
+        (
+            "<p>\n  Suppliers of <b>{{ item.number | bdi }}</b>, as\n of {{ now }}.</p>",
+            ["Suppliers of <b>%(number)s</b>, as of %(now)s."],
+            "<p>\n  SUPPLIERS OF <b>{{ item.number | bdi }}</b>, AS OF {{ now }}.</p>",
+        ),
+        (
+            '<a href="/items">Items</a> › <a href="{{ path }}">{{ number }}</a> › BOM',
+            ["Items", "BOM"],
+            '<a href="/items">ITEMS</a> › <a href="{{ path }}">{{ number }}</a> › BOM',
+        ),
+        (
+            '<b title="For {{ a["}}"] }}">{% if a > "%}" %}One <a href="{{ x }}">two</a>{% endif %}</b>',
+            ["For %(a)s", "One %(link)stwo</a>"],
+            '<b title="FOR {{ a["}}"] }}">{% if a > "%}" %}ONE <a href="{{ x }}">TWO</a>{% endif %}</b>',
+        ),
+        ('{{ secret(csrf) }}<input value="No text"{% if a %} disabled{% endif %}>{# no text #}', [], None),
+        ("<code>no text</code> {{ number }} · × 12", [], None),
+        ('<span aria-hidden="true">⚠</span> Open', ["Open"], '<span aria-hidden="true">⚠</span> OPEN'),
+    ],
+)
+def test_a_template_is_translated_by_its_sentences(
+    template: str, texts: list[str], german: str | None
+) -> None:
+    """Placeholders hold expressions and tags; the rest of the template stays as it is."""
+    seen: list[str] = []
+
+    def shout(text: str) -> str:
+        seen.append(text)
+        return re.sub(r"(%\(\w+\)s|<[^>]*>)|([^%<]+)", lambda part: part[1] or part[2].upper(), text)
+
+    assert translated(template, shout) == (template if german is None else german)
+    assert sorted(seen) == sorted(texts)
+    assert translated(template, lambda text: text).split() == template.split()

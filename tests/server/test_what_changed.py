@@ -15,9 +15,9 @@ from server_testing import Api, bom
 from web_visitor import Visitor
 
 from silo_server.db.engine import Database
-from silo_server.db.tables import product_looks
+from silo_server.db.tables import bom_change_lines, bom_changes, product_looks
 from silo_server.run import RunningServer
-from silo_server.services.bom.summary import SAME_LOOK, keep_looks, last_look
+from silo_server.services.bom.review import SAME_LOOK, keep_looks, last_look
 from silo_server.services.items import NewItem, create_item
 from silo_server.settings import stamp
 
@@ -92,8 +92,55 @@ def test_revisions_are_moments_and_what_is_none_is_refused(api: Api, product: tu
         api.merge(sub, {part: 2 + n, other: 1})
     assert ("quantity", sub, part, "2", "3") in changes(api, top, "r1", "r2")
     assert ("quantity", sub, part, "2", "4") in changes(api, top, "r1")
-    for wrong, status in (("r9", 404), ("yesterday", 400), ("2026-13-01", 400), ("2026-02-08T10:00", 400)):
+    for wrong, status in (("r9", 404), ("yesterday", 404), ("2026-13-01", 400), ("2026-02-08T10:00", 400)):
         assert api.call("GET", bom(top, f"changes?from={wrong}")).status == status
+
+
+def test_frozen_revisions_are_compared_as_they_are(
+    api: Api, product: tuple[str, ...], server: RunningServer, visitors: dict[str, Visitor]
+) -> None:
+    """Two of them, or one and now, whatever is kept of the history between; either way round."""
+    top, sub, part, other, new, _ = product
+
+    def freeze(label: str) -> None:
+        api.good("POST", f"/api/items/{top}/releases", {"label": label})
+        api.good("POST", f"/api/items/{top}/releases/{label}/approval", {"override": "a trial"})
+
+    api.good("PUT", "/api/users/admin", {"approver": True})
+    freeze("A")
+    api.merge(sub, {part: 3, new: 4, other: 1})
+    api.good("PUT", bom(sub, part), {"notes": "glued"})
+    api.good("PATCH", f"/api/items/{part}/properties", {"mass_kg": 2})
+    api.good("PUT", f"/api/items/{other}", {"name": "Another name"})
+    body, headers = form_file("part.FCStd", b"one")
+    assert api.call("POST", f"/api/items/{part}/file", body=body, headers=headers).status == 201
+    expected = {
+        ("line", sub, part, "notes: –", "notes: glued"),
+        ("added", sub, new, "", "4"),
+        ("data", "", part, "mass_kg: –", "mass_kg: 2"),
+        ("data", "", top, "mass in all [kg]: –", "mass in all [kg]: 6"),
+        ("file", "", part, "", "part.FCStd, revision 2"),
+    }
+    assert expected <= set(changes(api, top, "A"))
+    freeze("B")
+    told = changes(api, top, "A", "B")
+    assert expected <= set(told)
+    assert [row[4] for row in told if row[2] == other] == ["name: Another name"]
+    assert changes(api, top, "B", "A") == told
+    assert changes(api, top, "A", "A") == changes(api, top, "B") == []
+    api.merge(sub, {part: 9})
+    assert changes(api, top, "A", "B") == told
+    assert ("quantity", sub, part, "3", "9") in changes(api, top, "B")
+    with server.app.state.server.db.write() as tx:
+        for table in (bom_change_lines, bom_changes):
+            tx.conn.execute(table.delete())
+    assert changes(api, top, "A", "B") == told
+    page = visitors["viewer"].get(f"/items/{top}/releases/B").body.decode()
+    assert f"/items/{top}/changes?since=A&until=B" in page.replace("&amp;", "&")
+    page = visitors["viewer"].get(f"/items/{top}/changes?since=A&until=B").body.decode()
+    assert "notes: glued" in page
+    assert ">By</th>" not in page
+    assert api.call("GET", bom(top, "changes?from=Z")).status == 404
 
 
 def test_the_files_have_the_same_rows(
@@ -113,7 +160,8 @@ def test_the_files_have_the_same_rows(
     assert "<strong>1 added</strong>" in page
     assert f"/api/items/{top}/bom/changes.xlsx?from=2020-01-01" in page
     wrong = visitors["viewer"].get(f"/items/{top}/changes?since=nonsense")
-    assert (wrong.status, "wanted a date" in wrong.body.decode().lower()) == (400, True)
+    assert (wrong.status, "wanted a date" in wrong.body.decode().lower()) == (404, True)
+    assert visitors["viewer"].get(f"/items/{top}/changes?since=2026-13-99").status == 400
 
 
 def test_a_look_within_the_hour_is_the_same_look(db: Database) -> None:
@@ -143,7 +191,7 @@ def test_the_product_page_says_what_is_new(
     api.merge(sub, {part: 2})
     visitor: Any = visitors["editor"]
     page = visitor.get(f"/items/{top}").body.decode()
-    assert "1 question open</a> in 1 sub-assembly" in page
+    assert "1 open question</a> in 1 sub-assembly" in page
     assert "<strong>1 kg</strong>, 1 of 2 parts known" in page
     assert "0 of 2 parts known" in page
     assert "Changed since you looked" not in page

@@ -6,15 +6,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import reduce
 
-from silo.workbench.pane.activity import Activity, Entry
+from silo.workbench.pane.activity import Activity, PaneEntry
 
 
-def activity_of(entries: Iterable[Entry]) -> Activity:
+def activity_of(entries: Iterable[PaneEntry]) -> Activity:
     """With these entries, added one after another."""
     return reduce(Activity.add, entries, Activity())
 
 
-def entry_text(entry: Entry) -> str:
+def entry_text(entry: PaneEntry) -> str:
     """A box as plain text."""
     parts = [entry.title]
     if entry.badges:

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from silo.inertia.core import Floats
-from silo.inertia.model import Prototype
+from silo.inertia.model import Floats, Prototype
 
 
 def body(name: str, volume: float, second: Sequence[float], **more: Any) -> Prototype:

@@ -6,31 +6,33 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from silo.bom.errors import SiloError
+from silo.api.wire import Scene
+from silo.bom.errors import DocumentError, NotFoundError, SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.outbox.send import Sent
 from silo.platform import stamp_of
 from silo.registering.items import Registration
-from silo.registering.offer import Candidate, Offer, Seen, State
+from silo.registering.offer import Candidate, ComponentState, Offer, OpenedFile
 from silo.registering.orders import Order
 from silo.testing import FakeSilo
-from silo.workbench.commit.flow import Answer, Look
+from silo.workbench.commit.flow import CommitAnswer, Look
 from silo.workbench.commit.opened import Base
-from silo.workbench.commit.plan import Plan, Snapshot
+from silo.workbench.commit.plan import CommitPlan, Snapshot
 from silo.workbench.preview.flow import Preview
+from silo.workbench.revisions.flow import Differences, Ghost
 from silo.workbench.session.session import Listener, Session
-from silo.workbench.settings.preferences import DEFAULTS, Preferences
-from silo.workbench.settings.server import Known
+from silo.workbench.settings import DEFAULTS, Preferences
+from silo.workbench.settings.server import ServerPreferences
 
-WAIT_S = 60
+WAIT_S = 300  # reached only if the test fails; a busy machine may need minutes
 
 
 class Gui:
@@ -49,10 +51,23 @@ class Gui:
 
 
 class Silo(FakeSilo):
-    """A server that can be closed like a client."""
+    """A server that can be closed like a client, and shows the models that a test gives it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.scenes: dict[tuple[str, int], Scene] = {}
+        self.geometries: dict[str, bytes] = {}
 
     def close(self) -> None:
         return
+
+    def get_scene(self, part_number: str, revision: int, /) -> Scene:
+        if (part_number, revision) not in self.scenes:
+            raise NotFoundError(f"item {part_number} has no revision {revision}")
+        return self.scenes[part_number, revision]
+
+    def get_geometry(self, sha256: str, /) -> bytes:
+        return self.geometries[sha256]
 
 
 class NoTokens:
@@ -185,6 +200,8 @@ class RegisterWindow:
     numbers: dict[str, str] = field(default_factory=dict)
     told: list[str] = field(default_factory=list)
     undone: list[Any] = field(default_factory=list)
+    back: list[Any] = field(default_factory=list)
+    pictures: dict[str, bytes] = field(default_factory=dict)
     stops: int = 0
 
     def fill(self, offer: Offer) -> None:
@@ -204,6 +221,12 @@ class RegisterWindow:
 
     def undeclared(self, row: Any, *, no_part: bool) -> None:
         self.undone.append((row, no_part))
+
+    def taken_back(self, order: Order, error: SiloError | None) -> None:
+        self.back.append((order.name, error))
+
+    def show_pictures(self, pictures: Mapping[str, bytes]) -> None:
+        self.pictures.update(pictures)
 
     def stopped(self) -> None:
         self.stops += 1
@@ -225,7 +248,7 @@ class Desk:
     asked: list[str] = field(default_factory=list)
     comments: list[str] = field(default_factory=list)
     willing: bool = True
-    decide: Callable[[Plan, Look], Answer | None] | None = None
+    decide: Callable[[CommitPlan, Look], CommitAnswer | None] | None = None
     open: list[Document] = field(default_factory=list)
     previews: list[PreviewWindow] = field(default_factory=list)
     witnessed: list[Any] = field(default_factory=list)
@@ -272,13 +295,18 @@ class Desk:
         self.registers.append(RegisterWindow(title, path, flow))
         return self.registers[-1]
 
-    def look_at(self, paths: Iterable[str]) -> dict[str, Seen]:
-        return {path: Seen(State.READY) for path in paths}
+    def look_at(self, paths: Iterable[str]) -> dict[str, OpenedFile]:
+        return {path: OpenedFile(ComponentState.READY) for path in paths}
 
     def remove_identity(self, candidate: Candidate, *, no_part: bool) -> None:
         if self.refusal is not None:
             raise self.refusal
         self.taken_back.append(candidate.article.objects if candidate.article is not None else ())
+
+    def restore_identity(self, candidate: Candidate) -> None:
+        if self.refusal is not None:
+            raise self.refusal
+        self.write_identity(candidate, candidate.entry.silo_uuid or "")
 
     def write_identity(self, candidate: Candidate, identity: str) -> None:
         assert threading.current_thread() is threading.main_thread()
@@ -303,12 +331,12 @@ class Desk:
     def identity(self, doc: Any) -> str | None:
         return str(doc.identity) or None
 
-    def ask(self, planned: Plan, note: str, comment: str, look: Look) -> Answer | None:
+    def ask(self, planned: CommitPlan, note: str, comment: str, look: Look) -> CommitAnswer | None:
         self.asked.append(note)
         self.comments.append(comment)
         if self.decide is not None:
             return self.decide(planned, look)
-        answer = Answer(planned.wanted, comment or "a comment", planned.unregistered)
+        answer = CommitAnswer(planned.wanted, comment or "a comment", planned.unregistered)
         return answer if self.willing else None
 
     def warn(self, _title: str, text: str) -> None:
@@ -320,6 +348,40 @@ class Desk:
     def pass_turns(self) -> None:
         while self.turns:
             self.turns.pop(0)()
+
+
+@dataclass
+class Cad:
+    """FreeCAD's documents and files, for what opens and closes them."""
+
+    documents: Documents
+    docs: list[Document]
+    opened: list[Path] = field(default_factory=list)
+    ghosts: Sequence[Ghost] = ()
+
+    def find(self, path: str, /) -> Document | None:
+        return next((doc for doc in self.docs if doc.FileName == path), None)
+
+    def open(self, path: str, /) -> None:
+        self.opened.append(Path(path))
+
+    def close(self, doc: Any, /) -> None:
+        self.docs.remove(doc)
+
+    def save_copy(self, doc: Any, path: Path, /) -> None:
+        path.write_bytes(doc.content)
+
+    def compare(self, path: str, _revision: int, theirs: Sequence[Ghost], /) -> Differences | None:
+        if self.find(path) is None:
+            raise DocumentError(path, "it is not open any more")
+        self.ghosts = () if self.ghosts else theirs
+        return Differences(len(theirs), 1, 2, 3) if self.ghosts else None
+
+    def open_paths(self) -> tuple[str, ...]:
+        return tuple(doc.FileName for doc in self.docs)
+
+    def is_open_elsewhere(self, _path: str, /) -> bool:
+        return False
 
 
 @dataclass
@@ -343,7 +405,7 @@ class Office:
         listener = Listener(console=self.console.append, sent=self.sent.append, bug=self.bugs.append)
         self.session = Session(
             self.gui.calls.put,
-            Known(url=self.silo.base_url),
+            ServerPreferences(url=self.silo.base_url),
             NoTokens(),
             listener=listener,
             folder=self.folder / "data",

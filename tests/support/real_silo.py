@@ -16,9 +16,9 @@ import os
 import re
 import threading
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -70,6 +70,78 @@ class Moods:
     oldest_first: bool = False  # revisions
 
 
+MOODS = {
+    "null lists": Moods(null_lists=True),
+    "wrapped lists": Moods(list_key="items"),
+    "lists under results": Moods(list_key="results"),
+    "wrapped items": Moods(wrapped=True),
+    "odd answer to a new item": Moods(odd_created=True),
+    "odd answer, properties nowhere": Moods(odd_created=True, properties="nowhere"),
+    "properties on the item": Moods(properties="item"),
+    "unknown properties dropped": Moods(drops_unknown_properties=True),
+    "takes our ids": Moods(own_ids=False),
+    "batch look-up": Moods(batch=200),
+    "batch refused by role": Moods(batch=403),
+    "batch refused by mode": Moods(batch=503),
+    "a late index": Moods(search="nothing"),
+    "no search": Moods(search="missing"),
+    "no creation time": Moods(created_at=False),
+    "no merge": Moods(merge="missing"),
+    "no merge, strict": Moods(merge="missing", strict=True),
+    "merge answers {}": Moods(merge="empty"),
+    "merge answers null": Moods(merge="null"),
+    "409 for manual lines": Moods(manual_409=True),
+    "strict": Moods(strict=True),
+    "no checksums": Moods(checksums=False),
+    "no checksums, no sizes": Moods(checksums=False, sizes=False),
+    "uploads in two steps": Moods(upload="presigned"),
+    "another schema": Moods(schemas=("acme",)),
+    "errors as text": Moods(errors="text"),
+    "errors bare": Moods(errors="bare"),
+    "the other dialect": Moods(event="bom_merge"),
+    "no auth/me": Moods(auth_me=False),
+    "no revisions": Moods(revisions_route=False, properties="item"),
+    "no numbers": Moods(numbers=False),
+    "pages of 2, counted": Moods(page=2, total="header", oldest_first=True),
+    "pages of 2, counted in the body": Moods(page=2, total="body", oldest_first=True, batch=200),
+    "pages of 2, next": Moods(page=2, total="next", oldest_first=True, batch=200),
+    "pages of 2, linked": Moods(page=2, total="link", batch=200),
+}
+
+
+MIXTURES = (
+    (),
+    (
+        "null lists",
+        "wrapped items",
+        "a late index",
+        "merge answers {}",
+        "batch refused by role",
+        "errors as text",
+    ),
+    ("wrapped lists", "no merge", "no checksums", "odd answer to a new item", "batch look-up", "no auth/me"),
+    ("lists under results", "merge answers null", "uploads in two steps", "no search", "errors bare"),
+    ("pages of 2, counted", "no merge, strict", "no checksums, no sizes", "properties on the item"),
+    ("pages of 2, counted in the body", "409 for manual lines", "no creation time", "the other dialect"),
+    ("pages of 2, next", "strict", "takes our ids", "unknown properties dropped", "no numbers"),
+    ("pages of 2, linked", "uploads in two steps", "no checksums", "another schema", "batch refused by mode"),
+    ("no revisions", "no merge", "errors as text", "null lists"),
+    ("odd answer, properties nowhere", "uploads in two steps", "a late index"),
+)
+"""Each mood at least once, beside others that do not hide it: what is done in all moods, is done in these."""
+
+
+def mixed(names: Sequence[str]) -> Moods:
+    """All switches that differ in these moods."""
+    switches = {
+        one.name: value
+        for name in names
+        for one in fields(Moods)
+        if (value := getattr(MOODS[name], one.name)) != one.default
+    }
+    return Moods(**switches)
+
+
 @dataclass
 class Item:
     """An item as the server holds it."""
@@ -108,6 +180,8 @@ class PlainError(Exception):
 class RealSilo(ThreadingHTTPServer):
     """The server; ``seen`` lists the requests, ``faults`` maps a request's number (from 0) to a fault.
 
+    faults_of
+        "METHOD path" → the faults of the next requests of this kind, "" for none.
     answered_creations
         after so many items were made no answer arrives any more; None for no such end.
     """
@@ -125,6 +199,7 @@ class RealSilo(ThreadingHTTPServer):
         self.news = threading.Condition()
         self.seen: list[str] = []
         self.faults: dict[int, str] = {}
+        self.faults_of: dict[str, list[str]] = {}
         self.answered_creations: int | None = None
         self.lock = threading.RLock()
         self.ending = threading.Event()
@@ -151,6 +226,8 @@ class RealSilo(ThreadingHTTPServer):
                 self.answered_creations -= (method, path) == ("POST", "/api/items")
                 if self.answered_creations < 0:
                     return "drop after"
+            if kind := self.faults_of.get(self.seen[-1]):
+                return kind.pop(0)
             return self.faults.pop(len(self.seen) - 1, "")
 
     # -- what is held -------------------------------------------------------------------------------------
@@ -168,9 +245,19 @@ class RealSilo(ThreadingHTTPServer):
             return copy.deepcopy(self.items)
 
     def restore(self, items: dict[str, Item]) -> None:
-        """Hold what it held then: whatever came since is lost, and its numbers are given anew."""
+        """Hold what it held then: whatever came since is lost, and its numbers are given again."""
         with self.lock:
             self.items = copy.deepcopy(items)
+
+    def make(
+        self, category: str, description: str, item_type: str = "part", given: str | None = None
+    ) -> Item:
+        """A new item, without a revision."""
+        serial = sum(1 for number in self.items if number.startswith(category.casefold())) + 1
+        number, now = f"{category}-{serial:04d}", datetime.now(UTC).isoformat()
+        item = Item(given or str(uuid.uuid4()), number, description, item_type, now)
+        self.items[number.casefold()] = item
+        return item
 
     def check_storage(self) -> None:
         if self.moods.storage == "down":
@@ -307,18 +394,10 @@ def _create(silo: RealSilo, _query: dict[str, str], body: Any) -> Answer:
     silo.keys(body, *known, "long_description", "properties")
     if body["schema"] not in silo.moods.schemas or body["category"] not in CATEGORIES:
         raise Refused(400, "bad_request", "no such category")
-    serial = sum(1 for number in silo.items if number.startswith(body["category"].casefold())) + 1
     given = None if silo.moods.own_ids else body.get("id")
     if given and any(item.id == given for item in silo.items.values()):
         return 201, silo.shown(next(item for item in silo.items.values() if item.id == given))
-    item = Item(
-        given or str(uuid.uuid4()),
-        f"{body['category']}-{serial:04d}",
-        body.get("description", ""),
-        body.get("item_type", "part"),
-        datetime.now(UTC).isoformat(),
-    )
-    silo.items[item.part_number.casefold()] = item
+    item = silo.make(body["category"], body.get("description", ""), body.get("item_type", "part"), given)
     silo.revise(item, "created", body.get("properties") or {})
     if silo.moods.odd_created:
         return 201, {"ok": True}
@@ -560,6 +639,19 @@ FAULTS = (
 )
 """What may happen to one request; "after": the server did what was asked, and the answer was lost."""
 
+REFUSALS: dict[str, tuple[int, str, str]] = {
+    "401": (401, "unauthorized", ""),
+    "403": (403, "forbidden", ""),
+    "409": (409, "conflict", "the item is checked out"),
+    "413": (413, "too_large", ""),
+    "422": (422, "unprocessable", "no such kind of file"),
+    "500": (500, "internal", "a bug"),
+    "501": (501, "not_implemented", "no file storage is configured"),
+    "read-only": (503, "read_only", "server is in read-only mode"),
+    "no storage": (503, "unavailable", "file storage is down"),
+}
+"""Status, code and text, in the words of the mood."""
+
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
@@ -576,8 +668,6 @@ class _Handler(BaseHTTPRequestHandler):
         if fault == "drop before":
             return self._hang_up()
         early = {
-            "401": (401, {"error": "unauthorized"}, {}),
-            "403": (403, {"error": "forbidden"}, {}),
             "429": (429, {"error": "slow down"}, {"Retry-After": "40"}),
             "502 before": (502, "<html><title>502 Bad Gateway</title></html>", {"Content-Type": "text/html"}),
             "503": (503, "", {}),
@@ -591,7 +681,8 @@ class _Handler(BaseHTTPRequestHandler):
             return self._write(302, "", {"Location": f"/login?next={parts.path}"})
         if parts.path == "/api/events" and not fault:
             return self._stream()
-        status, content = self._answer(parts.path, {k: v[0] for k, v in parse_qs(parts.query).items()}, raw)
+        query = {k: v[0] for k, v in parse_qs(parts.query).items()}
+        status, content = self._answer(parts.path, query, raw, fault)
         if fault == "drop after":
             return self._hang_up()
         if fault == "502 after":
@@ -603,7 +694,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     do_GET = do_POST = do_PUT = do_DELETE = _any
 
-    def _answer(self, path: str, query: dict[str, str], raw: bytes) -> tuple[int, Any]:
+    def _answer(self, path: str, query: dict[str, str], raw: bytes, fault: str) -> tuple[int, Any]:
         kind = self.headers.get("Content-Type", "")
         if kind.startswith("multipart/"):
             text = b"Content-Type: " + kind.encode() + b"\r\n\r\n" + raw
@@ -613,6 +704,10 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             body = raw
         try:
+            if fault == "no route":
+                raise PlainError("404 page not found")
+            if fault in REFUSALS:
+                raise Refused(*REFUSALS[fault])
             with self.server.lock:
                 return self.server.answer(self.command, path, query, body, self.headers)
         except PlainError as error:
@@ -686,7 +781,7 @@ def register_elsewhere(top: str, url: str, home: str) -> int:
     from silo.api.client import SiloClient
     from silo.api.policy import Retries
     from silo.cli.common import read_assembly
-    from silo.registering.on_disk import proposals_for, register_all
+    from silo.registering.orders import proposals_for, register_all
 
     for name in HOMES:
         os.environ[name] = home

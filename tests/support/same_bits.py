@@ -29,9 +29,9 @@ from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound
 
+from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.graph import ReadOptions
 from silo.inertia.geometry.helpers import Helpers
-from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.solids import measure_all
 from silo.inertia.geometry.measured import Measured
 

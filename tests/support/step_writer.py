@@ -19,7 +19,7 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
-from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry import kernel as occt
 
 
 def trsf_of(translation: ArrayLike = (0, 0, 0), rotation: ArrayLike | None = None) -> gp_Trsf:

@@ -15,20 +15,22 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
 import pytest
 from fcstd_writer import Doc, Local, XLink, locals_, part
+from hunting import examples
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from silo.bom.errors import InputError
-from silo.fcstd.library import Contents
-from silo.vault.index import Index, Seen, StoredAnswer
-from silo.vault.reading import Question, Reading, Session
+from silo.fcstd.library import FileContents
+from silo.vault.index import Index, SeenFile, StoredAnswer
+from silo.vault.reading import Question, VaultReader, WalkSession
 
 HOUR_NS = 3600 * 10**9
 NAMES = tuple(f"{folder}{name}.FCStd" for folder in ("", "sub/") for name in ("a", "b", "c", "d"))
@@ -65,13 +67,13 @@ def questions(folder: Path) -> list[Question]:
 
 def truth(folder: Path) -> list[Any]:
     """What the files say, asked one by one without any memory."""
-    return [json.loads(Session().ask(question).answer) for question in questions(folder)]
+    return [json.loads(WalkSession().ask(question).answer) for question in questions(folder)]
 
 
-def indexed(folder: Path, index: Path, contents: Contents | None = None) -> tuple[list[Any], int]:
+def indexed(folder: Path, index: Path, contents: FileContents | None = None) -> tuple[list[Any], int]:
     """The same through the index; and how many files were read."""
-    with Index(index, contents=contents or Contents(clock=later)) as memory:
-        reading = Reading(memory)
+    with Index(index, contents=contents or FileContents(clock=later)) as memory:
+        reading = VaultReader(memory)
         return [answer.plain for answer in reading.ask_many(questions(folder))], reading.reads
 
 
@@ -191,18 +193,8 @@ def damaged(content: bytes, at: float, how: str) -> bytes:
     )
 
 
-Vault.TestCase.settings = settings(max_examples=12, stateful_step_count=12)
+Vault.TestCase.settings = settings(max_examples=examples(6), stateful_step_count=12)
 TestVault = Vault.TestCase
-
-
-class LongVault(Vault):
-    """The same hunt, for longer."""
-
-
-LongVault.TestCase.settings = settings(max_examples=400, stateful_step_count=25)
-TestLongVault = pytest.mark.slow(LongVault.TestCase)
-if not os.environ.get("SILO_LONG"):
-    del TestLongVault
 
 
 @pytest.fixture
@@ -230,13 +222,13 @@ def test_a_second_run_reads_nothing_and_a_change_reads_what_uses_it(vault: Path,
 def test_an_edit_within_one_tick_of_the_clock_is_seen(vault: Path, tmp_path: Path) -> None:
     """Right after a save, size and times say nothing: the content is compared until the file has settled."""
     path, index = vault / "a.FCStd", tmp_path / "index"
-    indexed(vault, index, Contents())
+    indexed(vault, index, FileContents())
     status = path.stat()
     others = (part("a", uuid=f"{number:x}").bytes() for number in range(1, 4096))
     path.write_bytes(next(content for content in others if len(content) == status.st_size))
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert path.stat().st_size == status.st_size
-    assert indexed(vault, index, Contents())[0] == truth(vault)
+    assert indexed(vault, index, FileContents())[0] == truth(vault)
 
 
 def test_a_state_counts_as_settled_only_well_after_its_last_change(vault: Path) -> None:
@@ -244,7 +236,7 @@ def test_a_state_counts_as_settled_only_well_after_its_last_change(vault: Path) 
     status = (vault / "a.FCStd").stat()
     changed = max(status.st_mtime_ns, status.st_ctime_ns)
     state = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
-    looks = {after: Seen("", *state, changed + after * 10**9).still(status) for after in (-1, 0, 2, 3)}
+    looks = {after: SeenFile("", *state, changed + after * 10**9).still(status) for after in (-1, 0, 2, 3)}
     assert looks == {-1: False, 0: False, 2: False, 3: True}
 
 
@@ -253,9 +245,9 @@ def test_one_assembly_is_asked_and_what_it_uses_has_changed(vault: Path, tmp_pat
     index, asked = tmp_path / "index", Question(str(vault / "c.FCStd"))
     indexed(vault, index)
     part("b", uuid="new").save(vault / "b.FCStd")
-    with Index(index, contents=Contents(clock=later)) as memory:
-        found = Reading(memory).ask(asked)
-    assert found.plain == json.loads(Session().ask(asked).answer)
+    with Index(index, contents=FileContents(clock=later)) as memory:
+        found = VaultReader(memory).ask(asked)
+    assert found.plain == json.loads(WalkSession().ask(asked).answer)
     assert "new" in found.known.answer
 
 
@@ -276,7 +268,7 @@ def odd_target() -> Doc:
 
 def test_a_session_frees_what_it_made(vault: Path) -> None:
     """Documents and their objects refer to each other; thousands of them must not wait for the collector."""
-    session = Session()
+    session = WalkSession()
     asked = [Question(str(path), below=below) for path in vault.glob("*.FCStd") for below in (True, False)]
 
     def run() -> None:
@@ -326,25 +318,25 @@ def test_facts_in_place_of_a_file_change_nothing(vault: Path, tmp_path: Path) ->
     asked = [
         Question(str(path), below=below) for path in sorted(vault.glob("*.FCStd")) for below in (True, False)
     ]
-    wanted = [Session().ask(question) for question in asked]
+    wanted = [WalkSession().ask(question) for question in asked]
     for _ in ("found out", "remembered", "walked again with the facts of the index"):
-        with Index(tmp_path / "index", contents=Contents(clock=later)) as memory:
-            found = [answer.known for answer in Reading(memory).ask_many(asked)]
+        with Index(tmp_path / "index", contents=FileContents(clock=later)) as memory:
+            found = [answer.known for answer in VaultReader(memory).ask_many(asked)]
         assert [json.loads(one.answer) for one in found] == [json.loads(one.answer) for one in wanted]
         assert [trail_of(one) for one in found] == [trail_of(one) for one in wanted]
         if _ == "remembered":
-            with sqlite3.connect(tmp_path / "index") as database:
+            with closing(sqlite3.connect(tmp_path / "index")) as database, database:
                 database.execute("DELETE FROM answers")
 
 
 def test_facts_of_another_state_of_a_file_are_not_mixed_with_it(vault: Path, tmp_path: Path) -> None:
     """A file that is saved between the two steps of a run: what its facts do not say is not taken from it."""
     odd_target().save(vault / "odd.FCStd")
-    facts = Session().read(Question(str(vault / "odd.FCStd"))).facts
+    facts = WalkSession().read(Question(str(vault / "odd.FCStd"))).facts
     doc = Doc("top").add("App::Part", "A", Group=locals_("Known", "Unknown"))
     doc.link("Known", "odd.FCStd", "Body").link("Unknown", "odd.FCStd", "More29").save(vault / "top.FCStd")
     part("odd", name="More29", uuid="new").save(vault / "odd.FCStd")
-    known = Session().ask(Question(str(vault / "top.FCStd")), lambda path: facts if "odd" in path else "")
+    known = WalkSession().ask(Question(str(vault / "top.FCStd")), lambda path: facts if "odd" in path else "")
     plain = json.loads(known.answer)
     assert [row["silo_uuid"] for row in plain["table"] if row["object_name"] == "Body"] == ["body"]
     assert "being written just now" in plain["findings"][0]["message"]
@@ -352,14 +344,14 @@ def test_facts_of_another_state_of_a_file_are_not_mixed_with_it(vault: Path, tmp
     with Index(tmp_path / "index") as memory:
         memory.remember(str(vault / "top.FCStd"), "question", known)
     with Index(tmp_path / "index") as memory:
-        assert memory.recall(str(vault / "top.FCStd"), "question") is None, "the next run finds out anew"
+        assert memory.recall(str(vault / "top.FCStd"), "question") is None, "the next run finds out again"
 
 
 def test_facts_that_somebody_changed_in_the_index_are_not_there(vault: Path, tmp_path: Path) -> None:
     """Each row has a checksum; what fails it is read from the file."""
     index = tmp_path / "index"
     indexed(vault, index)
-    with sqlite3.connect(index) as database:
+    with closing(sqlite3.connect(index)) as database, database:
         done = database.execute("UPDATE facts SET facts = replace(facts, 'ua', 'ub')")
         assert done.rowcount >= 2
         database.execute("DELETE FROM answers")
@@ -374,10 +366,10 @@ def test_only_what_changed_is_read_again(vault: Path, tmp_path: Path, waiting: i
     for change, reads in (("", 4), ("", 0), ("d.FCStd", 1)):
         if change:
             assembly("d", {"a.FCStd": 3, "b.FCStd": 1}).save(vault / change)
-        with Index(index, contents=Contents(clock=later)) as memory:
-            reading = Reading(memory, waiting=waiting)
+        with Index(index, contents=FileContents(clock=later)) as memory:
+            reading = VaultReader(memory, waiting=waiting)
             found = [answer.known.answer for answer in reading.ask_many(asked)]
-            assert found == [Session().ask(question).answer for question in asked]
+            assert found == [WalkSession().ask(question).answer for question in asked]
             assert reading.reads == reads
 
 
@@ -389,7 +381,7 @@ def test_a_file_that_was_only_touched_is_known_by_its_content(vault: Path, tmp_p
     shutil.rmtree(vault)
     (tmp_path / "copy").rename(vault)
     with Index(index) as memory:
-        reading = Reading(memory)
+        reading = VaultReader(memory)
         list(reading.ask_many(questions(vault)))
         assert reading.asked == len(questions(vault)) - 8, "only the files that are not there"
 
@@ -404,9 +396,9 @@ def test_what_became_a_symlink_is_what_it_leads_to(vault: Path, tmp_path: Path, 
     )
     before.rename(after)
     os.symlink(after, before)
-    with Index(index, contents=Contents(clock=later)) as memory:
-        found = list(Reading(memory).ask_many(asked))
-    assert [one.plain for one in found] == [json.loads(Session().ask(one).answer) for one in asked]
+    with Index(index, contents=FileContents(clock=later)) as memory:
+        found = list(VaultReader(memory).ask_many(asked))
+    assert [one.plain for one in found] == [json.loads(WalkSession().ask(one).answer) for one in asked]
     assert all("moved" in one.known.answer for one in found)
 
 
@@ -419,8 +411,8 @@ def test_another_current_folder_is_another_file(
     answers = []
     for folder in (vault, other):
         monkeypatch.chdir(folder)
-        with Index(tmp_path / "index", contents=Contents(clock=later)) as memory:
-            answers.append(Reading(memory).ask(Question("a.FCStd")).plain["table"][0]["silo_uuid"])
+        with Index(tmp_path / "index", contents=FileContents(clock=later)) as memory:
+            answers.append(VaultReader(memory).ask(Question("a.FCStd")).plain["table"][0]["silo_uuid"])
     assert answers == ["ua", "elsewhere"]
 
 
@@ -435,18 +427,18 @@ def test_a_file_that_the_user_named_and_that_is_no_index_stays(vault: Path) -> N
 def test_an_index_that_cannot_be_written_costs_time_only(vault: Path, tmp_path: Path) -> None:
     """A full disk, a folder in its place."""
     (tmp_path / "folder").mkdir()
-    with Index(tmp_path / "folder", contents=Contents(clock=later)) as memory:
+    with Index(tmp_path / "folder", contents=FileContents(clock=later)) as memory:
         assert "cannot be used" in memory.trouble
-        assert [answer.plain for answer in Reading(memory).ask_many(questions(vault))] == truth(vault)
+        assert [answer.plain for answer in VaultReader(memory).ask_many(questions(vault))] == truth(vault)
     if Path("/dev/full").exists():
         small = tmp_path / "small"
-        with Index(small, contents=Contents(clock=later)) as memory:
+        with Index(small, contents=FileContents(clock=later)) as memory:
             memory._database._database.execute("PRAGMA max_page_count = 1")
-            found = [answer.plain for answer in Reading(memory, waiting=0).ask_many(questions(vault))]
+            found = [answer.plain for answer in VaultReader(memory, waiting=0).ask_many(questions(vault))]
             memory.save()
             assert "full" in memory.trouble
             assert found == truth(vault)
-            assert [answer.plain for answer in Reading(memory).ask_many(questions(vault))] == found
+            assert [answer.plain for answer in VaultReader(memory).ask_many(questions(vault))] == found
 
 
 def _processes(folder: Path, index: Path, count: int) -> Iterator[subprocess.Popen[bytes]]:

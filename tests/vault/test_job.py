@@ -14,10 +14,11 @@ from typing import Any
 
 import pytest
 from fcstd_writer import Doc, locals_, part
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from silo.batch import Options, TopResult
+from silo.batch import SyncOptions, TopResult
 from silo.bom.errors import AuthError, SiloError, UnreachableError
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
@@ -26,9 +27,8 @@ from silo.fcstd import Library
 from silo.files import documents_in
 from silo.testing import FakeSilo
 from silo.vault.index import Index
-from silo.vault.job import Job
-from silo.vault.plan import make_plan
-from silo.vault.reading import Pool, Question, Reading, pool_of, work
+from silo.vault.plan import SyncJob, make_plan
+from silo.vault.reading import Pool, Question, VaultReader, pool_of, work
 
 
 def write(folder: Path, silo: FakeSilo | None, assemblies: dict[int, dict[int, int]], parts: int = 4) -> None:
@@ -55,9 +55,11 @@ def run(
     """The job, as the command line runs it."""
     tops = documents_in([str(folder)])
     with Index(index) as memory:
-        reading = Reading(memory, pool)
+        reading = VaultReader(memory, pool)
         plan = make_plan(tops, reading)
-        return list(Job(plan, reading, api, Options(recursive=True, **options), str(folder)).results())
+        return list(
+            SyncJob(plan, reading, api, SyncOptions(recursive=True, **options), str(folder)).results()
+        )
 
 
 def boms(silo: FakeSilo) -> dict[str, dict[str, float | None]]:
@@ -87,7 +89,7 @@ def vaults(draw: st.DrawFn) -> dict[int, dict[int, int]]:
     }
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(10))
 @given(vaults())
 def test_the_boms_are_those_of_each_file_alone(
     tmp_path_factory: pytest.TempPathFactory, holds: dict[int, dict[int, int]]
@@ -229,7 +231,7 @@ def answers(folder: Path, pool: Pool | None) -> list[str]:
     """All answers as text, asked for without an index."""
     with Index(None) as memory:
         tops = documents_in([str(folder)])
-        return [one.known.answer for one in Reading(memory, pool).ask_many(Question(top) for top in tops)]
+        return [one.known.answer for one in VaultReader(memory, pool).ask_many(Question(top) for top in tops)]
 
 
 def test_a_worker_that_dies_costs_its_task_only(tmp_path: Path) -> None:
@@ -272,7 +274,7 @@ def test_processes_give_the_same_answers(tmp_path: Path) -> None:
         with pool_of(jobs, worth=0) as pool, Index(None) as memory:
             if pool is not None:
                 pool.chunk = 3
-            reading = Reading(memory, pool)
+            reading = VaultReader(memory, pool)
             found = [one.known.answer for one in reading.ask_many(Question(top) for top in tops)]
         assert found == answers(tmp_path, None)
         assert reading.reads == len(tops)
@@ -303,12 +305,12 @@ def test_parts_in_the_file_of_an_assembly_are_its_bom_where_it_is_registered(
     doc.add("Part::Box", "One", SiloItemId="one").add("Part::Box", "Two", SiloItemId="two")
     doc.add("Assembly::AssemblyObject", "Assembly", Group=locals_("One", "Two")).save(tmp_path / "own.FCStd")
     with Index(None) as memory:
-        plan = make_plan(documents_in([str(tmp_path)]), Reading(memory))
+        plan = make_plan(documents_in([str(tmp_path)]), VaultReader(memory))
     assert (len(plan.nodes), plan.parts) == ((1, 0) if uuid else (0, 1))
 
 
 def test_a_worker_starts_without_the_network() -> None:
-    """Each worker imports what it needs anew; HTTP and TLS would be a tenth of it."""
+    """Each worker imports what it needs again; HTTP and TLS would be a tenth of it."""
     code = (
         "import sys, silo.vault.reading as _; print([n for n in ('http.client', 'ssl') if n in sys.modules])"
     )

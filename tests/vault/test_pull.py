@@ -25,7 +25,7 @@ from silo.outbox.entry import Commit
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
-from silo.vault.pull import Pulled, RevisionBoms, Rules, State, fetched, lay_out, place, words
+from silo.vault.pull import Pulled, PullState, RevisionBoms, Rules, fetched, lay_out, place, words
 
 
 def assembly(identity: str, *links: tuple[str, str, int]) -> Doc:
@@ -110,7 +110,7 @@ def project(tmp_path: Path) -> Project:
     return Project(tmp_path, FakeSilo())
 
 
-def states(pulled: Pulled, into: Path) -> dict[str, State]:
+def states(pulled: Pulled, into: Path) -> dict[str, PullState]:
     return {one.path.relative_to(into.resolve()).as_posix(): one.state for one in pulled.files}
 
 
@@ -127,13 +127,13 @@ def test_a_tree_is_fetched_with_every_file_in_its_place(project: Project, tmp_pa
     project.commit()
     into = tmp_path / "other computer"
     pulled = project.pull(into)
-    assert states(pulled, into) == dict.fromkeys(TREE, State.NEW)
+    assert states(pulled, into) == dict.fromkeys(TREE, PullState.NEW)
     assert pulled.complete
     assert pulled.top == (into / "robot" / "arm" / "Arm.FCStd").resolve()
     assert bom(pulled.top) == bom(project.arm)
     assert not any(missing for _, _, missing in bom(pulled.top))
     again = project.pull(into)
-    assert set(states(again, into).values()) == {State.SAME}
+    assert set(states(again, into).values()) == {PullState.SAME}
 
 
 def test_a_chosen_revision_brings_the_files_of_its_time(project: Project, tmp_path: Path) -> None:
@@ -198,12 +198,12 @@ def test_local_edits_are_not_overwritten_unasked(project: Project, tmp_path: Pat
     edited = plate.read_bytes()
     pulled = project.pull(into)
     told = states(pulled, into)
-    assert told["robot/arm/Arm.FCStd"] is State.UPDATED
-    assert told["robot/arm/parts/Plate.FCStd"] is State.EDITED
+    assert told["robot/arm/Arm.FCStd"] is PullState.UPDATED
+    assert told["robot/arm/parts/Plate.FCStd"] is PullState.EDITED
     assert not pulled.complete
     assert plate.read_bytes() == edited
     pulled = project.pull(into, overwrite=True, keep=project.store.keep_aside)
-    (one,) = [one for one in pulled.files if one.state is State.OVERWRITTEN]
+    (one,) = [one for one in pulled.files if one.state is PullState.OVERWRITTEN]
     assert one.kept is not None
     assert one.kept.read_bytes() == edited
     assert plate.read_bytes() == project.path("arm/parts/Plate.FCStd").read_bytes()
@@ -217,7 +217,7 @@ def test_what_freecad_has_open_is_left_alone(project: Project, tmp_path: Path) -
     project.write(bolts=6)
     project.commit("Arm")
     pulled = project.pull(into, is_open=lambda path: path.endswith("Arm.FCStd"))
-    assert states(pulled, into)["robot/arm/Arm.FCStd"] is State.OPEN
+    assert states(pulled, into)["robot/arm/Arm.FCStd"] is PullState.OPEN
     assert bom(pulled.top) != bom(project.arm)
 
 
@@ -229,7 +229,7 @@ def test_a_part_goes_where_the_folder_has_it_already(project: Project, tmp_path:
     part("Plate, thicker", uuid=project.ids["Plate"]).save(project.path("arm/parts/Plate.FCStd"))
     project.commit("Plate")
     pulled = project.pull(into, "Plate")
-    assert states(pulled, into) == {"robot/arm/parts/Plate.FCStd": State.UPDATED}
+    assert states(pulled, into) == {"robot/arm/parts/Plate.FCStd": PullState.UPDATED}
     alone = tmp_path / "alone"
     assert set(states(project.pull(alone, "Plate"), alone)) == {"Plate.FCStd"}
 
@@ -328,7 +328,7 @@ NAMES = st.sampled_from(["a", "b", "c"])
 def test_relative_places_are_kept_whatever_the_folders(
     top: list[str], others: list[tuple[list[str], str]]
 ) -> None:
-    """A law: wherever the files lie, laid out anew each is in the same place relative to the top."""
+    """A law: wherever the files lie, laid out again each is in the same place relative to the top."""
     import posixpath
 
     files = {"/".join(["root", *folders, f"{name}.FCStd"]) for folders, name in others}
@@ -406,7 +406,7 @@ def test_a_link_to_a_file_stays_a_link(project: Project, tmp_path: Path) -> None
     plate.symlink_to(real)
     part("Plate, thicker", uuid=project.ids["Plate"]).save(project.path("arm/parts/Plate.FCStd"))
     project.commit("Plate")
-    assert states(project.pull(into), into)["robot/arm/parts/Plate.FCStd"] is State.UPDATED
+    assert states(project.pull(into), into)["robot/arm/parts/Plate.FCStd"] is PullState.UPDATED
     assert plate.is_symlink()
     assert real.read_bytes() == project.path("arm/parts/Plate.FCStd").read_bytes()
 
@@ -551,4 +551,4 @@ def test_two_copies_in_the_folder_are_no_place(project: Project, tmp_path: Path)
     into = tmp_path / "mine"
     for folder in ("a", "b"):
         project.pull(into / folder, "Plate")
-    assert states(project.pull(into, "Plate"), into) == {"Plate.FCStd": State.NEW}
+    assert states(project.pull(into, "Plate"), into) == {"Plate.FCStd": PullState.NEW}

@@ -11,9 +11,9 @@ step: what breaks off half-way continues with the next run, which plans from the
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -22,16 +22,17 @@ from silo.api.transport import Caller, Cancel, body, stop_if
 from silo.api.wire import (
     Answer,
     BomLine,
+    LineTexts,
     MergeDiff,
     MergeEntry,
     MergeRequest,
     MergeResult,
     MergeWarning,
+    ProductChanges,
     ProductSummary,
     Quantity,
     QuantityLine,
     WhereUsedLine,
-    Wire,
 )
 from silo.bom.compare import answer_of, conflict_warning, is_manual, plan_merge, same_quantity, says_the_same
 from silo.bom.errors import (
@@ -50,7 +51,7 @@ from silo.bom.errors import (
 from silo.bom.model import BomDiff, QuantityChange
 
 UNCLEAR = "answer_not_understood"
-"""The warning of a merge whose answer was not understood, and that the BOM shows all the same."""
+"""The warning of a merge whose answer was not understood, and that the BOM shows anyway."""
 
 NOT_ATOMIC = "not_atomic"
 """The warning of a merge that was made of single calls."""
@@ -60,16 +61,6 @@ def unusual(result: MergeResult | None) -> list[str]:
     """What a person must know about a merge that was not a usual one, in sentences."""
     warnings = result.warnings if result is not None else ()
     return [warning.message for warning in warnings if warning.type in (UNCLEAR, NOT_ATOMIC)]
-
-
-class Lines(Protocol):
-    """What is needed of a Silo."""
-
-    def get_bom(self, part_number: str, /) -> list[BomLine]: ...
-
-    def add_bom_line(self, part_number: str, child: str, /, **values: Any) -> BomLine: ...
-
-    def update_bom_line(self, part_number: str, child: str, /, **changes: Any) -> BomLine: ...
 
 
 def merge_result(reply: Reply) -> MergeResult | None:
@@ -109,11 +100,11 @@ _LISTS = {"added", "removed", "quantity_changed", "unchanged"}
 
 def result_of(diff: BomDiff, part_number: str, request: MergeRequest) -> MergeResult:
     """The answer of spec §5 for a planned merge."""
-    left_out = [one.model_dump() for one in request.left_out or ()]
+    left_out = [part.model_dump() for part in request.left_out or ()]
     return MergeResult.model_validate(answer_of(diff, part_number, request.sync_id, left_out))
 
 
-def read_back(api: Lines, part_number: str, request: MergeRequest, host: str) -> MergeResult:
+def read_back(api: BomCalls, part_number: str, request: MergeRequest, host: str) -> MergeResult:
     """The result of a merge whose answer says neither success nor failure, as the BOM shows it."""
     sent = f"{host}: the BOM of {part_number} was sent, but the answer was not understood"
     if request.dry_run:
@@ -140,7 +131,7 @@ def read_back(api: Lines, part_number: str, request: MergeRequest, host: str) ->
 
 
 def without_manual(
-    api: Lines, part_number: str, request: MergeRequest, merge: Callable[[MergeRequest], MergeResult]
+    api: BomCalls, part_number: str, request: MergeRequest, merge: Callable[[MergeRequest], MergeResult]
 ) -> MergeResult | None:
     """Merge all but the children that people own; None where there are none. For a server that answers 409.
 
@@ -152,7 +143,7 @@ def without_manual(
         return None
     rest = [entry for entry in request.entries if _key(entry) not in manual]
     result = merge(request.model_copy(update={"entries": rest}))
-    known = {warning.part_number.casefold() for warning in result.warnings if warning.type == "conflict"}
+    marked = {warning.part_number.casefold() for warning in result.warnings if warning.type == "conflict"}
     warnings = [
         MergeWarning.model_validate(
             conflict_warning(
@@ -161,20 +152,20 @@ def without_manual(
         )
         for entry in left
         if not says_the_same(entry.quantity, (line := manual[_key(entry)]).quantity, line.unit)
-        and _key(entry) not in known
+        and _key(entry) not in marked
     ]
     return result.model_copy(update={"warnings": [*result.warnings, *warnings]})
 
 
 def merge_by_lines(
-    api: Lines, part_number: str, request: MergeRequest, host: str, *, cancelled: Cancel | None = None
+    api: BomCalls, part_number: str, request: MergeRequest, host: str, *, cancelled: Cancel | None = None
 ) -> MergeResult:
     """The merge as single calls. Raises :class:`RejectedError` with all children that were refused.
 
     Raises :class:`RouteMissingError` where the server has no calls for single lines either.
     """
     lines = api.get_bom(part_number)
-    plan = plan_merge([_entry(entry) for entry in request.entries], lines)
+    plan = plan_merge([entry.model_dump() for entry in request.entries], lines)
     result = result_of(plan.diff, part_number, request)
     if request.dry_run:
         return result
@@ -195,8 +186,8 @@ def merge_by_lines(
             f"{len(refused)} were refused: {'; '.join(refused[:5])}",
             refused,
         )
-    told = f"{host} has no merge: {written} lines were written one by one, not in one step"
-    warning = MergeWarning(type=NOT_ATOMIC, part_number=part_number, message=told)
+    text = f"{host} has no merge: {written} lines were written one by one, not in one step"
+    warning = MergeWarning(type=NOT_ATOMIC, part_number=part_number, message=text)
     return result.model_copy(update={"warnings": [*result.warnings, warning]} if written else {})
 
 
@@ -210,10 +201,6 @@ def _try(refused: list[str], child: str, call: Callable[[], object]) -> None:
         refused.append(f"{child}: {error}")
 
 
-def _entry(entry: MergeEntry) -> Mapping[str, Any]:
-    return {"child_part_number": entry.child_part_number, "quantity": entry.quantity}
-
-
 def _key(entry: MergeEntry) -> str:
     return entry.child_part_number.casefold()
 
@@ -223,19 +210,13 @@ def _shows(line: BomLine | None, entry: MergeEntry) -> bool:
     return line is not None and (is_manual(line) or same_quantity(line.quantity, entry.quantity))
 
 
-class NumbersBody(Wire):
-    """``POST /api/items/boms``: the BOMs of many items in one question."""
-
-    part_numbers: list[str]
-
-
 class BomsAnswer(Answer):
-    """Its answer: the lines of each item that is known, by the part number as it was asked for."""
+    """The answer of ``POST /api/items/boms``: the lines of each known item, by its number as asked for."""
 
     boms: dict[str, list[BomLine]]
 
 
-class LineBody(Wire):
+class LineBody(LineTexts):
     """``POST …/bom`` and ``PUT …/bom/{child}``: a line as a person writes it.
 
     ``source`` is for a merge by single calls, on a server that has no other.
@@ -243,10 +224,7 @@ class LineBody(Wire):
 
     child_part_number: str | None = None
     quantity: Quantity | None = None
-    unit: str | None = None
     rel_type: str | None = None
-    find_number: str | None = None
-    notes: str | None = None
     reference_designators: list[str] | None = None
     child_revision: int | None = None
     metadata: dict[str, Any] | None = None
@@ -270,9 +248,9 @@ class BomCalls(Caller):
         """
 
         def batch(some: Sequence[str]) -> dict[str, list[BomLine]]:
-            asked = NumbersBody(part_numbers=list(some))
-            subject = f"the BOMs of {len(some)} items"
-            boms = self._ask(subject, "items", "boms", body=asked, cancelled=cancelled).model(BomsAnswer).boms
+            where = (f"the BOMs of {len(some)} items", "items", "boms")
+            reply = self._ask(*where, part_numbers=list(some), cancelled=cancelled)
+            boms = reply.model(BomsAnswer).boms
             return {number: _checked(number, lines) for number, lines in boms.items()}
 
         def single(part_number: str) -> list[BomLine] | None:
@@ -295,6 +273,14 @@ class BomCalls(Caller):
         except RouteMissingError:
             return None
         return reply.model(ProductSummary)
+
+    def get_changes(self, part_number: str, since: str, until: str = "", /) -> ProductChanges:
+        """What changed in a product over all levels between two points: days, times, ``r3`` or released
+        revisions; ``until`` "": now. Raises :class:`RouteMissingError` from a server that compares nothing.
+        """
+        query = {"from": since, **({"to": until} if until else {})}
+        where = (f"what changed in {part_number}", *_bom(part_number), "changes")
+        return self._get(*where, params=query).model(ProductChanges)
 
     def get_bom_version(self, part_number: str, /) -> str | None:
         """The version of the BOM as it is now, for ``if_match``; None where the server keeps none."""
@@ -394,7 +380,7 @@ class BomCalls(Caller):
             f"{child} on the BOM of {part_number}",
             *_bom(part_number),
             body=line,
-            extensions=("source", "find_number", "notes"),
+            extensions=("source", *LineTexts.model_fields.keys() - {"unit"}),
         )
         return reply.model(BomLine)
 

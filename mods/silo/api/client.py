@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 from urllib.parse import quote
-from uuid import UUID
 
 import requests
 from pydantic import Field
@@ -28,7 +27,7 @@ from pydantic import Field
 from silo.api.boms import BomCalls
 from silo.api.config import ServerAddress
 from silo.api.events import SILENCE, HttpEventStream, ServerEvent, open_stream
-from silo.api.files import FileCalls, UuidsBody, checksum_of
+from silo.api.files import FileCalls, checksum_of
 from silo.api.policy import Reply, Retries, WebPageError, translated
 from silo.api.transport import (
     LISTS,
@@ -43,7 +42,7 @@ from silo.api.transport import (
     save_abilities,
     stop_if,
 )
-from silo.api.wire import Answer, Item, ItemTexts, ServerState, User, Wire, login_code
+from silo.api.wire import Answer, FactSource, Item, ItemTexts, ServerState, User, login_code
 from silo.bom.errors import (
     InputError,
     NotFoundError,
@@ -52,6 +51,7 @@ from silo.bom.errors import (
     ServerFaultError,
     SiloError,
 )
+from silo.bom.model import as_uuid
 from silo.bom.resolve import Categories, categories_of, name_key, rules_of, schema_names
 from silo.files import bare_checksum
 
@@ -90,25 +90,13 @@ class ItemChanges(ItemTexts):
     item_type: str | None = None
     properties: dict[str, Any] | None = None
     comment: str | None = None
-
-
-class NumberBody(Wire):
-    """``POST /api/generate-part-number``: a preview, it may be asked as often as one likes."""
-
-    schema_name: str = Field(alias="schema", default="kindred-rd")
-    category: str = Field(min_length=1)
+    source: FactSource | None = None
 
 
 class NumberAnswer(Answer):
     """The number that the next item of this category would get."""
 
     part_number: str
-
-
-class LookAlikesBody(Wire):
-    """``POST /api/items/look-alikes``: the name of each component, and the hash of its file ("": none)."""
-
-    wanted: list[dict[str, str]]
 
 
 class LookAlike(Answer):
@@ -159,16 +147,16 @@ class ItemCalls(FileCalls):
         """
 
         def batch(some: Sequence[str]) -> dict[str, Item]:
-            asked = UuidsBody(uuids=list(some))
-            reply = self._ask(f"{len(some)} items", "items", "by-uuid", body=asked, cancelled=cancelled)
+            where = (f"{len(some)} items", "items", "by-uuid")
+            reply = self._ask(*where, uuids=list(some), cancelled=cancelled)
             if reply.is_null(*LISTS):
                 # Go's empty list, or no answer. Read as "not registered" it would have all registered again.
                 raise RejectedError(f"{len(some)} items: the answer is null")
-            known = {_written(item.id): item for item in reply.models(Item, *LISTS)}
-            if reply.next or reply.total > len(known):
+            models = {_written(item.id): item for item in reply.models(Item, *LISTS)}
+            if reply.next or reply.total > len(models):
                 # Read as "not registered", the items of the other pages would be made once more.
-                raise RejectedError(f"{len(some)} items: the answer has {len(known)}, and is not the whole")
-            return {uuid: known[_written(uuid)] for uuid in some if _written(uuid) in known}
+                raise RejectedError(f"{len(some)} items: the answer has {len(models)}, and is not the whole")
+            return {uuid: models[_written(uuid)] for uuid in some if _written(uuid) in models}
 
         wanted = [uuid for uuid in uuids if uuid]
         return self._many("batch", wanted, batch, self.get_item_by_uuid, cancelled)
@@ -238,7 +226,7 @@ class ItemCalls(FileCalls):
             "name": name,
             "item_type": item_type,
             # Our server takes the identity from the client, which makes a repeat find the item.
-            "id": idempotency_key if is_uuid(idempotency_key) else None,
+            "id": as_uuid(idempotency_key or "") or None,
             "properties": dict(properties) if properties is not None else None,
             "projects": list(projects) if projects is not None else None,
             **texts,
@@ -300,7 +288,9 @@ class ItemCalls(FileCalls):
         ``properties`` makes a new revision (with ``comment``); the rest changes in place.
         """
         content = body(ItemChanges, changes, "an item")
-        reply = self._change("PUT", f"item {part_number}", "items", part_number, body=content)
+        extensions = ("source",) if content.source else ()
+        subject = f"item {part_number}"
+        reply = self._change("PUT", subject, "items", part_number, body=content, extensions=extensions)
         # Some servers answer a change with no content.
         if not reply.content.strip():
             return self.get_item(content.part_number or part_number)
@@ -312,7 +302,7 @@ class ItemCalls(FileCalls):
 
     def generate_part_number(self, schema: str, category: str) -> str:
         """The number that the next item of this category would get: a preview, nothing is reserved."""
-        wanted = body(NumberBody, {"schema": schema, "category": category}, "a part number")
+        wanted = {"schema": schema, "category": category}
         reply = self._change("POST", f"a number in {category}", "generate-part-number", body=wanted)
         return reply.model(NumberAnswer).part_number
 
@@ -329,13 +319,13 @@ class ItemCalls(FileCalls):
             return self.abilities.schemas[wanted]
         try:
             self.get_schema(wanted)
-            found = wanted
+            schema = wanted
         except RouteMissingError:
             raise
         except NotFoundError as error:
-            found = self._only_schema(wanted, error)
-        self.abilities.schemas[wanted] = found
-        return found
+            schema = self._only_schema(wanted, error)
+        self.abilities.schemas[wanted] = schema
+        return schema
 
     def _only_schema(self, wanted: str, missing: NotFoundError) -> str:
         try:
@@ -368,9 +358,9 @@ class ItemCalls(FileCalls):
         """
 
         def batch(some: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[LookAlike]]:
-            asked = LookAlikesBody(wanted=[{"name": name, "sha256": digest} for name, digest in some])
-            subject = f"items like {len(some)} components"
-            reply = self._ask(subject, "items", "look-alikes", body=asked, cancelled=cancelled)
+            asked = [{"name": name, "sha256": digest} for name, digest in some]
+            where = (f"items like {len(some)} components", "items", "look-alikes")
+            reply = self._ask(*where, wanted=asked, cancelled=cancelled)
             answer = reply.model(LookAlikesAnswer).look_alikes
             if len(answer) != len(some):
                 raise ServerFaultError(f"wanted {len(some)} lists of look-alikes, got {len(answer)}")
@@ -380,36 +370,26 @@ class ItemCalls(FileCalls):
 
     def _look_alikes(self, wanted: tuple[str, str]) -> list[LookAlike]:
         name, digest = wanted
-        # A server that does not search by content finds nothing; what has the name is compared all the same.
+        # A server that does not search by content finds nothing; what has the name is compared anyway.
         with_file = self.search_items(digest, limit=4) if digest else []
-        found = []
-        for item in {one.id: one for one in (*with_file, *self.search_items(name, limit=8))}.values():
+        matches = []
+        for item in {
+            each_item.id: each_item for each_item in (*with_file, *self.search_items(name, limit=8))
+        }.values():
             same_file = bool(digest) and digest in self._checksums(item)
             if same_file or name_key(item.name) == name_key(name):
-                found.append(
+                matches.append(
                     LookAlike(id=item.id, part_number=item.part_number, name=item.name, same_file=same_file)
                 )
-        return sorted(found, key=lambda one: not one.same_file)
+        return sorted(matches, key=lambda match: not match.same_file)
 
     def _checksums(self, item: Item) -> set[str]:
-        known = map(checksum_of, self.revisions(item.part_number))
-        return {bare_checksum(str(item.properties.get("file_sha256", ""))), *known}
+        checksums = map(checksum_of, self.revisions(item.part_number))
+        return {bare_checksum(str(item.properties.get("file_sha256", ""))), *checksums}
 
 
 def _written(uuid: str) -> str:
-    # CAD files hold identities in capitals, in braces, without dashes; the server answers with its own form.
-    try:
-        return str(UUID(uuid))
-    except ValueError:
-        return uuid.lower()
-
-
-def is_uuid(text: str | None) -> bool:
-    """True for a UUID in its usual form."""
-    try:
-        return text is not None and str(UUID(text)) == text.lower()
-    except ValueError:
-        return False
+    return as_uuid(uuid) or uuid.lower()
 
 
 class SiloClient(ItemCalls, BomCalls):
@@ -530,10 +510,13 @@ class SiloClient(ItemCalls, BomCalls):
     def modules(self) -> list[str]:
         """The names of the server's modules that are on."""
         said = self._get("its modules", "modules").mapping()
-        found = said.get("modules", said)
-        if isinstance(found, dict):
-            return [name for name, on in found.items() if not isinstance(on, dict) or on.get("enabled", True)]
-        return [str(one.get("name", one)) if isinstance(one, dict) else str(one) for one in found or ()]
+        data = said.get("modules", said)
+        if isinstance(data, dict):
+            return [name for name, on in data.items() if not isinstance(on, dict) or on.get("enabled", True)]
+        return [
+            str(module.get("name", module)) if isinstance(module, dict) else str(module)
+            for module in data or ()
+        ]
 
     def open_events(self, last_event_id: str | None = None) -> HttpEventStream:
         """Open the event stream; :class:`silo.api.events.EventListener` keeps one open for good."""

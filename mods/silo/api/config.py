@@ -10,7 +10,7 @@ The file is TOML, readable by its owner only::
 
 Where a server is: the base URL rule, the paths below it, and which other addresses are the same server.
 
-``http(s)://host[:port]`` means REST under ``/api``. An address with a path of its own is used as it is: thus
+``http(s)://host[:port]`` means REST under ``/api``. An address with a path of its own is used as it is: so
 ``https://host/silo/api`` works behind a proxy (the older workbench reads both the same way).
 """
 
@@ -27,7 +27,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
-from urllib.parse import SplitResult, quote, urljoin, urlsplit, urlunsplit
+from urllib.parse import SplitResult, quote, urljoin, urlsplit
 
 from silo.bom.errors import ConfigError, InputError, did_you_mean
 from silo.bom.numbers import yes_or_no
@@ -89,9 +89,14 @@ class ServerAddress:
         text = text.strip()
         # So people type the server on their own computer; elsewhere a scheme is not guessed.
         here = re.match(r"(localhost|127\.[\d.]+|\[::1\])(:\d+)?(/|$)", text, re.IGNORECASE)
-        parts = _split(f"http://{text}" if here else text)
+        text = f"http://{text}" if here else text
+        parts = _http(text)
+        if any(ord(c) <= 32 or ord(c) == 127 for c in text) or parts.query or parts.fragment:
+            raise ConfigError(f"{text!r}: a server address has no blanks, no ? and no #; {_ADVICE}")
         path = re.sub("/+", "/", parts.path).rstrip("/")
-        bare = urlunsplit((parts.scheme, _netloc(parts), "", "", ""))
+        host = (parts.hostname or "").rstrip(".")
+        port = f":{parts.port}" if parts.port not in (None, _DEFAULT_PORTS[parts.scheme]) else ""
+        bare = f"{parts.scheme}://[{host}]{port}" if ":" in host else f"{parts.scheme}://{host}{port}"
         if not path:
             return cls(api_root=bare + "/api", web_root=bare)
         return cls(api_root=bare + path, web_root=bare + path.removesuffix("/api"))
@@ -114,7 +119,13 @@ class ServerAddress:
 
     def api(self, *segments: str) -> str:
         """The URL of an API path; each segment is quoted whole, also a part number with a slash."""
-        return "/".join((self.api_root, *(_segment(s) for s in segments)))
+        for text in segments:
+            # Every HTTP library resolves "." and "..": such a part number would ask for something else.
+            if not text.strip(".") or not text.strip():
+                raise InputError(
+                    f"{text!r} cannot be a part number or an identity: the server could not be asked for it"
+                )
+        return "/".join((self.api_root, *(quote(text, safe="") for text in segments)))
 
     def web(self, path: str) -> str:
         """The full URL of a page such as ``resolve_url``; raises :class:`InputError` for another server's."""
@@ -124,29 +135,6 @@ class ServerAddress:
         if origin_of(url) != self.origin:
             raise InputError(f"{url}: this page is not on {self.host}; it is not opened")
         return url
-
-
-def _segment(text: str) -> str:
-    # Every HTTP library resolves "." and "..": such a part number would ask for something else.
-    if text.strip(".") == "" or not text.strip():
-        raise InputError(
-            f"{text!r} cannot be a part number or an identity: the server could not be asked for it"
-        )
-    return quote(text, safe="")
-
-
-def _netloc(parts: SplitResult) -> str:
-    host = (parts.hostname or "").rstrip(".")
-    name = f"[{host}]" if ":" in host else host
-    return name if parts.port in (None, _DEFAULT_PORTS[parts.scheme]) else f"{name}:{parts.port}"
-
-
-def _split(url: str) -> SplitResult:
-    """The parts of a server address."""
-    parts = _http(url)
-    if any(ord(c) <= 32 or ord(c) == 127 for c in url) or parts.query or parts.fragment:
-        raise ConfigError(f"{url!r}: a server address has no blanks, no ? and no #; {_ADVICE}")
-    return parts
 
 
 def _http(url: str) -> SplitResult:
@@ -219,10 +207,10 @@ def resolve_server(
         raise ConfigError(f"no Silo server is configured. {_HOW}, or write both into {path}")
     if not same_server(url, file_url):
         file_token = None
-    found, token_from = first_of(("--token", token), (TOKEN, env.get(TOKEN)), (str(path), file_token))
+    server_url, token_from = first_of(("--token", token), (TOKEN, env.get(TOKEN)), (str(path), file_token))
     return ServerSettings(
         url=url,
-        token=found,
+        token=server_url,
         verify=_verify(verify, env.get(VERIFY), stored.get("verify"), path),
         url_from=url_from or "",
         token_from=token_from or "",
@@ -233,7 +221,8 @@ def load_config(path: Path) -> dict[str, Any]:
     """The whole file as TOML tables; empty where there is none."""
     try:
         with path.open("rb") as file:
-            _warn_if_open(path, os.fstat(file.fileno()).st_mode)
+            if MODES_COUNT and os.fstat(file.fileno()).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+                log.warning("%s can be read by others and may hold a token; chmod 600 keeps it private", path)
             return tomllib.load(file)
     except FileNotFoundError:
         return {}
@@ -259,7 +248,16 @@ def save_config(
     values = {"url": url, "verify": verify, **({"token": token} if token else {})}
     # JSON's texts are TOML's; DEL is the one character that only TOML wants escaped.
     lines = [f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in values.items()]
-    _write_private(path, "\n".join(["[server]", *lines, ""]).replace("\x7f", "\\u007f"))
+    text = "\n".join(["[server]", *lines, ""]).replace("\x7f", "\\u007f")
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        # The new file is its owner's alone before a byte of the token is in it.
+        with replacing(path) as file:
+            file.write(text.encode())
+    except OSError as error:
+        raise ConfigError(
+            f"{path}: the configuration cannot be written ({error.strerror or error})"
+        ) from error
     return path
 
 
@@ -269,14 +267,14 @@ def checked_config(path: Path) -> dict[str, Any]:
     problems = []
     for name, value in config.items():
         if name != "server":
-            inside = "; it belongs below [server]" if name in _KEYS else _meant(f"[{name}]", ("[server]",))
+            inside = "; it belongs below [server]" if name in _KEYS else _hint(f"[{name}]", ("[server]",))
             what = f"unknown table [{name}]" if isinstance(value, dict) else f"unknown key {name}"
             problems.append(f"line {_line(path, name)}: {what}{inside}")
         elif not isinstance(value, dict):
             problems.append(f"line {_line(path, name)}: wanted a table [server], got {value!r}")
         else:
             problems += [
-                f"line {_line(path, key)}: unknown key {key} in [server]{_meant(key, _KEYS)}"
+                f"line {_line(path, key)}: unknown key {key} in [server]{_hint(key, _KEYS)}"
                 for key in value
                 if key not in _KEYS
             ]
@@ -285,8 +283,8 @@ def checked_config(path: Path) -> dict[str, Any]:
     return config
 
 
-def _meant(name: str, known: Sequence[str]) -> str:
-    return did_you_mean(name.lower(), known) or f" (known: {', '.join(known)})"
+def _hint(name: str, names: Sequence[str]) -> str:
+    return did_you_mean(name.lower(), names) or f" (known: {', '.join(names)})"
 
 
 def _line(path: Path, name: str) -> int:
@@ -314,12 +312,12 @@ def first_of(
     return None, None
 
 
-def same_server(one: str, other: str | None) -> bool:
+def same_server(url: str, other: str | None) -> bool:
     """True where two addresses, as people write them, mean one server: a token for one is for the other."""
-    if not one or not other:
+    if not url or not other:
         return False
     try:
-        return ServerAddress.parse(one).origin == ServerAddress.parse(other).origin
+        return ServerAddress.parse(url).origin == ServerAddress.parse(other).origin
     except InputError:  # an address that is none has no token
         return False
 
@@ -342,23 +340,6 @@ def verify_of(source: str, text: str) -> bool | str:
             f"{source}: wanted true, false or a file with certificate authorities; {text} is no file"
         )
     return str(Path(text).expanduser())
-
-
-def _warn_if_open(path: Path, mode: int) -> None:
-    if MODES_COUNT and mode & (stat.S_IRWXG | stat.S_IRWXO):
-        log.warning("%s can be read by others and may hold a token; chmod 600 keeps it private", path)
-
-
-def _write_private(path: Path, text: str) -> None:
-    try:
-        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        # The new file is its owner's alone before a byte of the token is in it.
-        with replacing(path) as file:
-            file.write(text.encode())
-    except OSError as error:
-        raise ConfigError(
-            f"{path}: the configuration cannot be written ({error.strerror or error})"
-        ) from error
 
 
 LONGEST_TOLD = 3600.0

@@ -23,7 +23,7 @@ import re
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -158,13 +158,6 @@ class SseParser:
         return chunk.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
-def parse(chunks: Iterable[bytes]) -> Iterator[ServerEvent]:
-    """The events of a stream; a half one at its end is dropped (the server sends it again)."""
-    parser = SseParser()
-    for chunk in chunks:
-        yield from parser.feed(chunk)
-
-
 def read_block(block: bytes) -> ServerEvent | None:
     """The event of one block of lines; None for a comment or a block without data."""
     name, lines = "", list[str]()
@@ -185,8 +178,8 @@ def read_block(block: bytes) -> ServerEvent | None:
 
 def _marker(block: bytes) -> str | None:
     # A server may set the id without an event, to say where to resume.
-    found = _ID.findall(block)
-    return found[-1].decode("utf-8", "replace") or None if found and b"\0" not in found[-1] else None
+    matches = _ID.findall(block)
+    return matches[-1].decode("utf-8", "replace") or None if matches and b"\0" not in matches[-1] else None
 
 
 def _json(text: str) -> Any:
@@ -279,18 +272,14 @@ class HttpEventStream:
             self._response.close()
             return
         # Closing the response here would wait for the reader; shutting the socket down wakes it.
+        raw: Any = self._response.raw
         try:
-            _shut_down(self._response)
+            if hasattr(raw, "shutdown"):  # urllib3 2.3
+                raw.shutdown()
+            else:
+                raw._fp.fp.raw._sock.shutdown(socket.SHUT_RDWR)
         except (AttributeError, ValueError, RuntimeError, OSError):
             return  # It ended by itself meanwhile.
-
-
-def _shut_down(response: requests.Response) -> None:
-    raw: Any = response.raw
-    if hasattr(raw, "shutdown"):  # urllib3 2.3
-        raw.shutdown()
-    else:
-        raw._fp.fp.raw._sock.shutdown(socket.SHUT_RDWR)
 
 
 class Connection(StrEnum):
@@ -365,21 +354,10 @@ def _kind(pause: Pause) -> Connection:
     )
 
 
-class Pauses(Protocol):
-    """Where the pause of a server is kept."""
+class Pauses:
+    """Where the pause of a server is kept: here, if nobody else asks the server."""
 
-    def clock(self) -> float: ...
-
-    def get(self) -> Pause | None: ...
-
-    def set(self, pause: Pause | None) -> None: ...
-
-
-class _OwnPauses:
-    """A listener's own, where nobody else asks the server."""
-
-    def __init__(self) -> None:
-        self._pause: Pause | None = None
+    _pause: Pause | None = None
 
     def clock(self) -> float:
         return time.time()
@@ -401,13 +379,13 @@ class EventListener:
     wait
         ``wait(event, seconds)`` sleeps until the event is set; for tests.
     pauses
-        where the pause of this server is kept; shared with whoever else asks it.
+        where the pause of this server is kept; shared with all others that ask it.
     around
         a context for all that the listener's thread does but waiting for the server's next event.
 
     Both callbacks run in the listener's thread, one at a time, none after :meth:`stop` has returned. An error
     in a callback is logged and costs only that call. Where events may have been missed (the server lost its
-    log or counts anew), an event of type ``reset`` comes first: read again what is shown.
+    log or counts again), an event of type ``reset`` comes first: read again what is shown.
     """
 
     def __init__(
@@ -425,7 +403,7 @@ class EventListener:
     ) -> None:
         self._api, self._on_event, self._on_state = api, on_event, on_state
         self._backoff, self._chance, self._wait = backoff or Backoff(), chance, wait
-        self._around, self._pauses = around, pauses or _OwnPauses()
+        self._around, self._pauses = around, pauses or Pauses()
         self._last_id = last_event_id
         self._stop, self._wake = threading.Event(), threading.Event()
         self._stream: EventStream | None = None
@@ -473,11 +451,11 @@ class EventListener:
         while not stop.is_set():
             pause, now = self._pauses.get(), self._pauses.clock()
             if pause is not None and pause != waited and pause.left(now):
-                waited = pause  # it was noted by whoever else asks this server
+                waited = pause  # another program that asks this server noted it
                 self._rest(stop, wake, _kind(pause), pause.reason, pause.left(now))
                 continue
             self._tell(stop, ConnectionState(Connection.CONNECTING))
-            heard, kind, told = _Heard(), Connection.OFFLINE, None
+            heard, kind, answer = _Heard(), Connection.OFFLINE, None
             try:
                 self._listen(stop, heard)
                 reason = "the server ended the connection"
@@ -489,22 +467,22 @@ class EventListener:
                 if stop.is_set():
                     return
                 if judge(error).scope is Scope.ALL:
-                    now, before = self._pauses.clock(), self._pauses.get()
-                    known = before.failures if before is not None and not heard.anything else 0
-                    failures = 1 if heard.anything else max(failures, known) + 1
-                    waited = pause_after(error, failures, now, self._backoff, self._chance())
+                    now, reached = self._pauses.clock(), 0 if heard.anything else failures
+                    before = self._pauses.get()
+                    waited = pause_after(error, before, now, self._backoff, self._chance(), reached)
+                    failures = waited.failures
                     self._pauses.set(waited)
                     self._rest(stop, wake, _kind(waited), waited.reason, round(waited.until - now, 3))
                     continue
-                reason, told = str(error), told_wait(error)
+                reason, answer = str(error), told_wait(error)
                 # A proxy answers with a page of its own while the server behind it starts.
                 if isinstance(error, RouteMissingError) and not isinstance(error, WebPageError):
-                    kind, told = Connection.UNSUPPORTED, SELDOM
+                    kind, answer = Connection.UNSUPPORTED, SELDOM
                 elif isinstance(error, AuthError):
-                    kind, told = Connection.REFUSED, SELDOM
+                    kind, answer = Connection.REFUSED, SELDOM
             # Only what was really received counts as success: a server that greets and drops us is not up.
             failures = 1 if heard.anything else failures + 1
-            self._rest(stop, wake, kind, reason, self._backoff.pause(failures, self._chance(), told))
+            self._rest(stop, wake, kind, reason, self._backoff.pause(failures, self._chance(), answer))
 
     def _rest(
         self, stop: threading.Event, wake: threading.Event, kind: Connection, reason: str, seconds: float
@@ -572,9 +550,9 @@ class EventListener:
             return
         before, self._last_id = self._last_id, marker
         if _number(marker) < _number(before):
-            # The server counts anew, so what happened around its restart was never replayed.
-            anew = ServerEvent(marker, RESET, {"reason": "the server counts anew"})
-            self._call(stop, self._on_event, anew)
+            # The server counts again, so what happened around its restart was never replayed.
+            again = ServerEvent(marker, RESET, {"reason": "the server counts again"})
+            self._call(stop, self._on_event, again)
 
     def _forget_mark(self, stop: threading.Event) -> None:
         if self._last_id is not None:

@@ -8,19 +8,30 @@ An upload whose answer was lost is not sent again before this is known: it would
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import os
 import secrets
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Self
 from urllib.parse import urljoin
 
 from silo.api.policy import error_of
-from silo.api.transport import LISTS, MAX_ERROR, Call, Caller, Cancel, Transport, as_json, stop_if
-from silo.api.wire import Document, HeldItem, LinkedFile, Release, Revision, Wire
+from silo.api.transport import (
+    LISTS,
+    MAX_ERROR,
+    Call,
+    Caller,
+    Cancel,
+    Params,
+    Transport,
+    as_json,
+    stop_if,
+)
+from silo.api.wire import Document, HeldItem, LinkedFile, Release, Revision, Scene, Wire
 from silo.bom.errors import (
     ConflictError,
     DocumentError,
@@ -86,7 +97,7 @@ def has_file(revision: Revision) -> bool:
 
 
 def standing(
-    revisions: Iterable[Revision], origin: str, known: int | None = None, seen: str = ""
+    revisions: Iterable[Revision], origin: str, checksum: int | None = None, seen: str = ""
 ) -> Standing:
     """How a file that was made from ``origin`` (a SHA-256) stands.
 
@@ -101,7 +112,7 @@ def standing(
         r
         for r in files
         if seen == seen_as(r.revision_number, r.file_checksum)
-        or (checksum_of(r) == origin if checksum_of(r) else r.revision_number == known)
+        or (checksum_of(r) == origin if checksum_of(r) else r.revision_number == checksum)
     ]
     base = max(mine, key=lambda r: r.revision_number, default=None)
     return Standing(base, files[-1] if files else None)
@@ -127,21 +138,21 @@ def other_name(path: str, revisions: Iterable[Revision]) -> str:
     if not named:
         return ""
     newest = max(named, key=lambda revision: revision.revision_number)
-    known = os.path.basename(str(newest.file_name))
-    one, other = (no_device_name(os.path.basename(name)).casefold() for name in (known, path))
-    return known if one != other else ""
+    old_name = os.path.basename(str(newest.file_name))
+    file_name, other = (no_device_name(os.path.basename(name)).casefold() for name in (old_name, path))
+    return old_name if file_name != other else ""
 
 
 REPACKED = (".kc",)
-"""Files that a server packs anew: what comes down differs from what went up."""
+"""Files that a server packs again: what comes down differs from what went up."""
 
 
 def is_there(revisions: Iterable[Revision], file_name: str, sha256: str, number: int | None) -> bool:
     """True where a file that became revision ``number`` is among these. The checksum decides where it is that
     of the file as it was sent; a revision without a file decides nothing."""
     by_number = Path(file_name).suffix.lower() in REPACKED
-    known = list(revisions)
-    files = [r for r in known if has_file(r)] or known  # some servers say nothing of files
+    revisions_here = list(revisions)
+    files = [r for r in revisions_here if has_file(r)] or revisions_here  # some servers say nothing of files
     return any(
         checksum_of(r) == sha256 or (r.revision_number == number and (by_number or not checksum_of(r)))
         for r in files
@@ -162,15 +173,15 @@ def download_revision(
     Raises ServerFaultError where it is not the file that was committed (``checksum``; "" where the server
     names none): it was damaged in the store or on the way.
     """
-    found = client.download_file(part_number, path, revision, cancelled=cancelled)
-    if checksum and found != checksum:
+    result = client.download_file(part_number, path, revision, cancelled=cancelled)
+    if checksum and result != checksum:
         remove_patiently(path)
         raise ServerFaultError(
             f"the file of {part_number}, revision {revision}, is not the one that was committed: its SHA-256 "
-            f"is {found[:12]}…, wanted {checksum[:12]}…. Nothing was written; the server's administrator can "
-            "check its files"
+            f"is {result[:12]}…, wanted {checksum[:12]}…. Nothing was written; the server's administrator "
+            "can check its files"
         )
-    return found
+    return result
 
 
 class MayHaveArrivedError(ConflictError):
@@ -199,7 +210,7 @@ def find_arrived(
     client: SiloClient,
     part_number: str,
     sent: SentFile,
-    known: Sequence[Revision],
+    revisions: Sequence[Revision],
     *,
     cancelled: Cancel | None = None,
 ) -> Revision | None:
@@ -209,7 +220,7 @@ def find_arrived(
     :class:`MayHaveArrivedError` where even that says nothing: a person looks before it is sent a second time.
     """
     doubtful: list[Revision] = []
-    for revision in sorted(known, key=lambda one: one.revision_number):
+    for revision in sorted(revisions, key=lambda each_revision: each_revision.revision_number):
         if revision.revision_number <= sent.base:
             continue
         if checksum := checksum_of(revision):
@@ -279,27 +290,59 @@ class Origin(Wire):
     items: list[HeldItem] | None = None
 
 
-class UuidsBody(Wire):
-    """``POST /api/items/by-uuid`` and ``documents/by-uuid``: many identities in one question."""
+class MissingModels(Wire):
+    """The answer of ``POST /api/models/missing``: contents by their SHA-256."""
 
-    uuids: list[str]
+    sha256: list[str]
 
 
 class FileCalls(Caller):
     """Revisions of items and documents, and their files; a document is named by its :class:`DocumentId`."""
+
+    def lacking_models(self, sha256: Iterable[str], /) -> set[str]:
+        """Return which of these contents are files of revisions whose model the server does not have yet.
+
+        Raises RouteMissingError where the server keeps no models.
+        """
+        wanted, lacking = sorted(set(sha256)), set[str]()
+        for at in range(0, len(wanted), _PAGE):
+            reply = self._ask("the models", "models", "missing", sha256=wanted[at : at + _PAGE])
+            lacking.update(reply.model(MissingModels).sha256)
+        return lacking & set(wanted)
+
+    def put_model(self, sha256: str, part: str, body: bytes, /) -> None:
+        """Send ``geometry`` or ``structure`` of a content, packed with gzip."""
+        kind = "model/gltf-binary" if part == "geometry" else "application/json"
+        headers = {"Accept": "application/json", "Content-Type": kind, "Content-Encoding": "gzip"}
+        url = self._address.api("models", sha256, part)
+        call = Call("PUT", url, f"the {part} of a file", body=lambda: body, headers=headers, repeatable=True)
+        self._transport.send(call)
+
+    def get_scene(self, part_number: str, revision: int, /) -> Scene:
+        """Return where each part of a product stands, as a revision recorded its files.
+
+        Raises RouteMissingError where the server keeps no models.
+        """
+        asked: Params = {"revision": revision}
+        subject = f"the model of {part_number}"
+        return self._get(subject, *_path_of(part_number), "scene", params=asked).model(Scene)
+
+    def get_geometry(self, sha256: str, /) -> bytes:
+        """Return the GLB of a content."""
+        body = self._get("the geometry of a file", "models", sha256, "geometry").content
+        return gzip.decompress(body) if body.startswith(b"\x1f\x8b") else body
 
     def get_documents(self, uuids: Iterable[str], /) -> dict[str, Document]:
         """The documents with these UUIDs, in lower case, as they are now; unknown ones are left out.
 
         Raises RouteMissingError where the server knows no documents.
         """
-        found: dict[str, Document] = {}
+        documents: dict[str, Document] = {}
         wanted = sorted({uuid.lower() for uuid in uuids if uuid})
         for at in range(0, len(wanted), _PAGE):
-            asked = UuidsBody(uuids=wanted[at : at + _PAGE])
-            reply = self._ask("the files", "documents", "by-uuid", body=asked)
-            found |= {one.id: one for one in reply.models(Document, "documents", *LISTS)}
-        return found
+            reply = self._ask("the files", "documents", "by-uuid", uuids=wanted[at : at + _PAGE])
+            documents |= {model.id: model for model in reply.models(Document, "documents", *LISTS)}
+        return documents
 
     def get_document(self, uuid: str, /) -> Document:
         """One document, with what it links to and what links to it."""
@@ -308,7 +351,7 @@ class FileCalls(Caller):
     def documents_of(self, part_number: str, /) -> list[Document]:
         """The documents that hold an item, its own first."""
         where = (f"the files of {part_number}", "items", part_number, "documents")
-        return [one for page, _ in self._all(Document, *where, keys=("documents",)) for one in page]
+        return [document for page, _ in self._all(Document, *where, keys=("documents",)) for document in page]
 
     def get_release(self, part_number: str, label: str, /) -> Release:
         """A released revision of a product, or one in review, with all files as they were frozen.
@@ -331,13 +374,17 @@ class FileCalls(Caller):
             return self._all(Revision, subject, *where, keys=("revisions",), limit=limit, **more)
 
         pages = read(newest or _PAGE)
-        known, total = next(pages)
+        earlier, total = next(pages)
         # Numbers rise from 1: oldest first, the newest is not here while its number is below their count.
-        is_whole = max((one.revision_number for one in known), default=after) >= after + total
+        is_whole = max((revision.revision_number for revision in earlier), default=after) >= after + total
         if newest is None or not is_whole:
-            known = [one for page, _ in (read(_PAGE) if newest else pages) for one in page] + known
-        found = {one.revision_number: one for one in known if one.revision_number > after}
-        return [found[number] for number in sorted(found, reverse=True)][:newest]
+            earlier = [
+                revision for page, _ in (read(_PAGE) if newest else pages) for revision in page
+            ] + earlier
+        by_number = {
+            revision.revision_number: revision for revision in earlier if revision.revision_number > after
+        }
+        return [by_number[number] for number in sorted(by_number, reverse=True)][:newest]
 
     def get_revision(self, part_number: str, number: int, /) -> Revision:
         """One revision, with the files that its file links to."""
@@ -458,7 +505,7 @@ def _upload_fields(
     if origin.links is not None:
         fields["links"] = as_json([link.model_dump(exclude_defaults=True) for link in origin.links]).decode()
     if origin.items:
-        fields["items"] = as_json([one.model_dump(exclude_defaults=True) for one in origin.items]).decode()
+        fields["items"] = as_json([item.model_dump(exclude_defaults=True) for item in origin.items]).decode()
     return fields
 
 
@@ -507,23 +554,17 @@ def _in_two_steps(
 
 def _write(path: Path, pieces: Iterator[bytes], total: int, on_progress: Progress | None) -> str:
     digest, done = hashlib.sha256(), 0
-    with _replacing(path) as file:
-        for piece in pieces:
-            done += len(piece)
-            digest.update(piece)
-            file.write(piece)
-            if on_progress is not None:
-                on_progress(done, max(total, done))
-    return digest.hexdigest()
-
-
-@contextmanager
-def _replacing(path: Path) -> Iterator[BinaryIO]:
     try:
         with replacing(path) as file:
-            yield file
+            for piece in pieces:
+                done += len(piece)
+                digest.update(piece)
+                file.write(piece)
+                if on_progress is not None:
+                    on_progress(done, max(total, done))
     except OSError as error:
         raise DocumentError(str(path), f"cannot be written ({error.strerror or error})") from error
+    return digest.hexdigest()
 
 
 class FileForm:
@@ -548,7 +589,16 @@ class FileForm:
         self._path = path
         self._progress, self._cancelled = on_progress, cancelled
         self._boundary = secrets.token_hex(16)
-        self._begin = self._text_parts(fields) + self._file_head(file_name)
+        # The quoting that browsers use for file names (WHATWG HTML, multipart/form-data encoding).
+        quoted = file_name.replace('"', "%22").replace("\r", "%0D").replace("\n", "%0A")
+        begin, disposition = f"--{self._boundary}\r\n", "Content-Disposition: form-data; name="
+        parts = [
+            f'{begin}{disposition}"{name}"\r\nContent-Type: text/plain; charset=utf-8\r\n\r\n{text}\r\n'
+            for name, text in fields.items()
+        ]
+        parts.append(f'{begin}{disposition}"file"; filename="{quoted}"\r\n')
+        parts.append("Content-Type: application/octet-stream\r\n\r\n")
+        self._begin = "".join(parts).encode("utf-8", "replace")
         self._end = f"\r\n--{self._boundary}--\r\n".encode()
         try:
             self._file: BinaryIO = path.open("rb")
@@ -579,7 +629,9 @@ class FileForm:
         """The next bytes of the form."""
         stop_if(self._cancelled)
         if self._head:
-            return self._take_head(size)
+            size = len(self._head) if size < 0 else size
+            block, self._head = self._head[:size], self._head[size:]
+            return block
         if self._left:
             return self._take_file(size)
         tail, self._tail = self._tail, b""
@@ -597,11 +649,6 @@ class FileForm:
     def close(self) -> None:
         self._file.close()
 
-    def _take_head(self, size: int) -> bytes:
-        size = len(self._head) if size < 0 else size
-        block, self._head = self._head[:size], self._head[size:]
-        return block
-
     def _take_file(self, size: int) -> bytes:
         try:
             block = self._file.read(min(self._left, size if size > 0 else _BLOCK))
@@ -616,21 +663,6 @@ class FileForm:
         if self._progress is not None:
             self._progress(self.file_size - self._left, self.file_size)
         return block
-
-    def _text_parts(self, fields: Mapping[str, str]) -> bytes:
-        return "".join(
-            f'--{self._boundary}\r\nContent-Disposition: form-data; name="{name}"\r\n'
-            f"Content-Type: text/plain; charset=utf-8\r\n\r\n{text}\r\n"
-            for name, text in fields.items()
-        ).encode("utf-8", "replace")
-
-    def _file_head(self, name: str) -> bytes:
-        # The quoting that browsers use for file names (WHATWG HTML, multipart/form-data encoding).
-        quoted = name.replace('"', "%22").replace("\r", "%0D").replace("\n", "%0A")
-        return (
-            f'--{self._boundary}\r\nContent-Disposition: form-data; name="file"; filename="{quoted}"\r\n'
-            "Content-Type: application/octet-stream\r\n\r\n"
-        ).encode("utf-8", "replace")
 
 
 class FileBody(FileForm):

@@ -210,8 +210,8 @@ _WRAPPERS = (rq.ConnectionError, rq.ChunkedEncodingError, u3.MaxRetryError, u3.P
 
 def translate(error: Exception, where: Where) -> SiloError:
     """Our error for a foreign one, in plain words; never quotes a header."""
-    told = _innermost(error)
-    kind, text = next((TABLE[one] for one in type(told).__mro__ if one in TABLE), _GARBLED)
+    exception = _innermost(error)
+    kind, text = next((TABLE[cause] for cause in type(exception).__mro__ if cause in TABLE), _GARBLED)
     return kind(text.format(host=where.host, asked=where.asked, connect=where.connect, read=where.read))
 
 
@@ -280,8 +280,8 @@ class Reply:
     def total(self) -> int:
         """How many things there are on all pages; 0 where the server does not say."""
         said = self.data() if "X-Total-Count" not in self.headers else None
-        told = said.get("total") if isinstance(said, dict) else self.headers.get("X-Total-Count", "")
-        return whole_number(str(told)) or 0
+        header = said.get("total") if isinstance(said, dict) else self.headers.get("X-Total-Count", "")
+        return whole_number(str(header)) or 0
 
     @property
     def next(self) -> dict[str, str]:
@@ -328,15 +328,15 @@ class Reply:
 
     def models(self, kind: type[Model], *keys: str) -> list[Model]:
         """The answer as a list of models: a bare list, or an object that holds it under one of ``keys``."""
-        found = _under(self.data(), keys)
-        if found is None:
-            found = []  # Go's empty list
-        if not isinstance(found, list):
+        models_read = _under(self.data(), keys)
+        if models_read is None:
+            models_read = []  # Go's empty list
+        if not isinstance(models_read, list):
             raise ServerFaultError(
                 f"{self.where.asked} answered no list where one was wanted ({', '.join(keys)})"
             )
         with translated(self.where):
-            return TypeAdapter(list[kind]).validate_python(found)  # type: ignore[valid-type]
+            return TypeAdapter(list[kind]).validate_python(models_read)  # type: ignore[valid-type]
 
 
 @dataclass(frozen=True)
@@ -377,7 +377,7 @@ def complaint(reply: Reply) -> Complaint:
 def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
     """The error that a bad status stands for; 503 on ``writing`` is a read-only server, else no server."""
     said = complaint(reply)
-    told = f": {said.text}" if said.text else ""
+    detail = f": {said.text}" if said.text else ""
     asked, host, status = reply.where.asked, reply.where.host, reply.status
     if status == 401 and not reply.secret:
         return AuthError(
@@ -386,44 +386,44 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         )
     if status == 401:
         return AuthError(
-            f"{host} does not accept the token{told}. Give a valid one (SILO_API_TOKEN, or the settings; "
+            f"{host} does not accept the token{detail}. Give a valid one (SILO_API_TOKEN, or the settings; "
             "`silo-mod doctor` shows which one is used)"
         )
     if status == 403:
-        return ForbiddenError(f"{asked}: this token may not do that{told}. Ask for the editor role")
+        return ForbiddenError(f"{asked}: this token may not do that{detail}. Ask for the editor role")
     if status == 404 and reply.is_html:
         return WebPageError(
-            f"{asked}: not found, says a web page{told}; is this the address of a Silo server?"
+            f"{asked}: not found, says a web page{detail}; is this the address of a Silo server?"
         )
     if status in (405, 501) or (status == 404 and _router_speaks(said)):
-        return RouteMissingError(f"{asked}: this server does not know the request ({status}){told}")
+        return RouteMissingError(f"{asked}: this server does not know the request ({status}){detail}")
     if status in (404, 410):
-        return NotFoundError(f"{asked}: not found{told}")
+        return NotFoundError(f"{asked}: not found{detail}")
     if status == 409:
         if said.code == NewerRevisionError.code and said.revision is not None:
-            return NewerRevisionError(f"{asked}{told}", said.revision)
+            return NewerRevisionError(f"{asked}{detail}", said.revision)
         if said.code == MissingRevisionError.code:
-            return MissingRevisionError(f"{asked}{told}")
+            return MissingRevisionError(f"{asked}{detail}")
         cycle = len(said.path) > 1
         return (
             CycleError(said.path)
             if cycle
-            else ConflictError(f"{asked}: in conflict with what is there{told}")
+            else ConflictError(f"{asked}: in conflict with what is there{detail}")
         )
     if status == 412:
         return VersionConflictError(
-            f"{asked}: somebody changed it meanwhile{told}. Read it again, then repeat"
+            f"{asked}: somebody changed it meanwhile{detail}. Read it again, then repeat"
         )
     later = retry_after(reply) if status in _LATER else None
     if status == 503 and writing and not reply.is_html and _read_only(said, later):
-        closed = ReadOnlyError(f"{host} takes no changes now{told}. Nothing is lost; it can be sent later")
+        closed = ReadOnlyError(f"{host} takes no changes now{detail}. Nothing is lost; it can be sent later")
         closed.named = _names_read_only(said)
         return _put_off(closed, later)
     if status == 429 or (status == 503 and later is not None):
         when = f"in {duration(later)}" if later is not None else "later"
-        return _put_off(BusyError(f"{host} is busy ({status}){told}. Try again {when}"), later)
+        return _put_off(BusyError(f"{host} is busy ({status}){detail}. Try again {when}"), later)
     if status in _LATER:
-        gone = UnreachableError(f"{host} cannot answer now ({status}){told}. Try again later")
+        gone = UnreachableError(f"{host} cannot answer now ({status}){detail}. Try again later")
         gone.refused = status == 503
         return _put_off(gone, later)
     if 400 <= status < 500:
@@ -431,7 +431,7 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         rejected = RejectedError(f"{asked}: not accepted ({status}): {what}", said.problems)
         rejected.status = status
         return rejected
-    return ServerFaultError(f"{asked}: the server failed ({status}){told}")
+    return ServerFaultError(f"{asked}: the server failed ({status}){detail}")
 
 
 def retry_after(reply: Reply) -> float | None:
@@ -469,8 +469,8 @@ def _under(data: Any, keys: Sequence[str]) -> Any:
 
 
 def _titled(reply: Reply) -> str:
-    found = _TITLE.search(reply.content[:20_000].decode("utf-8", "replace"))
-    return f" ({_clean(html.unescape(found[1]), reply.secret)})" if found else ""
+    match = _TITLE.search(reply.content[:20_000].decode("utf-8", "replace"))
+    return f" ({_clean(html.unescape(match[1]), reply.secret)})" if match else ""
 
 
 def _texts(value: Any, reply: Reply) -> tuple[str, ...]:
@@ -536,22 +536,18 @@ def judge(error: SiloError, alive: Callable[[], object] | None = None) -> Verdic
     if isinstance(error, NotSentError):
         return Verdict(Scope.ALL, Then.RETRY)
     if isinstance(error, (UnreachableError, ServerFaultError, WebPageError)):
-        return Verdict(_scope(error, alive), Then.RETRY, wait)
+        scope = Scope.ALL if alive is None and isinstance(error, UnreachableError) else Scope.ENTRY
+        try:
+            if alive is not None:
+                alive()
+        except SiloError:
+            scope = Scope.ALL
+        return Verdict(scope, Then.RETRY, wait)
     if isinstance(error, RouteMissingError):
         return Verdict(Scope.KIND, Then.RETRY)
     if isinstance(error, NotFoundError):
         return Verdict(Scope.ENTRY, Then.RETRY, wait)
     return Verdict(Scope.ENTRY, Then.PERSON)
-
-
-def _scope(error: SiloError, alive: Callable[[], object] | None) -> Scope:
-    if alive is None:
-        return Scope.ALL if isinstance(error, UnreachableError) else Scope.ENTRY
-    try:
-        alive()
-    except SiloError:
-        return Scope.ALL
-    return Scope.ENTRY
 
 
 def is_certain(error: SiloError) -> bool:
@@ -575,8 +571,8 @@ def ends_run(error: SiloError, api: object = None) -> bool:
 
 def told_wait(error: SiloError) -> float | None:
     """The pause that the server named with this error, in seconds, within bounds."""
-    told = getattr(error, "retry_after", None)
-    return None if told is None else min(float(told), LONGEST_TOLD)
+    value = getattr(error, "retry_after", None)
+    return None if value is None else min(float(value), LONGEST_TOLD)
 
 
 def may_repeat(error: SiloError, *, harmless: bool) -> bool:
@@ -588,8 +584,6 @@ def may_repeat(error: SiloError, *, harmless: bool) -> bool:
     Any other change is repeated only where the server certainly did not process it: it never left this
     computer, or the server put it off (429, 503 with Retry-After).
     """
-    if isinstance(error, ReadOnlyError):
-        return False  # until a person changes that; waiting here would help nobody
     return isinstance(error, (NotSentError, BusyError)) or (harmless and isinstance(error, UnreachableError))
 
 
@@ -601,23 +595,31 @@ class Backoff:
     factor: float = 2.0
     longest: float = 60.0
 
-    def pause(self, attempt: int, chance: float, told: float | None = None) -> float:
+    def pause(self, attempt: int, chance: float, wanted_s: float | None = None) -> float:
         """The pause after failed attempt ``attempt`` (from 1).
 
         ``chance`` in [0, 1) takes off up to half, so that many clients do not return in one moment. ``told``
         is the server's own wish: the pause is never shorter.
         """
         full = min(self.longest, self.first * self.factor ** min(attempt - 1, 60))
-        return max(full * (1.0 - chance / 2.0), told or 0.0)
+        return max(full * (1.0 - chance / 2.0), wanted_s or 0.0)
 
 
-def pause_after(error: SiloError, failures: int, now: float, backoff: Backoff, chance: float) -> Pause:
-    """The pause after an error, which is the so-manieth in a row."""
+def pause_after(
+    error: SiloError, before: Pause | None, now: float, backoff: Backoff, chance: float, failures: int = 0
+) -> Pause:
+    """Return the pause after an error; ``failures`` counts those in a row before it, as ``before`` does.
+
+    ``before``, the pause that is known, is kept if it ends later: another request was promised that time.
+    """
+    failures = max(failures, before.failures if before is not None else 0) + 1
     wait = told_wait(error)
-    refused = isinstance(error, AuthError | ConfigError) and not isinstance(error, ForbiddenError)
-    if isinstance(error, UnreachableError):  # whoever is back in the network wants to see it soon
+    refused = isinstance(error, AuthError | ConfigError)
+    if isinstance(error, UnreachableError):  # a person who is back in the network wants to see it soon
         backoff = replace(backoff, longest=max(backoff.first, min(backoff.longest, 60.0)))
     until = math.inf if refused else now + backoff.pause(failures, chance, wait)
+    if before is not None and before.until > until:
+        return before
     return Pause(until, str(error), error.code, failures, wait is not None)
 
 
@@ -640,10 +642,10 @@ class Retries:
 
     def pause(self, attempt: int, error: SiloError, *, harmless: bool) -> float | None:
         """Seconds to wait after failed attempt ``attempt`` (from 1); None: give up and report the error."""
-        told = getattr(error, "retry_after", None)
+        value = getattr(error, "retry_after", None)
         tries = self.busy_tries if self.busy_tries and isinstance(error, BusyError) else self.tries
         if attempt >= tries or not may_repeat(error, harmless=harmless):
             return None
-        if told is not None:
-            return float(told) if told <= self.longest else None
+        if value is not None:
+            return float(value) if value <= self.longest else None
         return Backoff(self.first, 2.0, self.longest).pause(attempt, self.chance())

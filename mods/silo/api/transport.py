@@ -77,7 +77,7 @@ class Timeouts:
 
 @dataclass(frozen=True)
 class Call:
-    """One request. ``body`` makes the content anew for each attempt.
+    """One request. ``body`` makes the content again for each attempt.
 
     ``endless`` answers (downloads) may take as long as they come at all.
     """
@@ -113,14 +113,6 @@ class _Bearer(AuthBase):
         return "Bearer ***" if self._token else "no token"
 
 
-def clean_token(token: str | None) -> str | None:
-    """The token without blanks around it; a :class:`ConfigError`, without quoting it, if it is unusable."""
-    token = (token or "").strip()
-    if not all("!" <= c <= "~" for c in token):
-        raise ConfigError("the token holds blanks or characters that HTTP does not allow; copy it again")
-    return token or None
-
-
 class Transport:
     """Sends calls to one server over a :class:`requests.Session`; safe to share between threads."""
 
@@ -139,7 +131,9 @@ class Transport:
         self.address = address
         self.timeouts = timeouts
         self._retries = retries
-        self._token = clean_token(token)
+        self._token = (token or "").strip() or None
+        if not all("!" <= c <= "~" for c in self._token or ""):  # never quoted
+            raise ConfigError("the token holds blanks or characters that HTTP does not allow; copy it again")
         self._verify = verify
         self._session = session or _new_session(timeouts.read)
         self._max_bytes, self._clock = max_bytes, clock
@@ -168,7 +162,7 @@ class Transport:
                 if wait is None:
                     raise
                 self._retries.tell(wait, error)
-            self._rest(wait, call.cancelled)
+            self._pause(wait, call.cancelled)
 
     def _attempt(self, call: Call) -> Reply:
         with self.opened(call) as response:
@@ -191,8 +185,12 @@ class Transport:
             response = self._exchange(call, url, params, carry, read_timeout)
             if not response.is_redirect:
                 return response
-            with closing(response):
-                url, params = self._next_url(call, url, response), {}
+            with closing(response), translated(self.where(call.subject)):
+                target = urljoin(url, response.headers["Location"])
+                _check_redirect(
+                    call, self.address, origin_of(url), origin_of(target), target, response.status_code
+                )
+                url, params = target, {}
         raise ServerFaultError(
             f"{self.where(call.subject).asked} redirects in a circle; check the server address"
         )
@@ -202,13 +200,14 @@ class Transport:
     ) -> requests.Response:
         # A server on this computer is never behind a proxy, whatever the environment says of the others.
         proxies = {"no_proxy": self.address.origin[1]} if self.address.is_loopback else None
+        packing = "gzip, deflate" if _CAN_UNPACK else "identity"
         with translated(self.where(call.subject)):
             return self._session.request(
                 call.method,
                 url,
                 params=params,
                 data=call.body() if call.body else None,
-                headers=_headers(call),
+                headers={"Accept-Encoding": packing, "User-Agent": "silo-mod", **call.headers},
                 auth=_Bearer(self._token if carry else None),
                 timeout=(self.timeouts.connect, read_timeout or self.timeouts.read),
                 allow_redirects=False,
@@ -216,13 +215,6 @@ class Transport:
                 verify=self._verify,
                 proxies=proxies,
             )
-
-    def _next_url(self, call: Call, url: str, response: requests.Response) -> str:
-        with translated(self.where(call.subject)):
-            target = urljoin(url, response.headers["Location"])
-            here, there = origin_of(url), origin_of(target)
-        _check_redirect(call, self.address, here, there, target, response.status_code)
-        return target
 
     def reply(self, response: requests.Response, call: Call) -> Reply:
         """The response, read whole within the call's bounds."""
@@ -250,7 +242,7 @@ class Transport:
 
             _check_length(response, size, where)
 
-    def _rest(self, seconds: float, cancelled: Cancel | None) -> None:
+    def _pause(self, seconds: float, cancelled: Cancel | None) -> None:
         if cancelled is None:
             self._retries.sleep(seconds)
         else:
@@ -290,17 +282,14 @@ def read_some(response: requests.Response) -> bytes:
     return bytes(raw._fp.read1(_CHUNK) or b"")
 
 
-def _headers(call: Call) -> dict[str, str]:
-    packing = "gzip, deflate" if _CAN_UNPACK else "identity"
-    return {"Accept-Encoding": packing, "User-Agent": "silo-mod", **call.headers}
-
-
 def _check_length(response: requests.Response, size: int, where: Where) -> None:
     # urllib3 1 takes an early end for the end.
-    told = whole_number(response.headers.get("Content-Length", ""))
+    length = whole_number(response.headers.get("Content-Length", ""))
     packed = "Content-Encoding" in response.headers or response.request.method == "HEAD"
-    if told is not None and not packed and size < told:
-        raise UnreachableError(f"{where.asked} closed the connection after {size} of {told} bytes; try again")
+    if length is not None and not packed and size < length:
+        raise UnreachableError(
+            f"{where.asked} closed the connection after {size} of {length} bytes; try again"
+        )
 
 
 def stop_if(cancelled: Cancel | None) -> None:
@@ -313,7 +302,8 @@ def _check_redirect(
     call: Call, home: ServerAddress, here: Origin, there: Origin, target: str, status: int
 ) -> None:
     shown = f"{there[0]}://{urlsplit(target).netloc}"
-    if _is_login(urlsplit(target).path):
+    words = urlsplit(target).path.lower().strip("/").split("/")
+    if _LOGIN.intersection(words) or words[:2] == ["auth", "oidc"]:
         at = "" if there[1] == here[1] else f" at {shown}"
         raise AuthError(
             f"{home.host} wants a login{at}: there is no token, or it is not valid any more. "
@@ -328,11 +318,6 @@ def _check_redirect(
             f"{home.host} redirects a change to {shown}: not followed. If that is the Silo server, "
             "set it as the server address"
         )
-
-
-def _is_login(path: str) -> bool:
-    words = path.lower().strip("/").split("/")
-    return bool(_LOGIN.intersection(words)) or words[:2] == ["auth", "oidc"]
 
 
 class _Adapter(HTTPAdapter):
@@ -374,19 +359,15 @@ def _patient(pool: Any, patience: float) -> Any:
 
 
 def _new_session(patience: float) -> requests.Session:
+    from http.cookiejar import DefaultCookiePolicy
+
     session = requests.Session()
     adapter = _Adapter(patience)
     session.mount("http://", adapter)
     session.mount("https://", adapter)
     # The token is the only thing that says who we are; a session cookie would outlive its withdrawal.
-    session.cookies.set_policy(_no_cookies())
+    session.cookies.set_policy(DefaultCookiePolicy(allowed_domains=[]))
     return session
-
-
-def _no_cookies() -> Any:
-    from http.cookiejar import DefaultCookiePolicy
-
-    return DefaultCookiePolicy(allowed_domains=[])
 
 
 log = logging.getLogger("silo.api")
@@ -433,21 +414,21 @@ def abilities_path() -> Path:
 def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time.time) -> Abilities:
     """What is known of a server; nothing where that is older than a day."""
     try:
-        known = _Kept.model_validate(read_memory(path).get(server), strict=True)
+        memory = _Kept.model_validate(read_memory(path).get(server), strict=True)
     except ValidationError:
         return Abilities()
-    fresh = 0 <= clock() - known.learned_at < KEPT_S
-    return Abilities(**known.model_dump(exclude={"learned_at"})) if fresh else Abilities()
+    fresh = 0 <= clock() - memory.learned_at < KEPT_S
+    return Abilities(**memory.model_dump(exclude={"learned_at"})) if fresh else Abilities()
 
 
 def save_abilities(
-    path: Path, server: str, known: Abilities, *, clock: Callable[[], float] = time.time
+    path: Path, server: str, abilities: Abilities, *, clock: Callable[[], float] = time.time
 ) -> None:
     """Remember; what cannot be written is not remembered. One small JSON file for all servers.
 
     It is only a memory: a file that is lost, old or damaged costs some requests, never an answer.
     """
-    content = {**read_memory(path), server: {**known.model_dump(), "learned_at": clock()}}
+    content = {**read_memory(path), server: {**abilities.model_dump(), "learned_at": clock()}}
     if (error := write_memory(path, content)) is not None:
         log.info("%s: what was learned about %s is not kept (%s)", path, server, error)
 
@@ -520,29 +501,29 @@ class Caller:
                 )
             last, more = page, {**params, **(following or {"offset": rows})}
 
-    def _ask(self, subject: str, *segments: str, body: BaseModel, cancelled: Cancel | None = None) -> Reply:
+    def _ask(self, subject: str, *segments: str, cancelled: Cancel | None = None, **asked: Any) -> Reply:
         """Ask what is too long for an address: a POST that may be repeated freely."""
-        return self._change("POST", subject, *segments, body=body, repeatable=True, cancelled=cancelled)
+        return self._change("POST", subject, *segments, body=asked, repeatable=True, cancelled=cancelled)
 
     def _change(
         self,
         method: str,
         subject: str,
         *segments: str,
-        body: BaseModel,
+        body: BaseModel | Mapping[str, Any],
         headers: Mapping[str, str] | None = None,
         repeatable: bool = False,
         cancelled: Cancel | None = None,
         extensions: Sequence[str] = (),
     ) -> Reply:
-        """Send a model as JSON.
+        """Send a model, or what it would hold, as JSON.
 
         extensions
             keys that only our own server knows, also inside lists of objects. A strict server refuses them:
             it is asked once more without them, and never sent any again.
         """
         # Not pydantic's own JSON, which writes NaN as null: what cannot be said is an error, no gap.
-        said = body.model_dump(by_alias=True, exclude_none=True)
+        said = body.model_dump(by_alias=True, exclude_none=True) if isinstance(body, BaseModel) else body
         bare = _without(said, extensions)
 
         def send(data: Any) -> Reply:
@@ -588,7 +569,7 @@ class Caller:
             the field of :class:`Abilities` that says whether the server has such a request.
         """
         wanted = list(dict.fromkeys(keys))
-        found: dict[K, T] = {}
+        result: dict[K, T] = {}
         chunks = [wanted[start : start + MAX_IN_BATCH] for start in range(0, len(wanted), MAX_IN_BATCH)]
         while chunks:
             stop_if(cancelled)
@@ -601,7 +582,7 @@ class Caller:
                 except NotFoundError:
                     setattr(self.abilities, ability, False)
                 except (ForbiddenError, ReadOnlyError, BusyError):
-                    # No POST for viewers and on a read-only server: GET is allowed all the same.
+                    # No POST for viewers and on a read-only server: GET is allowed anyway.
                     self._refused = self._refused | {ability}
                 except RejectedError:
                     # Too many at once, or a malformed key, which spoils the batch: alone, it is unknown.
@@ -609,8 +590,8 @@ class Caller:
                         half = len(chunk) // 2
                         chunks[:0] = [chunk[:half], chunk[half:]]
                         continue
-            found.update(_one_by_one(chunk, single, cancelled) if answer is None else answer)
-        return found
+            result.update(_one_by_one(chunk, single, cancelled) if answer is None else answer)
+        return result
 
     def _delete(self, subject: str, *segments: str) -> None:
         """Remove."""
@@ -621,8 +602,8 @@ def body(kind: type[Body], values: Mapping[str, Any], thing: str) -> Body:
     """The values as a request; raises :class:`InputError` with all that does not fit at once."""
     unknown = sorted(set(values) - set(kind.model_fields) - {"schema"})
     if unknown:
-        known = ", ".join(kind.model_fields)
-        raise InputError(f"{', '.join(unknown)}: no field of {thing}; wanted some of {known}")
+        text = ", ".join(kind.model_fields)
+        raise InputError(f"{', '.join(unknown)}: no field of {thing}; wanted some of {text}")
     try:
         return kind.model_validate(values)
     except ValidationError as error:
@@ -637,12 +618,12 @@ def _one_by_one(keys: Sequence[K], single: Callable[[K], T | None], cancelled: C
 
     with ThreadPoolExecutor(min(MAX_WORKERS, len(keys)), "silo-lookup") as pool:
         try:
-            found = list(pool.map(one, keys))
+            results = list(pool.map(one, keys))
         except BaseException:
             # One failed, so the rest is not wanted any more.
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return {key: value for key, value in zip(keys, found, strict=True) if value is not None}
+    return {key: value for key, value in zip(keys, results, strict=True) if value is not None}
 
 
 def _without(data: Any, keys: Sequence[str]) -> Any:
@@ -650,7 +631,7 @@ def _without(data: Any, keys: Sequence[str]) -> Any:
     if not keys or not isinstance(data, dict):
         return data
     return {
-        key: [_without(one, keys) for one in value] if isinstance(value, list) else value
+        key: [_without(member, keys) for member in value] if isinstance(value, list) else value
         for key, value in data.items()
         if key not in keys
     }

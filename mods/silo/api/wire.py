@@ -118,6 +118,45 @@ class ItemTexts(Wire):
     ] = None
 
 
+class Price(Wire):
+    """What a piece costs if at least ``quantity`` are ordered; both are decimal numbers as text."""
+
+    quantity: str
+    price: str
+
+
+class SupplierPart(Answer):
+    """An item as a supplier sells it. Amounts are decimal numbers as text, for money is no float.
+
+    pack_size, minimum
+        what is ordered is a whole number of packs, and at least the minimum.
+    preferred
+        it is ordered even if another one is cheaper.
+    """
+
+    supplier: str
+    number: str = ""
+    link: str = ""
+    pack_size: str = "1"
+    minimum: str = "0"
+    prices: list[Price] = Field(default_factory=list)
+    currency: str = "EUR"
+    lead_time_days: int | None = None
+    preferred: bool = False
+
+
+FACTS = ("mass_kg", "volume_m3", "com_m", "size_m", "material")
+"""Properties whose origin is kept: a model states them, a scale does, or a person."""
+FactSource = Literal["hand", "scale", "cad"]
+
+
+class FactOrigin(Answer):
+    """Where one of :data:`FACTS` comes from, and since when. What CAD says replaces only what CAD said."""
+
+    source: FactSource = "hand"
+    at: Time = None
+
+
 class Item(ItemTexts, Record):
     """An item of the PLM. ``id`` is its stable UUID; the part number may be renamed."""
 
@@ -134,6 +173,8 @@ class Item(ItemTexts, Record):
     bom_version: int | None = None
     last_sync: LastSync | None = None
     properties: dict[str, Any] = Field(default_factory=dict)
+    supplier_parts: list[SupplierPart] = Field(default_factory=list)
+    origins: dict[str, FactOrigin] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _name_or_description(self) -> Item:
@@ -143,7 +184,19 @@ class Item(ItemTexts, Record):
         return self
 
 
-class BomLine(Record):
+class LineTexts(Wire):
+    """The columns of a BOM line that people write and nothing is computed from.
+
+    A new column is a field here and in the server's ``LineState``, a column of its table with its migration,
+    and headers in :mod:`silo.bom.headers`. Requests, answers, form, page, history, export and import follow.
+    """
+
+    unit: Annotated[str | None, Field(title="Unit", json_schema_extra={"maxLength": 32})] = None
+    find_number: Annotated[str | None, Field(title="Find number", json_schema_extra={"maxLength": 32})] = None
+    notes: Annotated[str | None, Field(title="Notes", json_schema_extra={"long": True})] = None
+
+
+class BomLine(LineTexts, Record):
     """A BOM line as the server has it. ``unreferenced_since`` is set while no assembly component uses it.
 
     ``assembly_told``: the server has heard what the assembly says of this line that people own, namely
@@ -161,10 +214,7 @@ class BomLine(Record):
     rel_type: str = "component"
     quantity: Number | None = None
     total_quantity: Number | None = None
-    unit: str | None = None
     reference_designators: Annotated[list[str], BeforeValidator(_designators)] = Field(default_factory=list)
-    find_number: str | None = None
-    notes: str | None = None
     child_revision: int | None = None
     effective_revision: int | None = None
     source: Annotated[Source, BeforeValidator(_known_source)] = "assembly"
@@ -343,6 +393,29 @@ class ProductSummary(Answer):
     cost_missing: Lacking = Lacking()
 
 
+class Happened(Answer):
+    """One thing that changed in a product: ``what`` is added, removed, quantity or line (of the BOM
+    ``within``), data or file. Two frozen revisions do not say when, and who it was."""
+
+    what: str
+    within: str = ""
+    part_number: str
+    name: str = ""
+    before: str = ""
+    after: str = ""
+    at: Time = None
+    username: str = ""
+
+
+class ProductChanges(Answer):
+    """What changed in a product over all levels (``GET …/bom/changes``)."""
+
+    part_number: str
+    since: Time = Field(default=None, validation_alias="from")
+    to: Time = None
+    changes: list[Happened] = Field(default_factory=list)
+
+
 class ErrorBody(Answer):
     """The one shape of every HTTP error. ``problems`` lists all bad entries at once, with their index.
 
@@ -391,6 +464,8 @@ class Revision(Record):
         where the file was, relative to the folder that holds it and all that it links to.
     links
         the files that it links to; only where one revision is asked for.
+    draft
+        in the answer to an upload, if a revision of the item is released.
     """
 
     revision_number: int = Field(validation_alias=AliasChoices("revision_number", "revision", "number"))
@@ -409,6 +484,7 @@ class Revision(Record):
     base_revision: int | None = None
     file_path: str | None = None
     links: list[LinkedFile] = Field(default_factory=list)
+    draft: Draft | None = None
 
 
 class Document(Revision):
@@ -478,6 +554,115 @@ class Release(Record):
     approvals: list[Approval] = Field(default_factory=list)
     revision: int | None = None
     files: list[FrozenFile] = Field(default_factory=list)
+
+
+Finite = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+
+
+class Use(Wire):
+    """One placed use of a product (decision 24): ``member`` shows it, ``file`` and ``target`` name it.
+
+    matrix
+        row by row, in metres, from the target's axes to those of the product that holds the use.
+    color
+        RGBA that the link puts over all below it.
+    """
+
+    member: str = Field(max_length=400)
+    file: str = Field(default="", max_length=1000)
+    target: str = Field(max_length=1000)
+    uuid: str = Field(default="", max_length=64)
+    matrix: Annotated[list[Finite], Field(min_length=16, max_length=16)]
+    color: Annotated[list[Share], Field(min_length=4, max_length=4)] | None = None
+
+    @model_validator(mode="after")
+    def _is_affine(self) -> Use:
+        if self.matrix[12:] != [0, 0, 0, 1]:
+            raise ValueError("wanted 0 0 0 1 as the last row of the matrix")
+        return self
+
+
+Amount = Annotated[float, Field(gt=0, le=1e12, allow_inf_nan=False)]
+Point = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+
+
+class Stated(Wire):
+    """What a file states of a product (:data:`FACTS`, and the object's description), in its own axes."""
+
+    mass_kg: Amount | None = None
+    volume_m3: Amount | None = None
+    com_m: Point | None = None
+    size_m: Point | None = None
+    material: str | None = Field(default=None, max_length=200)
+    description: str | None = Field(default=None, max_length=1000)
+
+
+class ModelProduct(Wire):
+    """A product of a file: what it shows; ``shape``: it is drawn in the file's geometry."""
+
+    label: str = Field(default="", max_length=1000)
+    uuid: str = Field(default="", max_length=64)
+    shape: bool = False
+    stated: Stated | None = None
+    uses: list[Use] = Field(default_factory=list, max_length=100_000)
+
+
+class Structure(Wire):
+    """What a FreeCAD file shows, by the keys of its products; the first root is the file as a whole."""
+
+    format: Literal[1] = 1
+    roots: list[Annotated[str, Field(max_length=1000)]] = Field(default_factory=list, max_length=20_000)
+    products: dict[Annotated[str, Field(max_length=1000)], ModelProduct] = Field(
+        default_factory=dict, max_length=20_000
+    )
+
+
+class SceneGeometry(Record):
+    """The geometry of a file in a scene: its content, where it is, how many bytes it has on the wire."""
+
+    id: str
+    url: str
+    bytes: int
+
+
+class Occurrence(Record):
+    """A placed product that is drawn.
+
+    path, lines
+        the members from the top, and the part number of each; "" for what is no item.
+    geometry, key
+        an index into the scene's geometries (None: there is none yet), and the product's key in it.
+    matrix
+        column by column, in metres, to the axes of the top.
+    """
+
+    path: list[str]
+    lines: list[str]
+    part_number: str = ""
+    label: str = ""
+    geometry: int | None = None
+    key: str
+    matrix: list[float]
+    color: list[float] | None = None
+
+
+class NotDrawn(Record):
+    """What a scene lacks, and why."""
+
+    part_number: str = ""
+    label: str = ""
+    why: str
+
+
+class Scene(Record):
+    """``GET /api/items/{partNumber}/scene``: where each part of a product stands."""
+
+    part_number: str
+    revision: int
+    geometries: list[SceneGeometry] = Field(default_factory=list)
+    occurrences: list[Occurrence] = Field(default_factory=list)
+    missing: list[NotDrawn] = Field(default_factory=list)
 
 
 class WhereUsedLine(Record):

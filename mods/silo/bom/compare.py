@@ -163,7 +163,9 @@ def diff_bom(
             assembly_lines.append(line)
     units = {line.part_number: line.unit for line in manual_components}
     diff = _compare(local, _summed(assembly_lines), _summed(manual_lines), _summed(manual_components), units)
-    lines = _summed(_Line(one["child_part_number"], as_number(one.get("quantity"))) for one in kept)
+    lines = _summed(
+        _Line(each_line["child_part_number"], as_number(each_line.get("quantity"))) for each_line in kept
+    )
     return replace(diff, kept=tuple(BomChange(number, quantity) for number, quantity in lines.items()))
 
 
@@ -182,18 +184,20 @@ def lines_of_missing(
     gone = {(file, name) for file, name in missing}
     if not gone:
         return frozenset()
-    known: dict[str, set[tuple[Any, Any]]] = {}
+    components_by_number: dict[str, set[tuple[Any, Any]]] = {}
     owned = set()
     for line in lines:
         number = line["child_part_number"]
-        parts = {(one.get("file"), one.get("object")) for one in line.get("components") or ()}
-        known.setdefault(number, set()).update(parts)
+        parts = {
+            (component.get("file"), component.get("object")) for component in line.get("components") or ()
+        }
+        components_by_number.setdefault(number, set()).update(parts)
         if not is_manual(line):
             owned.add(number)
-    found = {number for number, components in known.items() if components & gone}
-    if gone.difference(*known.values()):
-        found |= {number for number in owned if not known[number] and number not in local}
-    return frozenset(found)
+    numbers = {number for number, components in components_by_number.items() if components & gone}
+    if gone.difference(*components_by_number.values()):
+        numbers |= {number for number in owned if not components_by_number[number] and number not in local}
+    return frozenset(numbers)
 
 
 def _compare(
@@ -274,19 +278,21 @@ def plan_merge(
     missing
         as in :func:`silo.bom.compare.diff_bom`: the lines of these components stay as they are.
     """
-    local, known = list(entries), list(lines)
-    diff = diff_bom(local, known, missing)
+    local, line_known = list(entries), list(lines)
+    diff = diff_bom(local, line_known, missing)
     kept = {change.part_number for change in diff.kept}
-    known = [line for line in known if line["child_part_number"] not in kept]
+    line_known = [line for line in line_known if line["child_part_number"] not in kept]
     flagged = {
-        line["child_part_number"] for line in known if line.get("unreferenced_since") and not is_manual(line)
+        line["child_part_number"]
+        for line in line_known
+        if line.get("unreferenced_since") and not is_manual(line)
     }
     gone = [change.part_number for change in diff.removed]
     return MergePlan(
         diff=diff,
         flag=tuple(number for number in gone if number not in flagged),
         unflag=tuple(sorted(flagged.difference(gone))),
-        tell=_untold(diff, local_quantities(local), known),
+        tell=_untold(diff, local_quantities(local), line_known),
     )
 
 
@@ -296,14 +302,14 @@ def _untold(
     in_conflict = {change.part_number for change in diff.conflicts}
     untold = []
     for line in lines:
-        number, told = line["child_part_number"], line.get("assembly_told")
-        if told is None or not is_manual(line) or not is_component(line):
+        number, components = line["child_part_number"], line.get("assembly_told")
+        if components is None or not is_manual(line) or not is_component(line):
             continue
         # An override of a line that the assembly once owned is in conflict too when the assembly drops it.
         now = local.get(number, 0.0)
         dropped = number not in local and bool(line.get("override"))
-        changed = told and not same_quantity(line.get("assembly_quantity"), now)
-        if changed or (not told and (number in in_conflict or dropped)):
+        changed = components and not same_quantity(line.get("assembly_quantity"), now)
+        if changed or (not components and (number in in_conflict or dropped)):
             untold.append(number)
     return tuple(untold)
 
@@ -363,7 +369,10 @@ def answer_of(
     """The answer to a merge (spec §5); ``sync_id`` and ``left_out`` only where there are such."""
 
     def lines(changes: Iterable[BomChange]) -> list[dict[str, Any]]:
-        return [{"part_number": one.part_number, "quantity": plain(one.quantity)} for one in changes]
+        return [
+            {"part_number": bom_change.part_number, "quantity": plain(bom_change.quantity)}
+            for bom_change in changes
+        ]
 
     unreferenced = [
         {
@@ -391,8 +400,8 @@ def answer_of(
         "warnings": unreferenced + [conflict_warning(change) for change in diff.conflicts],
         "resolve_url": resolve_url(part_number),
     }
-    told = {"sync_id": sync_id, "left_out": [dict(one) for one in left_out]}
-    return answer | {name: value for name, value in told.items() if value}
+    kept_answer = {"sync_id": sync_id, "left_out": [dict(part) for part in left_out]}
+    return answer | {name: value for name, value in kept_answer.items() if value}
 
 
 def conflict_warning(change: QuantityChange) -> dict[str, Any]:
@@ -463,7 +472,7 @@ def _first(*states: T | None) -> T:
 
 
 @dataclass(frozen=True, slots=True)
-class Assembly:
+class ComparedAssembly:
     """An assembly and its lines, quantities per one assembly. Paths are relative to the compared folder."""
 
     head: BomEntry
@@ -496,8 +505,8 @@ class LineChange:
 class AssemblyChange:
     """What became of one assembly. ``old`` is None for a new one, ``new`` for one that is gone."""
 
-    old: Assembly | None
-    new: Assembly | None
+    old: ComparedAssembly | None
+    new: ComparedAssembly | None
     lines: tuple[LineChange, ...] = ()
 
     @property
@@ -515,18 +524,23 @@ class AssemblyChange:
         return "changed" if self.lines else "moved"
 
 
-def compare_assemblies(old: Sequence[Assembly], new: Sequence[Assembly]) -> tuple[AssemblyChange, ...]:
+def compare_assemblies(
+    old: Sequence[ComparedAssembly], new: Sequence[ComparedAssembly]
+) -> tuple[AssemblyChange, ...]:
     """Every assembly whose lines or place differ, in the order of the new state, removed ones last."""
     match = _Match(old, new)
     before = {match.of_old(assembly.head): assembly for assembly in old}
-    found = []
+    changes = []
     for assembly in new:
-        known = before.pop(assembly.head.key, None)
-        lines = match.lines(known.lines if known else (), assembly.lines)
-        if known is None or lines or known.head.key != assembly.head.key:
-            found.append(AssemblyChange(known, assembly, lines))
-    gone = [AssemblyChange(known, None, match.lines(known.lines, ())) for known in before.values()]
-    return (*found, *gone)
+        earlier = before.pop(assembly.head.key, None)
+        lines = match.lines(earlier.lines if earlier else (), assembly.lines)
+        if earlier is None or lines or earlier.head.key != assembly.head.key:
+            changes.append(AssemblyChange(earlier, assembly, lines))
+    gone = [
+        AssemblyChange(compared_assembly, None, match.lines(compared_assembly.lines, ()))
+        for compared_assembly in before.values()
+    ]
+    return (*changes, *gone)
 
 
 @dataclass(frozen=True, slots=True)
@@ -567,12 +581,14 @@ class ThreeLines:
         return self.by_them and self.quantities[1] != self.quantities[2]
 
 
-def compare_three(base: Assembly | None, theirs: Assembly, mine: Assembly) -> tuple[ThreeLines, ...]:
+def compare_three(
+    base: ComparedAssembly | None, theirs: ComparedAssembly, mine: ComparedAssembly
+) -> tuple[ThreeLines, ...]:
     """Every line of an assembly that one of two people changed; what would be undone comes first.
 
     Without ``base``, every line in which the two differ; who changed it is then not known.
     """
-    common = base or Assembly(mine.head)
+    common = base or ComparedAssembly(mine.head)
     to_theirs, to_mine = _Match([common], [theirs]), _Match([common], [mine])
     across = _Match([theirs], [mine])
     left_theirs = {entry.key: entry for entry in theirs.lines}
@@ -593,7 +609,7 @@ def compare_three(base: Assembly | None, theirs: Assembly, mine: Assembly) -> tu
 class _Match:
     """Which component of the old state is which of the new one."""
 
-    def __init__(self, old: Sequence[Assembly], new: Sequence[Assembly]) -> None:
+    def __init__(self, old: Sequence[ComparedAssembly], new: Sequence[ComparedAssembly]) -> None:
         was, now = _components(old), _components(new)
         by_id_old, by_id_new = _by_identity(was), _by_identity(now)
         self._new_key: dict[Key, Key] = {}
@@ -617,15 +633,15 @@ class _Match:
     def lines(self, old: Iterable[BomEntry], new: Iterable[BomEntry]) -> tuple[LineChange, ...]:
         """The lines of one assembly that differ."""
         before = {self.of_old(entry): entry for entry in old}
-        found = []
+        changes = []
         for entry in new:
-            known = before.pop(entry.key, None)
-            if known is None or known.quantity != entry.quantity or known.key != entry.key:
-                found.append(LineChange(known, entry))
-        return (*found, *(LineChange(entry, None) for entry in before.values()))
+            bom_entry = before.pop(entry.key, None)
+            if bom_entry is None or bom_entry.quantity != entry.quantity or bom_entry.key != entry.key:
+                changes.append(LineChange(bom_entry, entry))
+        return (*changes, *(LineChange(entry, None) for entry in before.values()))
 
 
-def _components(assemblies: Iterable[Assembly]) -> dict[Key, BomEntry]:
+def _components(assemblies: Iterable[ComparedAssembly]) -> dict[Key, BomEntry]:
     return {entry.key: entry for assembly in assemblies for entry in (assembly.head, *assembly.lines)}
 
 

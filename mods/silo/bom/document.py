@@ -74,8 +74,8 @@ def saved_by(program: str | None) -> tuple[int, ...]:
 
     The numbers of realthunder's branch are dates (2022.111), and say nothing about FreeCAD's.
     """
-    found = re.match(r"(\d{1,3})\.(\d+)", program or "")
-    return tuple(map(int, found.groups())) if found else ()
+    match = re.match(r"(\d{1,3})\.(\d+)", program or "")
+    return tuple(map(int, match.groups())) if match else ()
 
 
 def derived(obj: Any, type_name: str) -> bool:

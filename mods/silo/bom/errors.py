@@ -8,6 +8,7 @@
     │   ├── DocumentError       a FreeCAD document cannot be read or written
     │   ├── SeveralAssembliesError  a document holds several, and none was named
     │   └── ConfigError         the configuration is missing or contradicts itself
+    │       └── PackageError    a Python package cannot be imported
     ├── RemoteError             the server's, or the way to it
     │   ├── UnreachableError    no answer (no network, refused, timed out)
     │   │   ├── NotSentError    the request did not leave this computer
@@ -54,15 +55,15 @@ def exit_of(error: BaseException) -> Exit:
     return Exit.REMOTE if isinstance(error, RemoteError | ConflictError) else Exit.BAD_INPUT
 
 
-def did_you_mean(given: str, known: Iterable[str]) -> str:
+def did_you_mean(given: str, candidates: Iterable[str]) -> str:
     """The end of a sentence about an unknown name: the known ones that look like it; "" where none does."""
-    near = difflib.get_close_matches(given, list(known), 2, 0.7)
+    near = difflib.get_close_matches(given, list(candidates), 2, 0.7)
     return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
-def counted(number: int, one: str, many: str = "") -> str:
+def counted(number: int, singular: str, many: str = "") -> str:
     """Return "1 item" or "2 items"; ``many`` if the plural is not ``one`` with an s."""
-    return f"{number} {one if number == 1 else many or one + 's'}"
+    return f"{number} {singular if number == 1 else many or singular + 's'}"
 
 
 # As ``FreeCAD.Qt.translate``: (context, text) -> the text in the user's language.
@@ -131,6 +132,12 @@ class ConfigError(InputError):
     """The configuration is missing or contradicts itself."""
 
     code = "bad_config"
+
+
+class PackageError(ConfigError):
+    """A Python package that is needed cannot be imported; installing it mends that."""
+
+    code = "bad_package"
 
 
 class RemoteError(SiloError):

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Self
 
 
 class Severity(StrEnum):
@@ -21,213 +22,332 @@ class Severity(StrEnum):
     ERROR = "error"  # the BOM cannot be trusted as it stands; it is not synced without consent
 
 
+_E, _W, _I = Severity.ERROR, Severity.WARNING, Severity.INFO
+
+
 class FindingCode(StrEnum):
-    """The machine names of findings; stable, part of the public surface."""
+    """The machine names of findings, which are stable and public, with all that follows from them.
 
-    # broken links (ERROR)
-    MISSING_FILE = "missing_file"
-    MISSING_OBJECT = "missing_object"
-    UNREADABLE_FILE = "unreadable_file"
-    LFS_POINTER = "lfs_pointer"
-    OUTSIDE_ROOT = "outside_root"
-    BROKEN_LINK = "broken_link"
-    CYCLE = "cycle"
-    TOO_DEEP = "too_deep"
-    # counted or left out by a rule
-    UNSET_LINK = "unset_link"
-    IN_DOCUMENT_LINK = "in_document_link"
-    SUB_ELEMENT_LINK = "sub_element_link"
-    NO_COMPONENT = "no_component"
-    SUPPRESSED = "suppressed"
-    EXCLUDED = "excluded"
-    MIRRORED = "mirrored"
-    VARIANT = "variant"
-    DRAFT_ARRAY = "draft_array"
-    ARRAY_SIZE = "array_size"
-    CONSUMED = "consumed"
-    NO_HARDWARE = "no_hardware"
-    SAME_ARTICLE = "same_article"
-    LOCAL_GEOMETRY = "local_geometry"
-    FOREIGN_COMPONENT = "foreign_component"
-    NO_CONTAINER = "no_container"
-    BESIDE_ASSEMBLY = "beside_assembly"
-    COUNTED_BESIDE = "counted_beside"
-    UNKNOWN_LINK_TYPE = "unknown_link_type"
-    NEWER_FREECAD = "newer_freecad"
-    STALE_ASSEMBLY_LINK = "stale_assembly_link"
-    LOST_ASSEMBLY = "lost_assembly"
-    RESPELT = "respelt"
-    EMPTY_BOM = "empty_bom"
-    NO_ROLE = "no_role"
-    TWO_ROLES = "two_roles"
-    CONSOLIDATION = "consolidation"
-    # identity
-    COPIED_IDENTITY = "copied_identity"
-    SHARED_IDENTITY = "shared_identity"
-    UNREGISTERED = "unregistered"
-    # against the server
-    UNREFERENCED = "unreferenced"
-    CONFLICT = "conflict"
+    severity
+        how much it usually matters.
+    meaning
+        what several of them have in common, in words, as in "15 × ...".
+    remedy
+        what a person does about it, for the reference; in Markdown.
+    sentence, tail
+        what the walk says of an object, and of the objects (``users``) that it says this of together.
+    """
 
-    @property
-    def meaning(self) -> str:
-        """What several of them have in common, in words, as in "15 × ..."."""
-        return _TABLE[self][0]
+    severity: Severity
+    meaning: str
+    remedy: str
+    sentence: str
+    tail: str
 
-    @property
-    def remedy(self) -> str:
-        """What a person does about it, for the reference; in Markdown."""
-        return _TABLE[self][1]
+    def __new__(
+        cls, code: str, severity: Severity, meaning: str, remedy: str, sentence: str = "", tail: str = ""
+    ) -> Self:
+        made = str.__new__(cls, code)
+        made._value_ = code
+        made.severity, made.meaning, made.remedy = severity, meaning, remedy
+        made.sentence, made.tail = sentence, tail
+        return made
 
-
-# What it is, and what a person does about it.
-_TABLE = {
-    FindingCode.MISSING_FILE: (
+    # broken links
+    MISSING_FILE = (
+        "missing_file",
+        _E,
         "a file that an assembly links to is not there",
         "put the file back, or `silo-mod relink` where it has moved; `--allow-missing` syncs the rest",
-    ),
-    FindingCode.MISSING_OBJECT: (
+        "The file {file} is missing",
+        "used by {users}",
+    )
+    MISSING_OBJECT = (
+        "missing_object",
+        _E,
         "a file lacks the object that an assembly links to",
-        "open the assembly and set the link anew; the part was deleted or replaced in its file",
-    ),
-    FindingCode.UNREADABLE_FILE: (
+        "open the assembly and set the link again; the part was deleted or replaced in its file",
+        "{file} no longer holds the object {part}",
+        "used by {users}",
+    )
+    UNREADABLE_FILE = (
+        "unreadable_file",
+        _E,
         "a file that an assembly links to cannot be read",
         "open the file in FreeCAD and save it, or take an older state from a backup or from Silo",
-    ),
-    FindingCode.LFS_POINTER: (
+        "The file {file} cannot be read",
+        "used by {users}",
+    )
+    LFS_POINTER = (
+        "lfs_pointer",
+        _E,
         "a Git LFS pointer, not the file itself; `git lfs pull` fetches it",
         "`git lfs pull`",
-    ),
-    FindingCode.OUTSIDE_ROOT: (
+        "{file} is a Git LFS pointer, not the file itself; fetch it with `git lfs pull`",
+        "used by {users}",
+    )
+    OUTSIDE_ROOT = (
+        "outside_root",
+        _E,
         "a link leads out of the project's folder",
         "move the file into the project and link to it there",
-    ),
-    FindingCode.BROKEN_LINK: ("a link is broken", "open the assembly and set the link anew, or delete it"),
-    FindingCode.CYCLE: (
+        "{file} lies outside the folder that may be read",
+        "used by {users}",
+    )
+    BROKEN_LINK = (
+        "broken_link",
+        _E,
+        "a link is broken",
+        "open the assembly and set the link again, or delete it",
+        "A link has lost its target",
+        "used by {users}",
+    )
+    CYCLE = (
+        "cycle",
+        _E,
         "an assembly contains itself",
         "delete one of the links of the ring that the message names",
-    ),
-    FindingCode.TOO_DEEP: (
+        "An assembly contains itself: {path}",
+        "the ring is closed by {users}",
+    )
+    TOO_DEEP = (
+        "too_deep",
+        _E,
         "an assembly is nested too deep",
         "look for a link that leads back into the assembly; else flatten a level",
-    ),
-    FindingCode.TWO_ROLES: (
-        "an object has two roles in the count; please report this",
-        "report it, with the file if you may",
-    ),
-    FindingCode.NO_ROLE: (
-        "an object has no role in the count; please report this",
-        "report it, with the file if you may",
-    ),
-    FindingCode.UNSET_LINK: ("a link leads nowhere", "give the link a target, or delete it"),
-    FindingCode.IN_DOCUMENT_LINK: (
+        "The assembly is nested more than {levels} levels deep; what lies below was not read",
+        "cut at {users}",
+    )
+    # counted or left out by a rule
+    UNSET_LINK = (
+        "unset_link",
+        _W,
+        "a link leads nowhere",
+        "give the link a target, or delete it",
+        "A link was never given a target",
+        "not counted: {users}",
+    )
+    IN_DOCUMENT_LINK = (
+        "in_document_link",
+        _I,
         "a link leads to an object of its own file",
         "nothing; it says how the link was counted",
-    ),
-    FindingCode.SUB_ELEMENT_LINK: (
+        "Links within the file lead to what is no part: construction geometry, not counted",
+        "these are: {users}",
+    )
+    SUB_ELEMENT_LINK = (
+        "sub_element_link",
+        _I,
         "a link leads to a part of an object",
         "nothing, if it is a reference; else link to the whole part",
-    ),
-    FindingCode.NO_COMPONENT: (
+        "{obj} is a reference to {element} of a part, not a component.",
+    )
+    NO_COMPONENT = (
+        "no_component",
+        _I,
         "a link leads to what is no component",
         "nothing; it says what was not counted",
-    ),
-    FindingCode.SUPPRESSED: (
+        "{obj} links to {target}, {words}: no component, not counted.",
+    )
+    SUPPRESSED = (
+        "suppressed",
+        _I,
         "suppressed, so not counted",
         "nothing, if it is meant; else end the suppression",
-    ),
-    FindingCode.EXCLUDED: (
+        "{obj} is suppressed and not counted.",
+    )
+    EXCLUDED = (
+        "excluded",
+        _I,
         "excluded by hand, so not counted",
         "nothing, if it is meant; else set `SiloBomExclude` to false",
-    ),
-    FindingCode.MIRRORED: (
+        "{obj} is excluded by SiloBomExclude on {by} and not counted.",
+    )
+    MIRRORED = (
+        "mirrored",
+        _W,
         "a mirrored part, counted as the part itself",
         "make the mirrored part a part of its own if it is bought or made differently",
-    ),
-    FindingCode.VARIANT: (
+        "{obj} is a mirrored {target} and counted as one; the other hand of a part usually needs a number"
+        " of its own.",
+    )
+    VARIANT = (
+        "variant",
+        _W,
         "a variant, counted as the part itself",
         "save the variant as a part of its own if it needs a number",
-    ),
-    FindingCode.DRAFT_ARRAY: ("a Draft array", "nothing; a link array would be clearer"),
-    FindingCode.ARRAY_SIZE: ("the size of an array is not known", "recompute the array in FreeCAD and save"),
-    FindingCode.CONSUMED: (
+        "{obj} is a variant of {target} (copy on change) and counted as one of it.",
+    )
+    DRAFT_ARRAY = (
+        "draft_array",
+        _I,
+        "a Draft array",
+        "nothing; a link array would be clearer",
+        "{obj} is a Draft array: counted as {count} × {target}.",
+    )
+    ARRAY_SIZE = (
+        "array_size",
+        _E,
+        "the size of an array is not known",
+        "recompute the array in FreeCAD and save",
+        "{obj} is a Draft array of {target} and does not say how many it shows; open it in FreeCAD, "
+        "recompute and save.",
+    )
+    CONSUMED = (
+        "consumed",
+        _I,
         "used up by another object, so not counted",
         "nothing, if it is no piece to buy; else take it out of the cut or fusion",
-    ),
-    FindingCode.NO_HARDWARE: (
+        "{obj} is used up by {target} (a cut, a boolean or a fusion) and not counted.",
+    )
+    NO_HARDWARE = (
+        "no_hardware",
+        _I,
         "standard parts are left out",
         "leave out `--no-hardware`, or change the setting, to count them",
-    ),
-    FindingCode.SAME_ARTICLE: (
+        "Standard parts are left out, as the settings say",
+        "not counted: {users}",
+    )
+    SAME_ARTICLE = (
+        "same_article",
+        _I,
         "several designations are one standard part",
         "use one standard for it in the project",
-    ),
-    FindingCode.LOCAL_GEOMETRY: (
+    )
+    LOCAL_GEOMETRY = (
+        "local_geometry",
+        _W,
         "modelled in the assembly's file, so not counted",
         "`silo-mod register TOP.FCStd --declare OBJECT` what is a part; set `SiloBomExclude` on the rest",
-    ),
-    FindingCode.FOREIGN_COMPONENT: (
+        "{what} yet in {obj} (pieces: {links}): {names}. Register them, or set SiloBomExclude on them.",
+    )
+    FOREIGN_COMPONENT = (
+        "foreign_component",
+        _W,
         "a component of another program",
         "import the part again from an FCStd file",
-    ),
-    FindingCode.NO_CONTAINER: (
+        "A2plus imported parts that name no FreeCAD file; they are own parts of this file",
+        "these are: {users}",
+    )
+    NO_CONTAINER = (
+        "no_container",
+        _W,
         "components lie in no assembly",
         "put the components into an assembly, or leave it: they are counted",
-    ),
-    FindingCode.BESIDE_ASSEMBLY: (
+        "The components lie in the document itself, in no assembly; they were counted.",
+    )
+    BESIDE_ASSEMBLY = (
+        "beside_assembly",
+        _W,
         "components lie beside the assembly, so they are not counted",
         "move into the assembly what belongs to it",
-    ),
-    FindingCode.COUNTED_BESIDE: (
+        "Components lie in the document itself, beside the assembly",
+        "not counted: {users}",
+    )
+    COUNTED_BESIDE = (
+        "counted_beside",
+        _I,
         "components lie beside the assembly, and are counted",
         "move them into the assembly",
-    ),
-    FindingCode.UNKNOWN_LINK_TYPE: ("an unknown kind of link", "check the quantity; report the type"),
-    FindingCode.NEWER_FREECAD: (
+        "Standard parts lie in the document beside {target} and are counted with it",
+        "these are: {users}",
+    )
+    UNKNOWN_LINK_TYPE = (
+        "unknown_link_type",
+        _W,
+        "an unknown kind of link",
+        "check the quantity; report the type",
+        "The object type {kind} is not known; it looks like a link and was read as one",
+        "check the quantity of {users}",
+    )
+    NEWER_FREECAD = (
+        "newer_freecad",
+        _I,
         "saved by a FreeCAD newer than the newest that was tried",
         "check the quantities with `silo-mod bom --verify`",
-    ),
-    FindingCode.STALE_ASSEMBLY_LINK: (
+        "Saved by FreeCAD {version}, newer than {newest}, the newest tested",
+        "the files: {users}",
+    )
+    STALE_ASSEMBLY_LINK = (
+        "stale_assembly_link",
+        _W,
         "a link to an assembly shows an old state of it",
         "recompute the assembly in FreeCAD and save",
-    ),
-    FindingCode.LOST_ASSEMBLY: (
+        "{obj} shows an old state of {target} ({parts}); the BOM counts the real one.",
+    )
+    LOST_ASSEMBLY = (
+        "lost_assembly",
+        _E,
         "FreeCAD 0.20 lost the assembly of a newer one",
         "use FreeCAD 1.0 or newer for this file, and do not save it in 0.20",
-    ),
-    FindingCode.RESPELT: (
+        "{file} holds the assembly {part}, which this FreeCAD is too old to load",
+        "used by {users}",
+    )
+    RESPELT = (
+        "respelt",
+        _W,
         "a path is recorded in other letters than the file's",
         "name the file in the letters of the link, or `silo-mod relink`: other systems do not find it",
-    ),
-    FindingCode.EMPTY_BOM: (
+    )
+    EMPTY_BOM = (
+        "empty_bom",
+        _W,
         "an assembly without components",
         "nothing, if it is empty; else look at what the other findings leave out",
-    ),
-    FindingCode.CONSOLIDATION: (
+        "{obj} holds no components that are linked from other files, so its BOM is empty.",
+    )
+    NO_ROLE = (
+        "no_role",
+        _E,
+        "an object has no role in the count; please report this",
+        "report it, with the file if you may",
+        "{obj} has no role in the count; please report this.",
+    )
+    TWO_ROLES = (
+        "two_roles",
+        _E,
+        "an object has two roles in the count; please report this",
+        "report it, with the file if you may",
+        "{obj} counts in two roles; please report this.",
+    )
+    CONSOLIDATION = (
+        "consolidation",
+        _W,
         "many single links to one part; an array would be clearer",
         "nothing; the count is right. An array is easier to change",
-    ),
-    FindingCode.COPIED_IDENTITY: (
+    )
+    # identity
+    COPIED_IDENTITY = (
+        "copied_identity",
+        _W,
         "several files carry one Silo identity",
         "say in the register dialog whether it is the same part or a new part",
-    ),
-    FindingCode.SHARED_IDENTITY: (
+    )
+    SHARED_IDENTITY = (
+        "shared_identity",
+        _W,
         "several components of a file carry one Silo identity",
         "remove the identity of the copy, then register it",
-    ),
-    FindingCode.UNREGISTERED: (
+    )
+    UNREGISTERED = (
+        "unregistered",
+        _W,
         "a component without a part number",
         "`silo-mod register`, or *Register Parts…* in FreeCAD",
-    ),
-    FindingCode.UNREFERENCED: (
+    )
+    # against the server
+    UNREFERENCED = (
+        "unreferenced",
+        _W,
         "a line that no component uses any more",
         "on the BOM page: *Remove* it, or *Keep as intentional*",
-    ),
-    FindingCode.CONFLICT: (
+    )
+    CONFLICT = (
+        "conflict",
+        _W,
         "a manual line that is a component as well",
         "on the BOM page: take the quantity of CAD, or keep that of Silo",
-    ),
-}
+    )
 
 
 @dataclass(frozen=True, slots=True, order=True)

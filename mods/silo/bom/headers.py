@@ -37,6 +37,21 @@ class Role(StrEnum):
     NOTES = "notes"
     TYPE = "rel_type"
     REVISION = "child_revision"
+    VALUE = "value"
+    FOOTPRINT = "footprint"
+    MANUFACTURER = "manufacturer"
+    MANUFACTURER_NUMBER = "manufacturer_part_number"
+    SUPPLIER = "supplier"
+    SUPPLIER_NUMBER = "supplier_part_number"
+    NOT_FITTED = "not_fitted"
+    LINK = "link"
+    PACK_SIZE = "pack_size"
+    MINIMUM = "minimum"
+    PRICE = "prices"
+    FROM_QUANTITY = "from"
+    CURRENCY = "currency"
+    LEAD_TIME = "lead_time_days"
+    PREFERRED = "preferred"
 
 
 # en, de, fr, es, it, ja, zh; Silo's and FreeCAD's own exports among them. The first alias fits best.
@@ -70,8 +85,8 @@ _ALIASES: dict[Role, str] = {
         小计重量; 質量計; 重量計; total wt; ext wt; posgewicht; pos gewicht; positionsgewicht""",
     Role.MASS_UNIT: """mass unit; mass units; weight unit; weight units; unit of mass; unit of weight;
         mass uom; weight uom; gewichtseinheit; masseneinheit; unité de masse; unidad de masa""",
-    Role.QUANTITY: """quantity; qty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité; qté; nb;
-        cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量; 수량; qte; qtà;
+    Role.QUANTITY: """quantity; qty; qnty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité; qté;
+        nb; cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量; 수량; qte; qtà;
         quantite; anz; komponentenmenge; req qty; qty reqd; qty req d; no req d""",
     Role.ITEM: """item; item no; index; pos; position; row; line; nr; lfd nr; rang;
         repère; article; elemento; artículo; posición; ítem; posizione; voce; 項目; 番号; 项目; 项; 序号;
@@ -81,12 +96,40 @@ _ALIASES: dict[Role, str] = {
         级别; 层级; 層級""",
     Role.UNIT: """unit; uom; unit of measure; einheit; mengeneinheit; unité; unidad; unità; 単位; 单位""",
     Role.REFERENCE_DESIGNATORS: """reference designators; reference designator; ref des; refdes; designators;
-        designator; references""",
+        designator; references; reference; reference s; ref; refs; ref s""",
     Role.FIND_NUMBER: """find number; find no; find nr; findnumber""",
     Role.NOTES: """notes; note; remarks; remark; comment; comments; bemerkung; bemerkungen; notiz; remarque;
         remarques; notas; 注記; 备注; 備註""",
     Role.TYPE: """type; rel type; relation type""",
     Role.REVISION: """revision""",
+    Role.VALUE: """value; val; wert; valeur; valor; valore""",
+    Role.FOOTPRINT: """footprint; package; case package; gehäuse; boîtier""",
+    Role.MANUFACTURER: """manufacturer; mfr; mfg; mfr name; manufacturer name; hersteller; fabricant;
+        fabricante; produttore; maker""",
+    Role.MANUFACTURER_NUMBER: """manufacturer part number; manufacturer s part number; mpn; mfr part number;
+        mfr part no; mfr pn; mfg pn; mfg part number; mfr no; manufacturer part no; manufacturer pn;
+        herstellernummer; hersteller teilenummer; herstellerteilenummer; hersteller artikelnummer""",
+    Role.SUPPLIER: """supplier; vendor; distributor; supplier name; vendor name; lieferant; händler;
+        fournisseur; proveedor; fornitore; 供应商; 仕入先""",
+    Role.SUPPLIER_NUMBER: """supplier part number; supplier s part number; spn; supplier part no; supplier pn;
+        vendor part number; distributor part number; bestellnummer; order number; order code; lcsc;
+        supplier number; supplier no; order no; vendor number; bestell nr; lieferantenartikelnummer;
+        lieferantennummer; référence fournisseur; numéro de commande;
+        lcsc part number; digikey part number; digi key part number; mouser part number""",
+    Role.NOT_FITTED: """dnp; dnf; do not populate; do not fit; do not place; not fitted""",
+    Role.LINK: """link; url; web address; web; product link; shop link""",
+    Role.PACK_SIZE: """pack size; pack; pack quantity; package size; packaging unit; pack qty; vpe;
+        verpackungseinheit; packungsgröße; conditionnement""",
+    Role.MINIMUM: """minimum; minimum order; minimum order quantity; minimum quantity; min order; min qty;
+        moq; mindestmenge; mindestbestellmenge; quantité minimale""",
+    Role.PRICE: """price; unit price; price each; price of one by quantity; price of one; prices; unit cost;
+        preis; stückpreis; einzelpreis; prix; prix unitaire; precio; prezzo; 单价; 単価""",
+    Role.FROM_QUANTITY: """from quantity; from; price from quantity; break; price break; break quantity;
+        scale quantity; ab menge; staffelmenge; ab stückzahl; à partir de""",
+    Role.CURRENCY: """currency; währung; devise; moneda; valuta; 货币; 通貨""",
+    Role.LEAD_TIME: """lead time; lead time days; delivery time; lieferzeit; lieferzeit tage; délai;
+        délai de livraison; plazo de entrega""",
+    Role.PREFERRED: """preferred; favourite; default; bevorzugt; préféré""",
 }
 
 BRACKET = re.compile(r"[\(\[（【<]\s*([^)\]）】>]*)\s*[\)\]）】>]")
@@ -116,9 +159,11 @@ def find_roles(header: Sequence[str], roles: Collection[Role]) -> dict[Role, int
     """Column index of each role. Of two columns the one whose name fits better, then the first."""
     best: dict[Role, tuple[int, int]] = {}
     for index, cell in enumerate(header):
-        found = alias(normal(cell))
-        if found is not None and found[0] in roles:
-            best[found[0]] = min(best.get(found[0], (len(_ROLE_OF), 0)), (found[1], index))
+        role_of_cell = alias(normal(cell))
+        if role_of_cell is not None and role_of_cell[0] in roles:
+            best[role_of_cell[0]] = min(
+                best.get(role_of_cell[0], (len(_ROLE_OF), 0)), (role_of_cell[1], index)
+            )
     return {role: index for role, (_, index) in best.items()}
 
 
@@ -126,8 +171,8 @@ def second_columns(
     header: Sequence[str], roles: Collection[Role], at: Mapping[Role, int]
 ) -> list[tuple[Role, int]]:
     """The columns that mean what another one is used for (``at``)."""
-    found = ((alias(normal(cell)), index) for index, cell in enumerate(header))
-    return [(of[0], i) for of, i in found if of and of[0] in roles and at.get(of[0], i) != i]
+    columns_by_role = ((alias(normal(cell)), index) for index, cell in enumerate(header))
+    return [(of[0], i) for of, i in columns_by_role if of and of[0] in roles and at.get(of[0], i) != i]
 
 
 @dataclass(frozen=True, slots=True)

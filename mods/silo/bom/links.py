@@ -8,35 +8,40 @@ The rules of this module:
 * an assembly inside itself is cut where it closes the ring, and reported as a cycle;
 * whatever is not counted has a finding.
 
-What one assembly holds is read by :mod:`silo.bom.walk.roles`, each once; this module puts the levels
+What one assembly holds is read by :mod:`silo.bom.roles`, each once; this module puts the levels
 together. It walks live FreeCAD objects, objects read from FCStd files and the tests' fakes alike.
 """
 
 from __future__ import annotations
 
 import os.path
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from silo.bom.document import NAMELESS, label_of, object_name, own
+from silo.bom.document import NAMELESS, label_of, own
 from silo.bom.errors import InputError, SeveralAssembliesError, did_you_mean
 from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.model import BomEntry, Extraction, identity_findings, identity_of, sole_identity, walk_entries
+from silo.bom.objects import (
+    Count,
+    Key,
+    Kind,
+    Lost,
+    chains,
+    held_by_joints,
+    is_attached,
+    is_container,
+    is_named_assembly,
+)
 from silo.bom.resolve import display_name
-from silo.bom.roots import Whole, as_it_is, beside, choose_assembly, fates, loose_hardware
-from silo.bom.walk.kinds import Kind, held_by_joints, is_attached, is_container, is_named_assembly
-from silo.bom.walk.notes import Notes
-from silo.bom.walk.rings import Rings
-from silo.bom.walk.roles import Reader
-from silo.bom.walk.standard import same_articles, standard_uuid
-from silo.bom.walk.targets import Inspect, resolve_target
-from silo.bom.walk.tree import Count, Key, Lost, chains
+from silo.bom.roles import Canonical, Files
+from silo.bom.roots import Whole, as_it_is, beside, choose_assembly, fates, silent_reader
+from silo.bom.standard import same_articles, standard_uuid
+from silo.bom.targets import Inspect, resolve_target
 
 # Real assemblies are some ten levels deep; deeper is an attack or a loop that no other guard saw.
 MAX_LEVELS = 64
-
-Canonical = Callable[[str], str]
 
 
 def extract_bom_links(assembly_obj: Any, level: int = 1) -> list[BomEntry]:
@@ -67,20 +72,20 @@ def file_bom(
         if hint is None:
             raise
         container = hint
-    found = (walk or extract)(container)
+    extraction = (walk or extract)(container)
     is_assembly = container.isDerivedFrom("Assembly::AssemblyObject") or own(container, "Type") == "Assembly"
     whole = sole_identity(document)
-    if not (found.entries or found.blocked or is_assembly):
+    if not (extraction.entries or extraction.blocked or is_assembly):
         return whole, None
-    head = found.assembly
+    head = extraction.assembly
     item = head.silo_uuid or whole
-    return item, replace(found, assembly=replace(head, silo_uuid=item))
+    return item, replace(extraction, assembly=replace(head, silo_uuid=item))
 
 
 def file_item(document: Any, hint: Any = None) -> str | None:
     """Return the item that a file belongs to, as :func:`file_bom`; mostly without a look for the assembly."""
-    if found := sole_identity(document):
-        return found
+    if result := sole_identity(document):
+        return result
     try:
         return identity_of(choose_assembly(document))
     except SeveralAssembliesError:
@@ -100,7 +105,7 @@ def extract(
     """Walk an assembly.
 
     inspect
-        says what is wrong with a live object (see :func:`silo.bom.walk.targets.resolve_target`); links read
+        says what is wrong with a live object (see :func:`silo.bom.targets.resolve_target`); links read
         from FCStd files know it themselves.
     canonical
         makes one path of the several that may name one file (``os.path.realpath`` for live documents).
@@ -110,7 +115,7 @@ def extract(
         False leaves standard parts out.
     below
         False reads this one assembly only. ``is_assembly`` then says of each entry whether it may be one;
-        nothing is said of what needs the whole tree (rings, shared identities).
+        nothing is reported of what needs the whole tree (rings, shared identities).
     """
     walker = _Walker(inspect, canonical, whole, hardware, below)
     top = assembly_obj
@@ -126,13 +131,14 @@ def extract(
     mine = walker.own_lines(top, level) if target.obj is not None else ()
     head = replace(head, level=level - 1, is_assembly=holds, own=mine)
     if entries or mine or walker.notes.any_blocking():
-        walker.notes.container(top)
+        if getattr(top, "is_document_root", False):  # the links lie in the document itself
+            walker.notes.add(FindingCode.NO_CONTAINER, top, "")
     else:
         walker.notes.empty(head)
     if target.obj is not None:
         walker.look_beside(top, empty=not entries)
-    for one, other in same_articles_of(walk_entries(entries)):
-        walker.notes.same_article(one, other)
+    for entry, other in same_articles_of(walk_entries(entries)):
+        walker.notes.same_article(entry, other)
     findings = walker.notes.findings()
     if below:
         findings = (*findings, *identity_findings([replace(head, children=entries)]))
@@ -157,12 +163,12 @@ def why(
     """
     walker = _Walker(inspect, canonical, whole, hardware, below=False)
     contents = walker.reader.contents(assembly_obj)
-    total, known, lines = 0, set[str](), list[str]()
+    total, line_number, lines = 0, set[str](), list[str]()
     for count in (*contents.counts, *contents.own):
         entry = walker.entry_for(count.target)
         names = (entry.object_name, entry.label, entry.document_label, entry.standard or "")
-        known.update(names)
-        if not (meant := [one for one in (entry.key, *names) if one in parts]):
+        line_number.update(names)
+        if not (meant := [each_part for each_part in (entry.key, *names) if each_part in parts]):
             continue
         part = meant[0] if isinstance(meant[0], str) else entry.standard or display_name(entry)
         total += count.quantity
@@ -170,37 +176,18 @@ def why(
             steps = [f"{label_of(obj)} × {times}" if times > 1 else label_of(obj) for obj, times in way]
             lines.append(" → ".join(["beside the assembly"] * count.beside + steps))
     if not lines:
-        wanted = next((one for one in parts if isinstance(one, str)), "This line")
-        meant_by = did_you_mean(wanted, sorted(known - {""})) or "."
+        wanted = next((each_part for each_part in parts if isinstance(each_part, str)), "This line")
+        meant_by = did_you_mean(wanted, sorted(line_number - {""})) or "."
         raise InputError(f"{wanted!r} is no part of {label_of(assembly_obj)} itself{meant_by}")
     return [f"{total} × {part} in {label_of(assembly_obj)}:", *lines]
 
 
 def same_articles_of(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, BomEntry]]:
     """Standard parts that are one article under two standards."""
-    known = {entry.standard: entry for entry in entries if entry.standard}
-    return [(known[one], known[other]) for one, other in same_articles(known)]
-
-
-class _Files:
-    """What identifies an object: its file, by one path, and its name in it."""
-
-    def __init__(self, canonical: Canonical | None) -> None:
-        self._canonical = canonical
-        self._paths: dict[str, str] = {}
-
-    def key(self, obj: Any) -> Key:
-        return (self.path(obj), object_name(obj))
-
-    def path(self, obj: Any) -> str:
-        return self.canonical(getattr(getattr(obj, "Document", None), "FileName", "") or "")
-
-    def canonical(self, path: str) -> str:
-        if not path or self._canonical is None:
-            return path
-        if path not in self._paths:
-            self._paths[path] = self._canonical(path)
-        return self._paths[path]
+    bom_entries = {entry.standard: entry for entry in entries if entry.standard}
+    return [
+        (bom_entries[designation], bom_entries[other]) for designation, other in same_articles(bom_entries)
+    ]
 
 
 class _Walker:
@@ -214,17 +201,13 @@ class _Walker:
     ) -> None:
         self._goes_below = below
         # Nothing here refers back to the walker: what a walk made goes with it, at once.
-        self._files = files = _Files(canonical)
-        self.notes = Notes(files.path)
+        self._files = files = Files(canonical)
         # For a look at what is not counted, which is nobody's business twice.
-        self.silent = silent = Reader(Notes(files.path), files.key, inspect, hardware=hardware)
-        self.reader = Reader(
-            self.notes,
-            files.key,
-            inspect,
-            beside=lambda container: loose_hardware(container, silent, whole) if hardware else (),
-            hardware=hardware,
+        self.silent = silent_reader(files, inspect=inspect, hardware=hardware)
+        self.reader = silent_reader(
+            files, inspect=inspect, hardware=hardware, counts_beside=hardware, whole=whole
         )
+        self.notes = self.reader.notes
         self._rings = Rings({})
         self._memo: dict[tuple[Key, int, Key], tuple[BomEntry, ...]] = {}
         self._heads: dict[Key, BomEntry] = {}
@@ -242,8 +225,8 @@ class _Walker:
         """
         if isinstance(obj, Lost):
             return (self._files.canonical(obj.file), obj.name)
-        if (known := self._components.get(id(obj))) is not None:
-            return known[1]
+        if (component_known := self._components.get(id(obj))) is not None:
+            return component_known[1]
         key = self._component(obj)
         self._components[id(obj)] = (obj, key)
         return key
@@ -318,8 +301,8 @@ class _Walker:
             where the walk came into the ring that the assembly is in; itself where it is in none.
         """
         key = self.component(container)
-        if (known := self._memo.get((key, level, entry))) is not None:
-            return known
+        if (bom_entries := self._memo.get((key, level, entry))) is not None:
+            return bom_entries
         contents = self.reader.contents(container)
         lines: dict[Key, list[Count]] = {}
         for count in contents.counts:
@@ -343,7 +326,7 @@ class _Walker:
         if not self._goes_below or not self._is_container(self.component(target), target):
             return ()
         if depth > MAX_LEVELS:
-            self.notes.too_deep(target, MAX_LEVELS)
+            self.notes.add(FindingCode.TOO_DEEP, target, str(MAX_LEVELS), levels=MAX_LEVELS)
             return ()
         return self._assembly(target, level, depth, entry)
 
@@ -352,7 +335,7 @@ class _Walker:
         roles = fates(top, self.reader.contents(top), self.silent)
         for name, role in roles.items():
             if role is None:
-                self.notes.without_role(top.Document.getObject(name))
+                self.notes.add(FindingCode.NO_ROLE, top.Document.getObject(name))
         self.notes.beside(beside(top, roles), empty=empty)
 
     def own_lines(self, container: Any, level: int) -> tuple[BomEntry, ...]:
@@ -363,9 +346,9 @@ class _Walker:
         lines: dict[Key, list[Count]] = {}
         for count in contents.own:
             lines.setdefault(count.key, []).append(count)
-        found = [self._entry(container, counts, level, (), silo_uuid=None) for counts in lines.values()]
-        self.notes.own_parts(container, found)
-        return tuple(found)
+        entries = [self._entry(container, counts, level, (), silo_uuid=None) for counts in lines.values()]
+        self.notes.own_parts(container, entries)
+        return tuple(entries)
 
     def _free(self, links: list[Count], container: Any) -> list[Count]:
         """The links that no joint holds, so that an array would do."""
@@ -377,7 +360,7 @@ class _Walker:
             inline = (obj for obj, kind in inner if kind in (Kind.NOTHING, Kind.CONTAINER))
             self._held[key] = held_by_joints([container, *inline])
         held = self._held[key]
-        return [one for one in links if one.shown.key[1] not in held and not is_attached(one.shown.obj)]
+        return [link for link in links if link.shown.key[1] not in held and not is_attached(link.shown.obj)]
 
     def _entry(
         self, container: Any, counts: list[Count], level: int, children: tuple[BomEntry, ...], **more: Any
@@ -385,7 +368,7 @@ class _Walker:
         target = counts[0].target
         entry = self.entry_for(target)
         links = [count for count in counts if count.link]
-        found = {
+        values = {
             "level": level,
             "quantity": sum([count.quantity for count in counts]),
             "children": children,
@@ -396,7 +379,7 @@ class _Walker:
             "instances": tuple([count.shown.key[1] for count in counts]),
             **more,
         }
-        return BomEntry(**(vars(entry) | found))  # dataclasses.replace() takes twice as long
+        return BomEntry(**(vars(entry) | values))  # dataclasses.replace() takes twice as long
 
     def _is_assembly(self, target: Any) -> bool:
         key = self.component(target)
@@ -407,6 +390,79 @@ class _Walker:
     def holds(self, top: Any) -> bool:
         """True where the top holds components, also such as do not count."""
         return self.reader.contents(top).holds_components
+
+
+# --- assemblies that contain themselves ---
+
+
+Graph = Mapping[Key, Sequence[Key]]
+
+
+class Rings:
+    """The rings of a graph: for each assembly, the assemblies that it holds, in a fixed order."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self._members: dict[Key, frozenset[Key]] = {}
+        for members in strongly_connected(graph):
+            if len(members) > 1 or any(node in graph[node] for node in members):
+                self._members.update(dict.fromkeys(members, members))
+        self._ways: dict[Key, dict[Key, tuple[Key, int]]] = {}
+
+    def same_ring(self, key: Key, other: Key) -> bool:
+        """True where each of the two contains the other, however deep."""
+        return other in self._members.get(key, ())
+
+    def closes(self, entry: Key, here: Key, there: Key) -> bool:
+        """True where the link from ``here`` to ``there`` is cut, in a ring that was entered at ``entry``."""
+        if not self.same_ring(here, there):
+            return False
+        ways = self._outwards(entry)
+        return ways[there][1] <= ways[here][1]
+
+    def example(self, node: Key) -> tuple[Key, ...]:
+        """A ring to report: the shortest through the first of those in a ring with ``node``."""
+        first = min(self._members[node])
+        ways = self._outwards(first)
+        ring = [next(reached for reached in ways if first in self._graph[reached])]
+        while ring[-1] != first:
+            ring.append(ways[ring[-1]][0])
+        return tuple(reversed(ring))
+
+    def _outwards(self, entry: Key) -> dict[Key, tuple[Key, int]]:
+        """All in a ring with the entry, nearest first: the assembly before each, and the distance."""
+        if entry not in self._ways:
+            ways, further = {entry: (entry, 0)}, [entry]
+            for node in further:
+                for reached in self._graph[node]:
+                    if reached in self._members[entry] and reached not in ways:
+                        ways[reached] = (node, ways[node][1] + 1)
+                        further.append(reached)
+            self._ways[entry] = ways
+        return self._ways[entry]
+
+
+def strongly_connected(graph: Graph) -> list[frozenset[Key]]:
+    """The strongly connected parts of a graph (Gabow's algorithm, without recursion)."""
+    at: dict[Key, int] = {}
+    path, starts, parts = list[Key](), list[int](), list[frozenset[Key]]()
+    left = [(node, False) for node in graph]
+    while left:
+        node, is_done = left.pop()
+        if is_done:
+            if starts[-1] == at[node]:
+                parts.append(frozenset(path[starts.pop() :]))
+                del path[at[node] :]
+                at.update(dict.fromkeys(parts[-1], len(graph)))
+        elif node not in at:
+            at[node] = len(path)
+            starts.append(len(path))
+            path.append(node)
+            left += [(node, True), *((target, False) for target in graph[node] if target in graph)]
+        else:
+            while starts and starts[-1] > at[node]:
+                starts.pop()
+    return parts
 
 
 __all__ = ["Extraction", "Finding", "FindingCode", "Place", "extract", "extract_bom_links"]

@@ -4,9 +4,8 @@
 All are frozen. Equality is that of the spec's fields and the component's key; where a value was found
 (labels, places) and what follows from the component itself takes no part in it.
 
-Where a component's Silo identity is written, and what it means to find one twice.
-
-Read in this order (the real Silo writes ``SiloItemId`` on objects, the spec ``SiloUUID`` on documents):
+A component's Silo identity is read in this order (the real Silo writes ``SiloItemId`` on objects, the spec
+``SiloUUID`` on documents):
 
 1. the object's own ``SiloItemId``, then its own ``SiloUUID``;
 2. ``Meta["SiloUUID/<object Name>"]`` of its document: one file may give several parts, and FreeCAD 0.20 has
@@ -15,17 +14,30 @@ Read in this order (the real Silo writes ``SiloItemId`` on objects, the spec ``S
 4. ``Meta["SiloUUID"]`` of its document.
 
 Part numbers are never parsed, and never taken from labels.
+
+:class:`Notes` is the walker's notebook: each finding once, however often it is met. A finding reads the
+same whatever the order in which its objects were met: places and names are sorted.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
+from uuid import UUID
 
-from silo.bom.document import document_property, object_name, own
+from silo.bom.document import (
+    DocumentRoot,
+    LinkProblem,
+    document_property,
+    label_of,
+    object_name,
+    own,
+    saved_by,
+)
+from silo.bom.errors import DocumentError, listed
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.walk.standard import STANDARD_PARTS, standard_uuid
+from silo.bom.standard import STANDARD_PARTS, standard_uuid
 
 T = TypeVar("T")
 
@@ -244,14 +256,14 @@ class BomDiff:
     def findings_at(self, parent: BomEntry | None = None) -> tuple[Finding, ...]:
         """Unreferenced lines in one finding, each conflict in one. ``parent``: the assembly compared."""
         places = (Place(parent.doc_path, parent.object_name),) if parent is not None else ()
-        found = []
+        findings = []
         if self.removed:
             count, numbers = len(self.removed), ", ".join(change.part_number for change in self.removed)
             items = "1 item in the Silo BOM is" if count == 1 else f"{count} items in the Silo BOM are"
             message = (
                 f"{items} not referenced by components in this assembly. Nothing was deleted: {numbers}."
             )
-            found.append(Finding(FindingCode.UNREFERENCED, Severity.WARNING, message, places))
+            findings.append(Finding(FindingCode.UNREFERENCED, Severity.WARNING, message, places))
         for change in self.conflicts:
             kept = "no quantity" if change.remote_quantity is None else f"{change.remote_quantity:g}"
             kept = change.on_server(kept)
@@ -259,8 +271,8 @@ class BomDiff:
                 f"{change.part_number}: the assembly has {change.local_quantity:g}, a line kept by hand in "
                 f"the Silo BOM has {kept}. It stays as it is until somebody decides."
             )
-            found.append(Finding(FindingCode.CONFLICT, Severity.WARNING, message, places))
-        return tuple(found)
+            findings.append(Finding(FindingCode.CONFLICT, Severity.WARNING, message, places))
+        return tuple(findings)
 
 
 def rows_as_dicts(rows: Iterable[Row]) -> list[dict[str, Any]]:
@@ -285,11 +297,19 @@ def identity_of(obj: object) -> str | None:
     return own_identity(obj) or document_identity(getattr(obj, "Document", None))
 
 
+def as_uuid(text: str) -> str:
+    """Return a UUID in its one written form; "" for what is none. Files hold it in capitals, in braces."""
+    try:
+        return str(UUID(text))
+    except ValueError:
+        return ""
+
+
 def own_identity(obj: object) -> str | None:
     """The identity that is written for this very object, not for its document."""
     for name in ("SiloItemId", "SiloUUID"):
-        if found := _text(own(obj, name)):
-            return found
+        if result := _text(own(obj, name)):
+            return result
     name = object_name(obj)
     return _text(_meta(getattr(obj, "Document", None)).get(meta_key(name))) if name else None
 
@@ -308,15 +328,15 @@ def held_items(doc: object) -> tuple[tuple[str, str], ...]:
     """
     whole = document_identity(doc)
     own = [(own_identity(obj), object_name(obj)) for obj in getattr(doc, "Objects", None) or ()]
-    return (*([(whole, "")] if whole else ()), *((found, name) for found, name in own if found))
+    return (*([(whole, "")] if whole else ()), *((identity, name) for identity, name in own if identity))
 
 
 def sole_identity(doc: object) -> str | None:
     """Return the item that a file without an assembly belongs to; None for several or none."""
     if whole := document_identity(doc):
         return whole
-    found = {identity for identity, _ in held_items(doc)}
-    return found.pop() if len(found) == 1 else None
+    items = {identity for identity, _ in held_items(doc)}
+    return items.pop() if len(items) == 1 else None
 
 
 def _meta(doc: object) -> Mapping[str, str]:
@@ -371,3 +391,212 @@ def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
             )
         findings.append(Finding(code, Severity.WARNING, message, where))
     return tuple(findings)
+
+
+_Slot = tuple[FindingCode, str]
+
+# What may be wrong with a link; a problem with another code is a broken link.
+_OF_LINKS = (
+    *(FindingCode.MISSING_FILE, FindingCode.MISSING_OBJECT, FindingCode.UNREADABLE_FILE),
+    *(FindingCode.LFS_POINTER, FindingCode.OUTSIDE_ROOT, FindingCode.LOST_ASSEMBLY),
+    *(FindingCode.UNSET_LINK, FindingCode.CYCLE),
+)
+_KNOWN_LINKS = frozenset(
+    {
+        *("App::Link", "App::LinkPython", "Part::LinkArray", "Part::LinkArrayLinear", "Part::LinkArrayPolar"),
+        *("Part::LinkArrayCircular", "Part::LinkArrayPath", "Part::LinkArrayPoint"),
+        *("Assembly::AssemblyLink", "App::LinkElement", "App::LinkElementPython"),
+    }
+)
+# The newest FreeCAD of the test matrix.
+NEWEST_TESTED = (1, 1)
+_BY_OBJECT = (FindingCode.MISSING_OBJECT, FindingCode.LOST_ASSEMBLY)
+
+
+@dataclass
+class _Note:
+    severity: Severity
+    message: str
+    tail: str = ""
+    file: str = ""
+    users: dict[Place, str] = field(default_factory=dict)
+
+    def finding(self, code: FindingCode) -> Finding:
+        where = sorted(self.users)
+        message = self.message
+        if self.tail:
+            names = listed(list(dict.fromkeys(self.users[place] for place in where)), 8)
+            message = f"{message}; {self.tail.format(users=names)}."
+        return Finding(code, self.severity, message, tuple(where), self.file)
+
+
+class Notes:
+    """Collects findings while walking; the same fact from several places becomes one finding.
+
+    ``path_of`` gives the file of an object, the same path for one file however it was opened.
+    """
+
+    def __init__(self, path_of: Callable[[Any], str]) -> None:
+        self._path_of = path_of
+        self.reading = ""  # the file that is being read; for objects that do not know theirs
+        self._notes: dict[_Slot, _Note] = {}
+
+    def findings(self) -> tuple[Finding, ...]:
+        """All findings, in the order in which they were first met."""
+        return tuple(note.finding(code) for (code, _), note in self._notes.items())
+
+    def any_blocking(self) -> bool:
+        """True where a finding keeps the BOM from being synced."""
+        return any(note.severity is Severity.ERROR for note in self._notes.values())
+
+    def place(self, obj: Any) -> Place:
+        """Return where an object is."""
+        return Place(self._path_of(obj) or self.reading, object_name(obj))
+
+    def add(
+        self,
+        code: FindingCode,
+        obj: Any,
+        about: str | None = None,
+        *,
+        severity: Severity | None = None,
+        sentence: str = "",
+        tail: str | None = None,
+        **values: Any,
+    ) -> _Note:
+        """Note a finding of an object in the words of its code; ``values``: what its sentence names.
+
+        about
+            findings of one code about the same become one, which names all objects; None: the object itself.
+        severity, sentence, tail
+            in place of those of the code.
+        """
+        named = {
+            name: value if isinstance(value, (str, int)) else label_of(value)
+            for name, value in values.items()
+        }
+        message = (sentence or code.sentence).format(obj=label_of(obj), **named)
+        place = self.place(obj)
+        made = _Note(severity or code.severity, message, code.tail if tail is None else tail)
+        note = self._notes.setdefault((code, str(place) if about is None else about), made)
+        note.users.setdefault(place, label_of(obj))
+        return note
+
+    def broken(self, link: Any, problem: LinkProblem | None) -> None:
+        """One finding per missing file or object, naming what uses it."""
+        problem = problem or LinkProblem(FindingCode.BROKEN_LINK)
+        code = problem.code if problem.code in _OF_LINKS else FindingCode.BROKEN_LINK
+        text = code.sentence
+        if code is FindingCode.BROKEN_LINK and problem.file:
+            text = "{file} was not loaded"
+        elif code is FindingCode.CYCLE:
+            text = "A chain of links leads back to itself"
+        about = problem.file or str(self.place(link))
+        if code in _BY_OBJECT:
+            about = f"{about}#{problem.obj}"
+        note = self.add(
+            code,
+            link,
+            about,
+            sentence=f"{text} ({{detail}})" if problem.detail else text,
+            tail="used by {users}" if code is FindingCode.CYCLE else None,
+            file=problem.file or "the file",
+            part=problem.obj or "that it is asked for",
+            detail=problem.detail,
+        )
+        if code is not FindingCode.UNSET_LINK:
+            note.file = problem.file
+
+    def unreadable(self, obj: Any, error: DocumentError) -> None:
+        """The file that ``obj`` lies in is damaged at this very place."""
+        text, tail = "The file {file} cannot be read in full ({reason})", "not counted: {users}"
+        self.add(
+            FindingCode.UNREADABLE_FILE,
+            obj,
+            str(error),
+            sentence=text,
+            tail=tail,
+            file=error.path,
+            reason=error.reason,
+        )
+
+    def cycle(self, link: Any, ring: Sequence[tuple[str, str]]) -> None:
+        """``ring``: the assemblies that contain each other, the first not repeated."""
+        path = " → ".join(str(Place(*key)) for key in (*ring, ring[0]))
+        self.add(FindingCode.CYCLE, link, path, path=path)
+
+    def loop(self, obj: Any) -> None:
+        text, tail = "{file} holds links that lead back to what holds them", "the ring goes through {users}"
+        file = self._path_of(obj)
+        self.add(FindingCode.CYCLE, obj, file, sentence=text, tail=tail, file=file or label_of(obj))
+
+    def in_document(self, link: Any, target: Any, *, leads_back: bool = False) -> None:
+        """A link within the file that brings nothing.
+
+        leads_back
+            to what holds the link, which FreeCAD cannot show.
+        """
+        code = FindingCode.IN_DOCUMENT_LINK
+        if leads_back:
+            text = "{obj} links to {target} in this same file: what holds it, and brings nothing."
+            self.add(code, link, severity=Severity.WARNING, sentence=text, tail="", target=target)
+        else:
+            self.add(code, link, self._path_of(link))
+
+    def same_article(self, bom_entry: BomEntry, other: BomEntry) -> None:
+        """One article under two standards."""
+        places = {Place(*(entry.doc_path, entry.object_name)): entry.label for entry in (bom_entry, other)}
+        self._notes[FindingCode.SAME_ARTICLE, f"{bom_entry.standard} {other.standard}"] = _Note(
+            FindingCode.SAME_ARTICLE.severity,
+            f"{bom_entry.standard} and {other.standard} are the same article under two standards: two lines.",
+            users=places,
+        )
+
+    def link_type(self, link: Any) -> None:
+        """A type of link that no tested FreeCAD knows."""
+        kind = getattr(link, "TypeId", "")
+        if kind and kind not in _KNOWN_LINKS:
+            self.add(FindingCode.UNKNOWN_LINK_TYPE, link, kind, kind=kind)
+
+    def newer(self, document: Any) -> None:
+        """A file that a FreeCAD saved which nothing here was tested with."""
+        version = saved_by(getattr(document, "ProgramVersion", ""))
+        if version > NEWEST_TESTED:
+            texts = [".".join(map(str, version_parts)) for version_parts in (version, NEWEST_TESTED)]
+            root = DocumentRoot(document)
+            self.add(FindingCode.NEWER_FREECAD, root, "", version=texts[0], newest=texts[1])
+
+    def stale(self, link: Any, target: Any, gone: Sequence[str], new: Sequence[str]) -> None:
+        parts = [f"no longer there: {listed(gone, 8)}"] if gone else []
+        parts += [f"not shown: {listed(new, 8)}"] if new else []
+        self.add(FindingCode.STALE_ASSEMBLY_LINK, link, target=target, parts="; ".join(parts))
+
+    def own_parts(self, container: Any, lines: Sequence[BomEntry]) -> None:
+        """One finding per assembly: what it shows of its own file is no item yet."""
+        if not lines:
+            return
+        self.add(
+            FindingCode.LOCAL_GEOMETRY,
+            container,
+            what="1 own part is no item" if len(lines) == 1 else f"{len(lines)} own parts are not items",
+            links=sum(line.quantity for line in lines),
+            names=listed(sorted(entry.label for entry in lines), 8),
+        )
+
+    def empty(self, head: BomEntry) -> None:
+        text = FindingCode.EMPTY_BOM.sentence.format(obj=head.label)
+        place = Place(head.doc_path, head.object_name)
+        note = _Note(FindingCode.EMPTY_BOM.severity, text, users={place: head.label})
+        self._notes[FindingCode.EMPTY_BOM, ""] = note
+
+    def beside(self, objects: Sequence[Any], *, empty: bool = False) -> None:
+        """What lies in the top document, but not in the assembly, and holds components.
+
+        empty
+            the assembly holds none at all, so it may be the wrong one.
+        """
+        code = FindingCode.BESIDE_ASSEMBLY
+        more = ", which holds none; move them into it, or name the one that is meant" if empty else ""
+        for obj in objects:
+            severity = Severity.ERROR if empty else None
+            self.add(code, obj, "", severity=severity, sentence=code.sentence + more)

@@ -87,7 +87,7 @@ class Number:
         return self.other is not None
 
 
-class Reading(NamedTuple):
+class NumberReading(NamedTuple):
     """What a text says: ``value``, or in words why it was refused (``problem`` ends a sentence)."""
 
     value: Decimal | None
@@ -114,20 +114,20 @@ def parse_number(text: str, mark: Mark | None = None) -> Number | None:
     fraction = _FRACTION.fullmatch(bare)
     if fraction is not None:
         return _fraction(fraction)
-    found = _SHAPE.fullmatch(_SPACES.sub("", bare))
-    if found is None:
+    match = _SHAPE.fullmatch(_SPACES.sub("", bare))
+    if match is None:
         return None
-    split = _split(found["body"], mark)
+    split = _split(match["body"], mark)
     if split is None:
         return None
-    exponent = int((found["exp"] or "0").replace("−", "-"))
-    sign = "-" if found["sign"] in ("-", "−") else ""
+    exponent = int((match["exp"] or "0").replace("−", "-"))
+    sign = "-" if match["sign"] in ("-", "−") else ""
     exact = Decimal(f"{sign}{split.whole or '0'}.{split.fraction or '0'}e{exponent}")
     other = Decimal(f"{sign}{split.whole}{split.fraction}e{exponent}") if split.ambiguous else None
     return Number(exact, exponent - len(split.fraction), split.proof, other)
 
 
-def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> Reading:
+def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
     """``text`` as a number for somebody who can be asked: refused where it is none, or is ambiguous.
 
     points_are_decimal
@@ -138,15 +138,15 @@ def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool
         mark = Mark.POINT
     number = parse_number(text, mark)
     if number is None:
-        return Reading(None, f"wanted a number such as 4 or 2.5, got {shown}")
+        return NumberReading(None, f"wanted a number such as 4 or 2.5, got {shown}")
     if number.other is not None:
         ways = f"{plain(number.other)} or {plain(number.exact)}"
         write = f"{plain(number.other)} or {number.exact:f}0"
-        return Reading(None, f"{shown} can be read as {ways}; write {write}")
-    return Reading(number.exact)
+        return NumberReading(None, f"{shown} can be read as {ways}; write {write}")
+    return NumberReading(number.exact)
 
 
-def read_count(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> Reading:
+def read_count(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
     """As :func:`read_number`; the text may name what it counts: "4 pcs", "4x", "4 Stk."."""
     counted = _COUNT_WORD.fullmatch(text.strip())
     return read_number(counted["number"] if counted else text, mark, points_are_decimal=points_are_decimal)
@@ -157,11 +157,11 @@ def counts_pieces(unit: str | None) -> bool:
     return not unit or not unit.strip() or _PIECE.fullmatch(unit.strip()) is not None
 
 
-def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> Reading:
+def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
     """The quantity of a BOM line: a count above 0 and at most 1e9."""
     reading = read_count(text, mark, points_are_decimal=points_are_decimal)
     if reading.value is not None and not 0 < reading.value <= Decimal(LARGEST_QUANTITY):
-        return Reading(None, f"wanted a number above 0 and at most 1e9, got “{text.strip()[:LONGEST]}”")
+        return NumberReading(None, f"wanted a number above 0 and at most 1e9, got “{text.strip()[:LONGEST]}”")
     return reading
 
 
@@ -283,10 +283,10 @@ def _with_groups(body: str, decimal: Mark, mark: Mark | None) -> _Split | None:
     return _Split(head + "".join(groups), fraction, decimal)
 
 
-def _fraction(found: re.Match[str]) -> Number | None:
-    part = Fraction(unicodedata.numeric(found["part"])).limit_denominator(10)
+def _fraction(match: re.Match[str]) -> Number | None:
+    part = Fraction(unicodedata.numeric(match["part"])).limit_denominator(10)
     if 1000 % part.denominator:
         return None  # a third has no last decimal
-    exact = Decimal(found["whole"] or 0) + Decimal(part.numerator) / part.denominator
+    exact = Decimal(match["whole"] or 0) + Decimal(part.numerator) / part.denominator
     places = exact.as_tuple().exponent
-    return Number(-exact if found["sign"] in ("-", "−") else exact, int(places))
+    return Number(-exact if match["sign"] in ("-", "−") else exact, int(places))

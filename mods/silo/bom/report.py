@@ -30,7 +30,7 @@ from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts, walk_entries
 from silo.bom.resolve import display_name
-from silo.bom.walk.standard import STANDARD_PARTS
+from silo.bom.standard import STANDARD_PARTS
 
 # A CAD model counts pieces.
 PIECES = "pcs"
@@ -74,7 +74,7 @@ def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
         "level": entry.level,
         "consolidation_warning": entry.consolidation_warning,
         "children": [entry_json(child, base) for child in entry.children],
-        **({"own": [entry_json(one, base) for one in entry.own]} if entry.own else {}),
+        **({"own": [entry_json(bom_entry, base) for bom_entry in entry.own]} if entry.own else {}),
     }
 
 
@@ -102,12 +102,12 @@ def shorten(message: str, base: str) -> str:
 
 def tree_size(entries: Iterable[BomEntry]) -> int:
     """Lines of the tree written out in full. Nested assemblies share their values, so it may be huge."""
-    known: dict[int, int] = {}
+    sizes: dict[int, int] = {}
 
     def size(entry: BomEntry) -> int:
-        if id(entry) not in known:
-            known[id(entry)] = 1 + sum(map(size, entry.children))
-        return known[id(entry)]
+        if id(entry) not in sizes:
+            sizes[id(entry)] = 1 + sum(map(size, entry.children))
+        return sizes[id(entry)]
 
     return sum(map(size, entries))
 
@@ -140,7 +140,7 @@ def bom_json(extraction: Extraction, base: str = "") -> dict[str, Any]:
             "name": head.name,
         },
         "entries": [entry_json(entry, base) for entry in extraction.entries],
-        **({"own": [entry_json(one, base) for one in head.own]} if head.own else {}),
+        **({"own": [entry_json(bom_entry, base) for bom_entry in head.own]} if head.own else {}),
         "findings": [finding_json(finding, base) for finding in extraction.findings],
     }
 
@@ -151,8 +151,8 @@ def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
 
     def subtree(entry: BomEntry) -> dict[tuple[str, str], int]:
         # Nested assemblies share their values; each distinct one is counted once.
-        if (known := below.get(id(entry))) is not None:
-            return known
+        if (result := below.get(id(entry))) is not None:
+            return result
         total = {entry.key: 1}
         for child in entry.children:
             for key, count in subtree(child).items():
@@ -170,8 +170,8 @@ def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
 def flat_lines(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, int]]:
     """Each component once, with its instances in the whole assembly."""
     direct = tuple(entries)
-    known = {entry.key: entry for entry in walk_entries(direct)}
-    return [(known[key], count) for key, count in flat_counts(direct).items()]
+    bom_entries = {entry.key: entry for entry in walk_entries(direct)}
+    return [(bom_entries[key], count) for key, count in flat_counts(direct).items()]
 
 
 def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
@@ -198,15 +198,7 @@ def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
 
 def diff_json(diff: BomDiff) -> dict[str, Any]:
     """A comparison with the server."""
-    return {
-        "added": rows_as_dicts(diff.added),
-        "quantity_changed": rows_as_dicts(diff.quantity_changed),
-        "removed": rows_as_dicts(diff.removed),
-        "unchanged": rows_as_dicts(diff.unchanged),
-        "manual": rows_as_dicts(diff.manual),
-        "conflicts": rows_as_dicts(diff.conflicts),
-        "kept": rows_as_dicts(diff.kept),
-    }
+    return {field.name: rows_as_dicts(getattr(diff, field.name)) for field in fields(diff)}
 
 
 _TOLD = ("added", "quantity_changed", "conflicts", "removed", "kept", "manual")
@@ -293,7 +285,7 @@ class _Table:
         }
         row |= {"children": children, "instances": list(entry.instances)}
         if entry.own:
-            row["own"] = [self.add(one) for one in entry.own]
+            row["own"] = [self.add(bom_entry) for bom_entry in entry.own]
         self.rows.append(row)
         self._known[id(entry)] = len(self.rows) - 1
         return len(self.rows) - 1
@@ -319,7 +311,7 @@ def _plain_finding(finding: Finding) -> dict[str, Any]:
 
 def _finding(data: Mapping[str, Any]) -> Finding:
     return Finding(
-        FindingCode(data["code"]),
+        FindingCode[data["code"].upper()],
         Severity(data["severity"]),
         data["message"],
         tuple(Place(path, obj) for path, obj in data["where"]),
@@ -379,14 +371,14 @@ def left_out_of(
     """
     missing = [entry for entry in entries if entry.missing]
     explained = {name for entry in missing for name in entry.instances}
-    found = [_component(Reason.MISSING, entry, base) for entry in missing]
-    found += [_component(Reason.UNREGISTERED, entry, base) for entry in unregistered]
-    found += [
+    outs = [_component(Reason.MISSING, entry, base) for entry in missing]
+    outs += [_component(Reason.UNREGISTERED, entry, base) for entry in unregistered]
+    outs += [
         LeftOut(Reason.BROKEN, message=shorten(finding.message, base))
         for finding in errors
         if not {place.obj for place in finding.where} <= explained
     ]
-    return tuple(found)
+    return tuple(outs)
 
 
 def _component(reason: Reason, entry: BomEntry, base: str) -> LeftOut:
@@ -404,17 +396,19 @@ def remembered(
     Lines that were kept because a component is missing keep what they were known by, so that the component
     is known again in the next sync.
     """
-    known: dict[str, list[dict[str, str]]] = {}
+    fields_by_key: dict[str, list[dict[str, str]]] = {}
     for entry in entries:
-        known.setdefault(entry["child_part_number"], []).extend(map(dict, entry.get("components") or ()))
+        fields_by_key.setdefault(entry["child_part_number"], []).extend(
+            map(dict, entry.get("components") or ())
+        )
     for number in kept:
-        mine = known.setdefault(number, [])
-        mine += [dict(one) for one in before.get(number, ()) if one not in mine]
-    return {number: components for number, components in known.items() if components}
+        mine = fields_by_key.setdefault(number, [])
+        mine += [dict(each_fields) for each_fields in before.get(number, ()) if each_fields not in mine]
+    return {number: components for number, components in fields_by_key.items() if components}
 
 
 def in_words(left: Sequence[LeftOut] | Sequence[Mapping[str, Any]]) -> str:
     """``2 missing, 1 unregistered``; "" for nothing."""
-    reasons = Counter(str(one["reason"] if isinstance(one, Mapping) else one.reason) for one in left)
+    reasons = Counter(str(out["reason"] if isinstance(out, Mapping) else out.reason) for out in left)
     parts = [f"{reasons.pop(reason)} {reason}" for reason in Reason if reason in reasons]
     return ", ".join([*parts, *(f"{count} {reason}" for reason, count in reasons.items())])

@@ -37,9 +37,11 @@ _COMMA = re.compile(r"(?<=\d),(?=\d)")
 _GLUE = re.compile(r"(?<=[^\W\d_])[\s_-]+(?=\d)")
 _MOST_READ = 2000
 _SUFFIX = re.compile(r"\.fcstd$", re.IGNORECASE)
-# Labels that FreeCAD gives by itself say nothing of the part.
+# Labels that FreeCAD or an import gives by itself say nothing of the part.
 _GENERIC = re.compile(
-    r"(?:body|part|assembly|model|unnamed|link|compound|solid|fusion|cut)[ _]?\d*$", re.IGNORECASE
+    r"(?:body|part(?:[_ ]+feature)?|assembly|model|unnamed|link|compound|solid|shell|shape|fusion|cut"
+    r"|open cascade step translator.*)[ _]?\d*$|.*\.(?:stp|step|igs|iges|brp|brep)[ _]?\d*$",
+    re.IGNORECASE,
 )
 
 
@@ -51,6 +53,8 @@ class Proposal:
         its file gives other components too.
     is_guess
         the category was found by little: a person has to look at it first.
+    sourcing
+        "manufactured" or "purchased"; "" while nobody has said.
     """
 
     entry: BomEntry
@@ -59,6 +63,15 @@ class Proposal:
     category: str
     shares_file: bool = False
     is_guess: bool = False
+    sourcing: str = ""
+    supplier: str = ""
+    supplier_part_number: str = ""
+
+    @property
+    def supply(self) -> dict[str, str]:
+        """Return the properties of the new item that say where it is bought."""
+        supply_facts = {"supplier": self.supplier, "supplier_part_number": self.supplier_part_number}
+        return {name: text for name, text in supply_facts.items() if text}
 
 
 def is_generic(label: str) -> bool:
@@ -125,7 +138,7 @@ def crowded_files(entries: Iterable[BomEntry]) -> frozenset[str]:
 
 
 def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
-    """The document's label (spec §2), or the object's where that says more.
+    """The document's label (spec §2), the object's where that says more, or the file's.
 
     FreeCAD makes a document's label from its file's name; only one that a person chose (it differs) stands
     before an object's own label. Where a file gives several components, the object's label decides.
@@ -134,6 +147,7 @@ def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
         return entry.standard
     of_document, of_object = clean_name(entry.document_label), clean_name(entry.label)
     stem = clean_name(os.path.splitext(os.path.basename(entry.doc_path))[0])
+    of_document = stem if of_document and is_generic(of_document) else of_document
     chosen = of_document not in ("", stem)
     if of_object and not _GENERIC.match(of_object) and (shares_file or not chosen):
         return of_object
@@ -162,6 +176,7 @@ def propose(entry: BomEntry, categories: Mapping[str, str], *, shares_file: bool
         category=guess.code,
         shares_file=shares_file,
         is_guess=not guess.is_sure,
+        sourcing="purchased" if entry.is_standard else "",
     )
 
 
@@ -218,7 +233,7 @@ _PART_WORDS = ("part", "machin", "custom", "manufactur", "component", "mechanic"
 
 
 @dataclass(frozen=True)
-class Rule:
+class CategoryRule:
     """A rule of the site: all of ``words`` in the name, none of ``without``, give the category."""
 
     category: str
@@ -226,7 +241,7 @@ class Rule:
     without: frozenset[str] = frozenset()
 
     @classmethod
-    def read(cls, raw: object) -> Rule:
+    def read(cls, raw: object) -> CategoryRule:
         """From TOML or JSON: ``{words = ["motor", "frame"], category = "M06"}``. InputError."""
         if not isinstance(raw, Mapping):
             raise InputError(f"category rule: wanted a table with words and category, got {raw!r}")
@@ -256,7 +271,9 @@ class Categories(dict[str, str]):
         why the rules of the site are not used; "" where they are, or where there are none.
     """
 
-    def __init__(self, known: Mapping[str, str], rules: Iterable[Rule] = (), problem: str = "") -> None:
+    def __init__(
+        self, known: Mapping[str, str], rules: Iterable[CategoryRule] = (), problem: str = ""
+    ) -> None:
         super().__init__(known)
         self.rules = tuple(rules)
         self.problem = problem
@@ -309,17 +326,17 @@ def _read(values: Any) -> Iterator[tuple[str, str]]:
             yield str(code), str(text) if text != code else ""
 
 
-def rules_of(schema: Mapping[str, Any]) -> tuple[Rule, ...]:
+def rules_of(schema: Mapping[str, Any]) -> tuple[CategoryRule, ...]:
     """The site's rules for categories (``category_rules``); a rule that cannot be read is left out.
 
     They only propose, so that a server with other rules, or none, costs a question and no more.
     """
-    found = []
+    rules = []
     raw = schema.get("category_rules")
-    for one in raw if isinstance(raw, list) else ():
+    for rule in raw if isinstance(raw, list) else ():
         with suppress(InputError):
-            found.append(Rule.read(one))
-    return tuple(found)
+            rules.append(CategoryRule.read(rule))
+    return tuple(rules)
 
 
 @dataclass(frozen=True)
@@ -348,18 +365,18 @@ def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str])
         return Guess(fitting[0], 1.0)
     if entry.standard:
         return _standard_category(entry.standard, {code: categories[code] for code in fitting}, categories)
-    words = _stems(name)
+    words = stems(name)
     for rule in getattr(categories, "rules", ()):
         if rule.category in fitting and rule.fits(frozenset(words)):
             return Guess(rule.category, 1.0)
     if entry.is_assembly:
         # The name of an assembly says what it is for, not which kind it is.
         return Guess(fitting[0], SURE)
-    scores = {code: _score(words, _stems(categories[code])) for code in fitting}
+    scores = {code: _score(words, stems(categories[code])) for code in fitting}
     best = max(scores.values())
     if best:
-        found = [code for code in fitting if scores[code] == best]
-        return Guess(found[0], best / len(found))
+        codes = [code for code in fitting if scores[code] == best]
+        return Guess(codes[0], best / len(codes))
     for wanted in _PART_WORDS:
         for code in fitting:
             if wanted in categories[code].casefold():
@@ -376,22 +393,22 @@ def standard_kind(designation: str) -> str:
             if kind := _KIND_OF.get(f"{match[1]} {number}"):
                 return kind
             number = number.rpartition(".")[0]
-    words = _stems(designation)
-    known = (*_KINDS, "insert", *_ALSO)
-    return next((kind for kind in known if set(_stems(kind)) <= set(words)), "")
+    words = stems(designation)
+    kinds = (*_KINDS, "insert", *_ALSO)
+    return next((kind for kind in kinds if set(stems(kind)) <= set(words)), "")
 
 
 def _standard_category(designation: str, fitting: Mapping[str, str], categories: Mapping[str, str]) -> Guess:
     """By the site's rules, else the one category of the kind, else one for standard parts of any kind."""
     kind = standard_kind(designation)
     for named in filter(None, (kind, _ALSO.get(kind))):
-        words = frozenset(_stems(f"{designation} {named}"))
+        words = frozenset(stems(f"{designation} {named}"))
         for rule in getattr(categories, "rules", ()):
             if rule.category in fitting and rule.fits(words):
                 return Guess(rule.category, 1.0)
-        found = [code for code, text in fitting.items() if set(_stems(named)) <= set(_stems(text))]
-        if found:
-            return Guess(found[0], 1.0 if len(found) == 1 else SURE / 2)
+        codes = [code for code, text in fitting.items() if set(stems(named)) <= set(stems(text))]
+        if codes:
+            return Guess(codes[0], 1.0 if len(codes) == 1 else SURE / 2)
     for wanted in _STANDARD_WORDS:
         for code, text in fitting.items():
             if wanted in text.casefold():
@@ -422,7 +439,8 @@ def _score(name: list[str], category: list[str]) -> float:
     return 0.6 + 0.4 * common if name[-1] in category else 0.2 * common
 
 
-def _stems(text: str) -> list[str]:
+def stems(text: str) -> list[str]:
+    """Return the words of a name by which categories are found, without the plural's s."""
     return [_stem(word) for word in _WORD.findall(_HUMP.sub(" ", text))]
 
 
@@ -451,8 +469,8 @@ def look_up(uuids: Iterable[str], api_client: ItemLookup) -> Known:
     wanted = list(dict.fromkeys(uuids))
     batch = getattr(api_client, "get_items_by_uuid", None)
     if callable(batch) and wanted:
-        found = _by_uuid(batch(wanted))
-        return {uuid: found.get(uuid) or found.get(uuid.lower()) for uuid in wanted}
+        items = _by_uuid(batch(wanted))
+        return {uuid: items.get(uuid) or items.get(uuid.lower()) for uuid in wanted}
     return {uuid: api_client.get_item_by_uuid(uuid) for uuid in wanted}
 
 
@@ -473,11 +491,11 @@ def resolve_part_numbers(
     keeps its (resolved) children. Missing components stay in place without a number: nobody can look up what
     they are, and they are not there to be registered.
     """
-    known = look_up((e.silo_uuid for e in walk_entries(entries) if e.silo_uuid), api_client)
-    return resolve_with(entries, known)
+    items = look_up((e.silo_uuid for e in walk_entries(entries) if e.silo_uuid), api_client)
+    return resolve_with(entries, items)
 
 
-def resolve_with(entries: Sequence[BomEntry], known: Known) -> tuple[list[BomEntry], list[BomEntry]]:
+def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEntry], list[BomEntry]]:
     """:func:`resolve_part_numbers` against items fetched before; pure."""
     missing: dict[tuple[str, str], BomEntry] = {}
     done: dict[int, tuple[BomEntry, bool]] = {}
@@ -489,33 +507,35 @@ def resolve_with(entries: Sequence[BomEntry], known: Known) -> tuple[list[BomEnt
         if entry.missing:
             done[id(entry)] = (entry, True)
             return done[id(entry)]
-        item = known.get(entry.silo_uuid) if entry.silo_uuid else None
+        item = items.get(entry.silo_uuid) if entry.silo_uuid else None
         number = item.get("part_number") if item is not None else None
         name = (item.get("name") or item.get("description") or number) if item is not None else None
         if not number:
             missing.setdefault(entry.key, entry)
-        told = replace(
+        bom_entry = replace(
             entry,
             part_number=number or None,
             name=name,
             children=tuple(several(entry.children)),
-            unregistered=tuple(child for child, found in map(one, entry.children) if not found),
+            unregistered=tuple(
+                child for child, children_resolved in map(one, entry.children) if not children_resolved
+            ),
         )
-        done[id(entry)] = (told, bool(number))
+        done[id(entry)] = (bom_entry, bool(number))
         return done[id(entry)]
 
     def several(group: Iterable[BomEntry]) -> list[BomEntry]:
-        return merge_lines(entry for entry, found in map(one, group) if found)
+        return merge_lines(entry for entry, group_resolved in map(one, group) if group_resolved)
 
     resolved = several(entries)
     unresolved = [one(entry)[0] for entry in missing.values()]
     return resolved, unresolved
 
 
-def numbered_findings(findings: Iterable[Finding], known: Known) -> tuple[Finding, ...]:
+def numbered_findings(findings: Iterable[Finding], items: Known) -> tuple[Finding, ...]:
     """The findings, those about an identity with the part number that people know it by."""
     numbers = {
-        uuid: str(item["part_number"]) for uuid, item in known.items() if item and item.get("part_number")
+        uuid: str(item["part_number"]) for uuid, item in items.items() if item and item.get("part_number")
     }
     return tuple(
         replace(finding, message=_numbered(finding.message, numbers))
@@ -576,15 +596,17 @@ _ADVICE = ". Consider using a link array (ElementCount) for cleaner assembly man
 
 def one_hint_each(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """The findings with one consolidation warning for each BOM, in the place of one for each of its parts."""
-    found: dict[object, list[Finding]] = {}
-    for one in findings:
-        found.setdefault(one.where[1:] if one.code is FindingCode.CONSOLIDATION else id(one), []).append(one)
-    return tuple(of[0] if len(of) == 1 else _several_hints(of) for of in found.values())
+    hints: dict[object, list[Finding]] = {}
+    for finding in findings:
+        hints.setdefault(
+            finding.where[1:] if finding.code is FindingCode.CONSOLIDATION else id(finding), []
+        ).append(finding)
+    return tuple(of[0] if len(of) == 1 else _several_hints(of) for of in hints.values())
 
 
 def _several_hints(hints: Sequence[Finding]) -> Finding:
-    told = listed([one.message.removeprefix(_HINT).removesuffix(_ADVICE) for one in hints])
-    return replace(hints[0], message=f"{_HINT}{told}{_ADVICE}")
+    text = listed([finding.message.removeprefix(_HINT).removesuffix(_ADVICE) for finding in hints])
+    return replace(hints[0], message=f"{_HINT}{text}{_ADVICE}")
 
 
 def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:

@@ -14,24 +14,29 @@ from typing import Any
 
 from silo.bom.document import DocumentRoot, derived, first_of, label_of, object_name, own, same_document
 from silo.bom.errors import InputError, SeveralAssembliesError
-from silo.bom.walk.kinds import (
+from silo.bom.objects import (
     COMPONENTS,
+    COPIES,
     INLINE,
     REPEATERS,
+    Contents,
     Kind,
+    Lost,
+    ObjectRole,
     Survey,
+    climbed,
     consumed,
     elements,
     is_assembly3,
     is_named_assembly,
+    is_switched_on,
     kind_of,
     left_out_by,
+    members,
     survey_of,
 )
-from silo.bom.walk.notes import Notes
-from silo.bom.walk.roles import SHOWING, Reader, Reading
-from silo.bom.walk.targets import Inspect, is_assembly_link
-from silo.bom.walk.tree import COPIES, Contents, Lost, Role, Tree, climbed, is_switched_on
+from silo.bom.roles import SHOWING, Files, Reader, Reading
+from silo.bom.targets import Inspect, is_assembly_link
 
 # What to do where a document holds several assemblies. The window says it in words of its own.
 NAME_ONE = "Name the one that is meant (--assembly NAME)."
@@ -45,11 +50,15 @@ _BESIDE = COMPONENTS | REPEATERS | {Kind.LINK_GROUP, Kind.STANDARD, Kind.CONTAIN
 
 Whole = Callable[[Any], Any]
 _CONTAINERS = frozenset({Kind.CONTAINER, Kind.LINK_GROUP, Kind.ASSEMBLY_LINK})
-_FOLDERS = frozenset({Kind.FOLDER})
 # An Assembly3 container with further properties may be taken for an array or a foreign part.
 _RANKED = frozenset({Kind.CONTAINER, Kind.DRAFT_ARRAY, Kind.FOREIGN})
 _LOCAL = frozenset({Kind.LOCAL})
 _SPARES = ("Parts", "Source_shapes")
+
+
+def as_it_is(document: Any) -> Any:
+    """A document that is there with all its objects."""
+    return document
 
 
 class _Lying:
@@ -71,7 +80,9 @@ class _Lying:
 
     def around(self, name: str) -> Iterator[tuple[Any, Kind]]:
         """All containers and folders around an object, at any distance, the nearest first."""
-        return (self._holders[upper] for upper in climbed(name, lambda one: self._above.get(one, ())))
+        return (
+            self._holders[upper] for upper in climbed(name, lambda each_name: self._above.get(each_name, ()))
+        )
 
     def is_inner(self, name: str) -> bool:
         """True for what lies in a container, also through folders, and for the copies that one made."""
@@ -81,14 +92,15 @@ class _Lying:
 
     def is_spare(self, obj: Any) -> bool:
         """True for what a folder keeps for later; of visible standard parts only Assembly4's folders do."""
-        around = {object_name(one).rstrip("0123456789") for one, _ in self.around(object_name(obj))}
+        around = {object_name(each_obj).rstrip("0123456789") for each_obj, _ in self.around(object_name(obj))}
         bought = kind_of(obj) is Kind.STANDARD and self.is_visible(obj)
         return bool(around.intersection(_SPARES) if bought else around)
 
     def is_visible(self, obj: Any) -> bool:
         """True for what is visible itself and lies in visible containers."""
         return all(
-            is_switched_on(one) for one in (obj, *(outer for outer, _ in self.around(object_name(obj))))
+            is_switched_on(each_obj)
+            for each_obj in (obj, *(outer for outer, _ in self.around(object_name(obj))))
         )
 
     def loose(self, kinds: frozenset[Kind]) -> list[Any]:
@@ -100,14 +112,14 @@ def _holders(survey: Survey) -> tuple[dict[str, tuple[Any, Kind]], dict[str, tup
     """The containers and folders of a document by name; and what lists an object, by the object's name."""
     holders: dict[str, tuple[Any, Kind]] = {}
     above: dict[str, tuple[str, ...]] = {}
-    for obj, kind in survey.of(_CONTAINERS | _FOLDERS):
-        listed = [one for name in ("Group", "ElementList") for one in own(obj, name) or ()]
+    for obj, kind in survey.of(_CONTAINERS | {Kind.FOLDER}):
+        listed = [each_name for name in ("Group", "ElementList") for each_name in own(obj, name) or ()]
         if kind is Kind.CONTAINER and is_assembly3(obj):
-            listed += [one for group in listed for one in own(group, "Group") or ()]
+            listed += [each_name for group in listed for each_name in own(group, "Group") or ()]
         holders[name := object_name(obj)] = (obj, kind)
         alone = (name,)  # one tuple for all that lie in this holder only
-        for one in map(object_name, listed):
-            above[one] = (*above[one], name) if one in above else alone
+        for each_name in map(object_name, listed):
+            above[each_name] = (*above[each_name], name) if each_name in above else alone
     return holders, above
 
 
@@ -126,7 +138,10 @@ def _rank(obj: Any, reader: Reader) -> int | None:
 def _holds(container: Any, reader: Reader) -> int:
     """2 for components of other files, 1 for standard or declared parts only, 0 for neither."""
     hardware, shows_others = False, False
-    for obj, kind in Tree(container, id_of, lambda _obj, _kind: False).members.values():
+    for obj in climbed(
+        container, lambda each_obj: members(each_obj) if each_obj is container or _is_walked(each_obj) else ()
+    ):
+        kind = kind_of(obj)
         if kind in COMPONENTS:
             target = first_of(getattr(obj, "LinkedObject", None))
             # A broken link stands for a component as well.
@@ -141,9 +156,8 @@ def _holds(container: Any, reader: Reader) -> int:
     return 2 if far else 1 if brought else 0
 
 
-def id_of(obj: Any) -> tuple[str, str]:
-    """What identifies an object within its document."""
-    return ("", object_name(obj))
+def _is_walked(obj: Any) -> bool:
+    return kind_of(obj) in INLINE and not object_name(obj).startswith(COPIES)
 
 
 def _is_far(target: Any, container: Any) -> bool:
@@ -161,34 +175,35 @@ _Candidates = list[tuple[tuple[int, bool], Any]]
 
 def _candidates(lying: _Lying) -> _Candidates:
     reader = silent_reader()
-    found = []
+    candidates = []
     for obj in lying.loose(_RANKED):
         if (rank := _rank(obj, reader)) is None:
             continue
         # People sort assemblies into folders too; a plain part in a folder is a spare.
         in_folder = any(lying.around(object_name(obj)))
         if not in_folder or rank < 2:
-            found.append(((rank, in_folder), obj))
-    return sorted(found, key=lambda candidate: candidate[0])
+            candidates.append(((rank, in_folder), obj))
+    return sorted(candidates, key=lambda candidate: candidate[0])
 
 
 def silent_reader(
-    *, hardware: bool = True, counts_beside: bool = False, inspect: Inspect | None = None
+    files: Files | None = None,
+    *,
+    hardware: bool = True,
+    counts_beside: bool = False,
+    inspect: Inspect | None = None,
+    whole: Whole = as_it_is,
 ) -> Reader:
-    """For a look at documents whose findings nobody needs twice."""
+    """For a look at documents whose findings nobody needs twice.
 
-    def path_of(obj: Any) -> str:
-        return getattr(getattr(obj, "Document", None), "FileName", "") or ""
-
-    def key(obj: Any) -> tuple[str, str]:
-        return (path_of(obj), object_name(obj))
-
-    silent = Reader(Notes(path_of), key, inspect, hardware=hardware)
+    counts_beside
+        visible standard parts beside the one assembly of a file count with it.
+    """
+    files = files or Files()
+    silent = Reader(inspect, files, hardware=hardware)
     if not counts_beside:
         return silent
-    return Reader(
-        Notes(path_of), key, inspect, beside=lambda top: loose_hardware(top, silent), hardware=hardware
-    )
+    return Reader(inspect, files, beside=lambda top: loose_hardware(top, silent, whole), hardware=hardware)
 
 
 def choose_assembly(document: Any, name: str | None = None) -> Any:
@@ -202,39 +217,39 @@ def choose_assembly(document: Any, name: str | None = None) -> Any:
     if name is not None:
         return _named(document, name)
     lying = _Lying(survey_of(document))
-    found = _candidates(lying)
-    likely = _likely(found)
-    if len(likely) > 1 and found[0][0][0] < 2:
-        told = f"{_file(document)} holds {len(likely)} assemblies: {_told(likely)}. {NAME_ONE}"
-        raise SeveralAssembliesError(told, document.FileName, list(map(object_name, likely)))
-    return likely[0] if len(likely) == 1 else _root_or_part(document, lying, found)
+    candidates = _candidates(lying)
+    likely = _likely(candidates)
+    if len(likely) > 1 and candidates[0][0][0] < 2:
+        text = f"{_file(document)} holds {len(likely)} assemblies: {_names_of(likely)}. {NAME_ONE}"
+        raise SeveralAssembliesError(text, document.FileName, list(map(object_name, likely)))
+    return likely[0] if len(likely) == 1 else _root_or_part(document, lying, candidates)
 
 
-def _likely(found: _Candidates) -> list[Any]:
+def _likely(candidates: _Candidates) -> list[Any]:
     """The containers that may be the assembly: real assemblies, and parts that hold components."""
-    if not found or found[0][0][0] > _HOLDS_NOTHING - 2:
+    if not candidates or candidates[0][0][0] > _HOLDS_NOTHING - 2:
         return []
     reader = silent_reader()
-    best = [obj for standing, obj in found if standing == found[0][0]]
-    return [obj for obj in best if _holds(obj, reader) == 2] or best
+    best = [obj for standing, obj in candidates if standing == candidates[0][0]]
+    return [obj for obj in best if len(best) > 1 and _holds(obj, reader) == 2] or best
 
 
-def _root_or_part(document: Any, lying: _Lying, found: _Candidates) -> Any:
+def _root_or_part(document: Any, lying: _Lying, candidates: _Candidates) -> Any:
     """The one part of a file that has nothing else to count, or the document with all that lies in it."""
-    best = [obj for standing, obj in found if standing == found[0][0]]
+    best = [obj for standing, obj in candidates if standing == candidates[0][0]]
     loose = lying.loose(_LOOSE)
     bodies = _loose_bodies(lying)
-    is_plain = bool(found) and found[0][0][0] == _HOLDS_NOTHING
+    is_plain = bool(candidates) and candidates[0][0][0] == _HOLDS_NOTHING
     if len(best) == 1 and not loose and not (bodies and is_plain):
         return best[0]
-    return DocumentRoot(document, [*(obj for _, obj in found), *loose, *bodies])
+    return DocumentRoot(document, [*(obj for _, obj in candidates), *loose, *bodies])
 
 
 def _file(document: Any) -> str:
     return getattr(document, "FileName", "") or getattr(document, "Label", "") or "The document"
 
 
-def _told(containers: Iterable[Any]) -> str:
+def _names_of(containers: Iterable[Any]) -> str:
     return ", ".join(f"{object_name(obj)} ({label_of(obj)})" for obj in containers) or "none"
 
 
@@ -247,9 +262,9 @@ def _named(document: Any, name: str) -> Any:
         if matching:
             raise InputError(
                 f"{_file(document)} holds {len(matching)} assemblies labelled {name!r}; give the name of the "
-                f"one that is meant instead: {_told(matching)}."
+                f"one that is meant instead: {_names_of(matching)}."
             )
-    raise InputError(f"{_file(document)} has no assembly named {name!r}; it has: {_told(containers)}.")
+    raise InputError(f"{_file(document)} has no assembly named {name!r}; it has: {_names_of(containers)}.")
 
 
 def _loose_bodies(lying: _Lying) -> list[Any]:
@@ -262,11 +277,6 @@ def _loose_bodies(lying: _Lying) -> list[Any]:
         eaten = consumed([obj for obj, _ in lying.survey.of(_LOCAL)], object_name)
         loose = [obj for obj in loose if object_name(obj) not in eaten]
     return [obj for obj in loose if lying.is_visible(obj)] or loose
-
-
-def as_it_is(document: Any) -> Any:
-    """A document that is there with all its objects."""
-    return document
 
 
 def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> list[Any]:
@@ -283,15 +293,15 @@ def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> l
     lying = _Lying(survey)
     visible = [obj for obj in lying.loose(frozenset({Kind.STANDARD})) if lying.is_visible(obj)]
     roles = _roles_beside(container, reader, lying, visible, {}) if visible else ()
-    if not (loose := [obj for obj, role in roles if role is Role.LOOSE]):
+    if not (loose := [obj for obj, role in roles if role is ObjectRole.LOOSE]):
         return []
     likely = _likely(_candidates(lying))
     return loose if list(map(object_name, likely)) == [object_name(container)] else []
 
 
 def _roles_beside(
-    top: Any, reader: Reader, lying: _Lying, objects: Iterable[Any], known: Mapping[str, Role | None]
-) -> Iterator[tuple[Any, Role]]:
+    top: Any, reader: Reader, lying: _Lying, objects: Iterable[Any], roles: Mapping[str, ObjectRole | None]
+) -> Iterator[tuple[Any, ObjectRole]]:
     """The role of each of some objects that lie in no container, for the assembly ``top``."""
     survey = lying.survey
     shown = {name for _, name in Reading(reader, top).shown_by(survey.of(SHOWING))}
@@ -299,22 +309,22 @@ def _roles_beside(
     for obj in objects:
         name = object_name(obj)
         if name in eaten:
-            role = Role.OPERAND
+            role = ObjectRole.OPERAND
         elif name in shown or (
             not lying.is_visible(obj)  # a visible array shows its elements once more
-            and any(known.get(object_name(one)) is Role.COMPONENT for one in elements(obj))
+            and any(roles.get(object_name(element)) is ObjectRole.COMPONENT for element in elements(obj))
         ):
-            role = Role.SOURCE
+            role = ObjectRole.SOURCE
         elif left_out_by(obj):
-            role = Role.LEFT_OUT
+            role = ObjectRole.LEFT_OUT
         elif lying.is_spare(obj):
-            role = Role.SPARE
+            role = ObjectRole.SPARE
         else:
-            role = Role.LOOSE
+            role = ObjectRole.LOOSE
         yield obj, role
 
 
-def beside(top: Any, fates: Mapping[str, Role | None]) -> list[Any]:
+def beside(top: Any, fates: Mapping[str, ObjectRole | None]) -> list[Any]:
     """What lies in the document of ``top``, but in no container and no folder, and holds components.
 
     It is not counted, and nobody may have noticed. Another assembly has a BOM of its own.
@@ -324,7 +334,7 @@ def beside(top: Any, fates: Mapping[str, Role | None]) -> list[Any]:
     return [
         obj
         for name, role in fates.items()
-        if role is Role.LOOSE and not is_named_assembly(obj := top.Document.getObject(name))
+        if role is ObjectRole.LOOSE and not is_named_assembly(obj := top.Document.getObject(name))
     ]
 
 
@@ -339,10 +349,10 @@ def seen_beside(top: Any, reader: Reader) -> list[Any]:
         if lying.is_visible(obj)
     ]
     roles = _roles_beside(top, reader, lying, loose, {})
-    return [obj for obj, role in roles if role is Role.LOOSE and object_name(obj) not in mine]
+    return [obj for obj, role in roles if role is ObjectRole.LOOSE and object_name(obj) not in mine]
 
 
-def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, Role | None]:
+def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, ObjectRole | None]:
     """The role of each object with a shape, a link or a fastener's properties, for the assembly ``top``.
 
     None breaks the law: a container of the assembly holds the object, and the count does not know it.
@@ -351,10 +361,10 @@ def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, Role | None
         for a look at what lies beside the assembly.
     """
     survey = survey_of(getattr(top, "Document", None))
-    found: dict[str, Role | None] = {name: role for (_, name), role in contents.roles.items()}
-    found[object_name(top)] = Role.HOLDER
-    if not (left := list(survey.of(_BESIDE | {Kind.ELEMENT}, found.keys()))):
-        return found
+    roles: dict[str, ObjectRole | None] = {name: role for (_, name), role in contents.roles.items()}
+    roles[object_name(top)] = ObjectRole.HOLDER
+    if not (left := list(survey.of(_BESIDE | {Kind.ELEMENT}, roles.keys()))):
+        return roles
     lying = _Lying(survey)
     grouped = survey.grouped(_LOCAL)
     outside = {object_name(obj) for obj, _ in lying.around(object_name(top))}
@@ -362,25 +372,25 @@ def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, Role | None
     for obj, kind in left:
         name = object_name(obj)
         if name in outside:  # it holds the assembly
-            found[name] = Role.CONSTRUCTION
+            roles[name] = ObjectRole.CONSTRUCTION
         elif name.startswith(COPIES) or kind is Kind.ELEMENT or name in grouped:
-            found[name] = Role.INSIDE
+            roles[name] = ObjectRole.INSIDE
         elif lying.is_inner(name):
-            found[name] = _inside(lying, name, found)
+            roles[name] = _inside(lying, name, roles)
         else:
             beside.append(obj)
-    for obj, role in _roles_beside(top, reader, lying, beside, found) if beside else ():
-        is_nothing = role is Role.LOOSE and not reader.brings(obj)
-        found[object_name(obj)] = Role.CONSTRUCTION if is_nothing else role
-    return found
+    for obj, role in _roles_beside(top, reader, lying, beside, roles) if beside else ():
+        is_nothing = role is ObjectRole.LOOSE and not reader.brings(obj)
+        roles[object_name(obj)] = ObjectRole.CONSTRUCTION if is_nothing else role
+    return roles
 
 
-def _inside(lying: _Lying, name: str, known: Mapping[str, Role | None]) -> Role | None:
+def _inside(lying: _Lying, name: str, roles: Mapping[str, ObjectRole | None]) -> ObjectRole | None:
     """The role of what lies in a container and is no member of the assembly."""
     around = list(lying.around(name))
     if any(is_assembly3(obj) for obj, _ in around):  # its elements and constraints
-        return Role.CONSTRUCTION
+        return ObjectRole.CONSTRUCTION
     if any(kind is Kind.ASSEMBLY_LINK or object_name(obj).startswith(COPIES) for obj, kind in around):
-        return Role.INSIDE
-    outer = [known.get(object_name(obj), Role.LOOSE) for obj, kind in around if kind is not Kind.FOLDER]
-    return None if all(role is Role.HOLDER for role in outer) else Role.INSIDE
+        return ObjectRole.INSIDE
+    outer = [roles.get(object_name(obj), ObjectRole.LOOSE) for obj, kind in around if kind is not Kind.FOLDER]
+    return None if all(role is ObjectRole.HOLDER for role in outer) else ObjectRole.INSIDE

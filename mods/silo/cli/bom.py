@@ -44,26 +44,23 @@ if TYPE_CHECKING:
 
 
 def add_bom(parser: argparse.ArgumentParser) -> None:
-    common.add_top(parser)
-    parser.add_argument(
-        "--flat", action="store_true", help="quantities multiplied down the tree, each part once"
+    common.add_top(parser, "--csv", "--xlsx")
+    common.options(
+        parser,
+        {
+            "--flat": "quantities multiplied down the tree, each part once",
+            "--verify": (
+                "have freecadcmd compare the BOM with the solids that FreeCAD shows; 1 where they differ"
+            ),
+            "--resolve": "ask the server for part numbers and names",
+            "--why PART": (
+                "show why the assembly itself has so many of a part (name, label or standard): each chain"
+            ),
+            "--verbose": "also hints, such as links that an array could replace",
+            "--csv FILE": "write the lines as CSV (- for standard output)",
+            "--xlsx FILE": "write the lines as a workbook",
+        },
     )
-    parser.add_argument(
-        "--verify",
-        action="store_true",
-        help="have freecadcmd compare the BOM with the solids that FreeCAD shows; 1 where they differ",
-    )
-    parser.add_argument("--resolve", action="store_true", help="ask the server for part numbers and names")
-    parser.add_argument(
-        "--why",
-        metavar="PART",
-        help="show why the assembly itself has so many of a part (name, label or standard): each chain",
-    )
-    parser.add_argument(
-        "--verbose", action="store_true", help="also hints, such as links that an array could replace"
-    )
-    parser.add_argument("--csv", metavar="FILE", help="write the lines as CSV (- for standard output)")
-    parser.add_argument("--xlsx", metavar="FILE", help="write the lines as a workbook")
     common.only_with(parser, "--resolve", "--server", "--token")
     common.not_with(parser, "--verify", "--flat", "--resolve", "--csv", "--xlsx", "--why", *common.READING)
     common.not_with(parser, "--why", "--flat", "--resolve", "--csv", "--xlsx", "--json", *common.READING)
@@ -78,7 +75,7 @@ def run_bom(args: argparse.Namespace) -> int:
         return _why(args)
     check_writable(*(path for path in (args.csv, args.xlsx) if path and path != "-"))
     if os.path.isdir(args.top) or args.assembly == common.EACH:
-        return _several(args)
+        return _show_each(args)
     extraction, summary = common.read_tops(args)[0], None
     if args.resolve:
         from silo.batch import ask_for_moved
@@ -92,8 +89,8 @@ def run_bom(args: argparse.Namespace) -> int:
                     summary = client.get_summary(number)
                 except BusyError as error:  # a very large product is summed up; the BOM is here
                     print(error, file=sys.stderr)
-        known = {entry.key: entry for entry in resolved.unresolved}
-        head = _whole(replace(resolved.assembly, children=resolved.entries), known)
+        entries = {entry.key: entry for entry in resolved.unresolved}
+        head = _whole(replace(resolved.assembly, children=resolved.entries), entries)
         extraction = Extraction(resolved.assembly, head.children, resolved.findings)
     else:
         hints = consolidation_findings(extraction.entries)
@@ -106,20 +103,22 @@ def run_bom(args: argparse.Namespace) -> int:
         kept = {"silo": summary.model_dump(mode="json")} if summary else {}
         common.print_json(flat_json(extraction) if args.flat else bom_json(extraction) | kept)
     if args.json or args.csv == "-":
-        return _exit_of(extraction)
+        return _exit_of(extraction, args)
     from silo.cli import show
 
     out = show.console()
     out.print(show.flat_table(flat_json(extraction)) if args.flat else show.bom_tree(extraction))
-    told = one_hint_each(extraction.findings)
-    told = tuple(one for one in told if args.verbose or one.code is not FindingCode.CONSOLIDATION)
-    if told:
+    findings = one_hint_each(extraction.findings)
+    findings = tuple(
+        finding for finding in findings if args.verbose or finding.code is not FindingCode.CONSOLIDATION
+    )
+    if findings:
         out.print()
-        out.print(show.findings_text(told, base_of(extraction)))
+        out.print(show.findings_text(findings, base_of(extraction)))
     if summary:
         out.print()
         out.print(show.summary_text(summary))
-    return _exit_of(extraction)
+    return _exit_of(extraction, args)
 
 
 def _why(args: argparse.Namespace) -> int:
@@ -140,12 +139,13 @@ def _why(args: argparse.Namespace) -> int:
     return Exit.DONE
 
 
-def _exit_of(extraction: Extraction) -> int:
+def _exit_of(extraction: Extraction, args: argparse.Namespace) -> int:
     """Return 1 if an error says that the BOM is not whole, or if own parts of the file are no items yet."""
-    return Exit.UNDONE if extraction.blocked or extraction.assembly.own else Exit.DONE
+    incomplete = extraction.blocked and not args.allow_missing
+    return Exit.UNDONE if incomplete or extraction.assembly.own else Exit.DONE
 
 
-def _several(args: argparse.Namespace) -> int:
+def _show_each(args: argparse.Namespace) -> int:
     """Each assembly of a file; of a folder with its own lines, children first. 1 where one is not whole."""
     if args.flat or args.resolve or args.csv or args.xlsx:
         raise InputError("--flat, --resolve, --csv and --xlsx are for one assembly; name its file.")
@@ -157,17 +157,23 @@ def _several(args: argparse.Namespace) -> int:
             tops = [(plan.extraction(node, reading), base) for layer in plan.layers for node in layer]
         errors = {relative(top, base): str(error) for top, error in plan.errors.items()}
     else:
-        tops = [(found, base_of(found)) for found in common.read_tops(args)]
+        tops = [
+            (extraction_of_top, base_of(extraction_of_top)) for extraction_of_top in common.read_tops(args)
+        ]
     if args.json:
-        common.print_json({"assemblies": [bom_json(*one) for one in tops], "errors": errors})
-    for found, base in tops if not args.json else ():
-        out.print(show.bom_tree(found, base))
-        if found.findings:
-            out.print(show.findings_text(found.findings, base))
+        common.print_json({"assemblies": [bom_json(*each_top) for each_top in tops], "errors": errors})
+    for extraction, base in tops if not args.json else ():
+        out.print(show.bom_tree(extraction, base))
+        if extraction.findings:
+            out.print(show.findings_text(extraction.findings, base))
         out.print()
     for path, words in errors.items() if not args.json else ():
         out.print(f"✗ {show.plain(path)}: {show.plain(words)}", style="red", markup=False)
-    return Exit.UNDONE if errors else max((_exit_of(found) for found, _ in tops), default=Exit.DONE)
+    return (
+        Exit.UNDONE
+        if errors
+        else max((_exit_of(extraction_of_top, args) for extraction_of_top, _ in tops), default=Exit.DONE)
+    )
 
 
 def _table(extraction: Extraction, *, flat: bool) -> list[list[str | int]]:
@@ -183,8 +189,8 @@ def _table(extraction: Extraction, *, flat: bool) -> list[list[str | int]]:
     grow([]) if flat else grow(bom_json(extraction)["entries"])
     level = () if flat else ("level",)
     columns = (*level, "part_number", "name", "quantity", "unit", "standard", "doc_path", "object", "missing")
-    told = flat_json(extraction) if flat else rows
-    cells = [["yes" if row[name] is True else row[name] or "" for name in columns] for row in told]
+    table_rows = flat_json(extraction) if flat else rows
+    cells = [["yes" if row[name] is True else row[name] or "" for name in columns] for row in table_rows]
     return [[name.replace("doc_path", "file").replace("_", " ") for name in columns], *cells]
 
 
@@ -230,19 +236,19 @@ def _verify(args: argparse.Namespace) -> int:
         raise InputError("--verify is for one file; name the file.")
     with Library() as library:
         extract(choose_assembly(library.open(args.top), args.assembly))
-        read = [one for one in library.documents.values() if isinstance(one, FcstdDocument)]
-        command, version = freecad_for(max(saved_by(one.ProgramVersion) for one in read))
+        read = [document for document in library.documents.values() if isinstance(document, FcstdDocument)]
+        command, version = freecad_for(max(saved_by(document.ProgramVersion) for document in read))
     print(f"Compared in FreeCAD {version} ({command}).", file=sys.stderr)
     witness: dict[str, list[dict[str, Any]]] = {}
-    ((top, found),) = run_freecad(
+    ((top, error),) = run_freecad(
         [args.top], args.assembly, command=command, hardware=not args.no_hardware, witness=witness
     )
-    if isinstance(found, SiloError):
-        raise found
+    if isinstance(error, SiloError):
+        raise error
     accounts = witness[top]
-    differs = found.blocked or not all(account["agrees"] for account in accounts)
+    differs = error.blocked or not all(account["agrees"] for account in accounts)
     if args.json:
-        common.print_json({**bom_json(found), "witness": accounts})
+        common.print_json({**bom_json(error), "witness": accounts})
         return int(differs)
     from silo.cli import show
 
@@ -250,26 +256,24 @@ def _verify(args: argparse.Namespace) -> int:
     for account in accounts:
         mark = "✓" if account["agrees"] else "✗"
         out.print(f"{mark} {show.plain(account['sentence'])}", markup=False)
-    if found.blocked:
-        out.print(show.findings_text(found.findings, base_of(found)))
+    if error.blocked:
+        out.print(show.findings_text(error.findings, base_of(error)))
     return int(differs)
 
 
 def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> BomEntry:
     """The entry with all its children again, those without a part number too."""
-    found = (*entry.children, *(unresolved.get(child.key, child) for child in entry.unregistered))
+    entries = (*entry.children, *(unresolved.get(child.key, child) for child in entry.unregistered))
     children = (
-        replace(_whole(one, unresolved), quantity=child.quantity, level=child.level)
-        for one, child in zip(found, (*entry.children, *entry.unregistered), strict=True)
+        replace(_whole(bom_entry, unresolved), quantity=child.quantity, level=child.level)
+        for bom_entry, child in zip(entries, (*entry.children, *entry.unregistered), strict=True)
     )
     return replace(entry, children=tuple(children))
 
 
 def add_where_used(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("part", metavar="PART.FCStd", help="the file; it need not be there any more")
-    parser.add_argument(
-        "vault", metavar="VAULT", nargs="?", default=".", help="the folder (default: this one)"
-    )
+    text = "the file; it need not be there any more"
+    common.add_each(parser, "part", metavar="PART.FCStd", help=text)
     parser.set_defaults(run=run_where_used)
 
 
@@ -277,9 +281,9 @@ def run_where_used(args: argparse.Namespace) -> int:
     """Print the files; those of an unchanged vault are known from the index."""
     from silo.vault.reading import Question
 
-    if not os.path.isdir(args.vault):
-        raise InputError(f"{args.vault} is no folder. Name the folder of the vault.")
-    base, part = os.path.realpath(args.vault), os.path.realpath(args.part)
+    if not os.path.isdir(args.root):
+        raise InputError(f"{args.root} is no folder. Name the folder of the vault.")
+    base, part = os.path.realpath(args.root), os.path.realpath(args.part)
     if not os.path.lexists(part) and os.path.lexists(inner := os.path.join(base, args.part)):
         part = os.path.realpath(inner)  # as the other commands print it
     tops = documents_in([base])
@@ -289,30 +293,32 @@ def run_where_used(args: argparse.Namespace) -> int:
     unread = []
     with common.reading_of(args) as reading:
         reading.index.expect(base)
+        progress = common.count_steps(len(tops))
         for top, answer in zip(tops, reading.ask_many(map(Question, tops)), strict=True):
+            progress(top)
             if "document" in answer.plain:
                 unread.append(top)
             for used in answer.known.links:
                 users.setdefault(used, set()).add(top)
     if part not in users and not os.path.lexists(part):
-        known = {relative(one, base) for one in (*tops, *users)}
-        meant = did_you_mean(relative(part, base), sorted(known)) or "."
-        raise InputError(f"{args.part}: there is no such file, and none in {args.vault} links to one{meant}")
+        relative_paths = {relative(each_path, base) for each_path in (*tops, *users)}
+        meant = did_you_mean(relative(part, base), sorted(relative_paths)) or "."
+        raise InputError(f"{args.part}: there is no such file, and none in {args.root} links to one{meant}")
     above = _above(part, users)
-    found = {
+    uses = {
         "direct": users.get(part, ()),
         "all": above,
         "tops": [top for top in above if not users.get(top)],
         "unreadable": unread,
     }
-    said = {name: [relative(path, base) for path in sorted(paths)] for name, paths in found.items()}
+    said = {name: [relative(path, base) for path in sorted(paths)] for name, paths in uses.items()}
     if args.json:
         common.print_json({"part": relative(part, base), **said})
         return Exit.UNDONE if unread else Exit.DONE
     from silo.cli import show
 
     out = show.console()
-    lines = said["direct"] or [f"No file of {args.vault} links to it."]
+    lines = said["direct"] or [f"No file of {args.root} links to it."]
     if said["tops"]:
         lines.append(f"Tops that a change touches: {', '.join(said['tops'])}")
     lines += [f"✗ {path} could not be read, so its links are not known." for path in said["unreadable"]]
@@ -323,18 +329,18 @@ def run_where_used(args: argparse.Namespace) -> int:
 
 def _above(part: str, users: Mapping[str, set[str]]) -> set[str]:
     """All files that use one, directly or not."""
-    found: set[str] = set()
+    result: set[str] = set()
     left = [part]
     while left:
         for user in users.get(left.pop(), ()):
-            if user not in found and user != part:
-                found.add(user)
+            if user not in result and user != part:
+                result.add(user)
                 left.append(user)
-    return found
+    return result
 
 
 def add_relink(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("top", metavar="TOP.FCStd", help="the assembly's file")
+    common.add_each(parser, "top", metavar="TOP.FCStd", help="the assembly's file")
     parser.add_argument(
         "--from",
         dest="old",
@@ -366,18 +372,22 @@ def run_relink(args: argparse.Namespace) -> int:
         raise InputError(f"no link of {args.top} and its sub-assemblies records {args.old}; nothing to mend")
     if args.json:
         rows = [
-            {"file": relative(one.path, folder), "links": one.links, "objects": list(one.objects)}
-            for one in done
+            {
+                "file": relative(relinked.path, folder),
+                "links": relinked.links,
+                "objects": list(relinked.objects),
+            }
+            for relinked in done
         ]
         common.print_json({"dry_run": args.dry_run, "to": relative(new, folder), "files": rows})
         return Exit.DONE
     from silo.cli import show
 
     out = show.console()
-    for one in done:
-        links = counted(one.links, "link")
-        verb = "would lead" if args.dry_run else "now leads" if one.links == 1 else "now lead"
-        text = f"✓ {relative(one.path, folder)}: {links} {verb} to {relative(new, folder)}"
+    for relinked in done:
+        links = counted(relinked.links, "link")
+        verb = "would lead" if args.dry_run else "now leads" if relinked.links == 1 else "now lead"
+        text = f"✓ {relative(relinked.path, folder)}: {links} {verb} to {relative(new, folder)}"
         out.print(show.plain(text), markup=False)
     return Exit.DONE
 
@@ -393,7 +403,7 @@ def _closed(path: str) -> None:
         raise DocumentError(
             path,
             "it is open in FreeCAD, and saving it there would undo the change. Close it there, or mend the "
-            "links from there (BOM in Silo, Mend links); --even-if-open writes it all the same",
+            "links from there (BOM in Silo, Mend links); --even-if-open writes it anyway",
         )
 
 
@@ -401,7 +411,7 @@ def _documents(top: str) -> list[str]:
     """The files of the tree, as far as they can be read."""
     try:
         extraction = common.read_assembly(top)
-    except SiloError:  # such as no assembly in the file: its own links can be mended all the same
+    except SiloError:  # such as no assembly in the file: its own links can be mended anyway
         return [top]
     entries = walk_entries(extraction.entries)
     return [top, *(entry.doc_path for entry in entries if not entry.missing and entry.doc_path)]
@@ -429,46 +439,54 @@ def run_diff(args: argparse.Namespace) -> int:
         common.reach(client, extraction)
         whole = resolve(extraction, client)
         chosen = list(assemblies(whole)) if args.recursive else [whole]
-        lines = [server_lines(one, client) for one in chosen]
+        lines = [server_lines(resolved, client) for resolved in chosen]
         whole = suggest_by_identity(whole, list(zip(chosen, lines, strict=True)))
-    compared = [(one, one.diff(known)) for one, known in zip(chosen, lines, strict=True)]
+    compared = [
+        (resolved, resolved.diff(each_lines)) for resolved, each_lines in zip(chosen, lines, strict=True)
+    ]
     base = base_of(extraction)
     drifted = bool(whole.unresolved or whole.assembly.part_number is None) or any(
-        diff.drifted or blocking(one) for one, diff in compared
+        diff.drifted or (blocking(resolved) and not args.allow_missing) for resolved, diff in compared
     )
     if args.json:
-        data = [{**_head(one, base), "diff": diff_json(diff)} for one, diff in compared]
-        told = chain(whole.findings, *(diff.findings_at(one.assembly) for one, diff in compared))
-        findings = [finding_json(finding, base) for finding in told]
+        data = [{**_head(resolved, base), "diff": diff_json(diff)} for resolved, diff in compared]
+        all_findings = chain(
+            whole.findings, *(diff.findings_at(resolved.assembly) for resolved, diff in compared)
+        )
+        findings = [finding_json(finding, base) for finding in all_findings]
         common.print_json({"drift": drifted, "assemblies": data, "findings": findings})
     else:
         _show(whole, compared, names_of(whole, chain.from_iterable(lines)), base)
     # What cannot be compared whole is no answer, whether one wants to know of differences or not.
-    broken = any(blocking(one) or one.assembly.part_number is None for one, _ in compared)
+    broken = any(
+        (blocking(resolved) and not args.allow_missing) or resolved.assembly.part_number is None
+        for resolved, _ in compared
+    )
     return Exit.UNDONE if broken or (args.check and drifted) else Exit.DONE
 
 
 def _folder_diff(args: argparse.Namespace) -> int:
     """Every assembly of a folder against the server; only those that differ are shown."""
-    from silo.batch import Options, Summary, is_news
+    from silo.batch import Summary, SyncOptions, is_news
     from silo.bom_sync import blocking
     from silo.cli import show
-    from silo.vault.job import Job
+    from silo.vault.plan import SyncJob
 
     out, data = show.console(), []
     with common.plan_of(args) as (plan, reading, base), common.client_of(args) as client:
         if not plan.uuids:
             common.reach(client)
         summary = Summary(base)
+        options = SyncOptions(recursive=True, dry_run=True, allow_missing=args.allow_missing)
         drifted = broken = False
         compared_count = 0
-        for result in Job(plan, reading, client, Options(recursive=True, dry_run=True), base).results():
+        for result in SyncJob(plan, reading, client, options, base).results():
             summary.add(result)
             broken = broken or result.error is not None
             drifted = drifted or not result.fine or bool(result.unregistered)
             for outcome in result.outcomes:
                 news = is_news(outcome)
-                whole = not blocking(outcome.resolved)
+                whole = args.allow_missing or not blocking(outcome.resolved)
                 numbered = outcome.resolved.assembly.part_number is not None
                 broken = broken or not whole or not numbered or outcome.error is not None
                 compared_count += outcome.plan is not None and whole
@@ -496,8 +514,8 @@ def _folder_diff(args: argparse.Namespace) -> int:
     return Exit.UNDONE if broken or (args.check and drifted) else Exit.DONE
 
 
-def _head(one: Resolved, base: str) -> dict[str, Any]:
-    head = one.assembly
+def _head(resolved: Resolved, base: str) -> dict[str, Any]:
+    head = resolved.assembly
     return {
         "doc_path": relative(head.doc_path, base),
         "object": head.object_name,
@@ -513,8 +531,8 @@ def _show(
     from silo.cli import show
 
     out = show.console()
-    for one, diff in compared:
-        head = one.assembly
+    for resolved, diff in compared:
+        head = resolved.assembly
         if head.part_number:
             out.print(show.entry_text(head, base))
         else:
@@ -523,7 +541,7 @@ def _show(
                 f"{name}: no part number yet, so nothing to compare with (silo-mod register)", markup=False
             )
         if head.part_number or diff.added:
-            out.print(show.diff_table(diff, names, whole=not (blocking(one) or one.unresolved)))
+            out.print(show.diff_table(diff, names, whole=not (blocking(resolved) or resolved.unresolved)))
         out.print()
     out.print(show.findings_text(whole.findings, base))
 
@@ -540,11 +558,14 @@ def add_bom_diff(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "folders", metavar="FOLDER", nargs="*", help="OLD and NEW; with --git the one folder to compare"
     )
-    parser.add_argument(
-        "--git",
-        metavar="A..B",
-        help="compare two revisions of a repository; A...B: from where B branched off A; "
-        "A alone: against the files as they are",
+    common.options(
+        parser,
+        {
+            "--git A..B": (
+                "compare two revisions of a repository; A...B: from where B branched off A; A alone: "
+                "against the files as they are"
+            )
+        },
     )
     parser.set_defaults(run=run_bom_diff)
 
@@ -631,10 +652,12 @@ def _quantities(line: LineChange) -> str:
 
 def _where(line: LineChange, change: AssemblyChange) -> str:
     """The file, and the object if the assembly has another one of it."""
-    heads = [one for state in (change.old, change.new) if state for one in (state.head, *state.lines)]
+    heads = [
+        bom_entry for state in (change.old, change.new) if state for bom_entry in (state.head, *state.lines)
+    ]
 
     def place(entry: BomEntry) -> str:
-        several = len({one.object_name for one in heads if one.doc_path == entry.doc_path}) > 1
+        several = len({head.object_name for head in heads if head.doc_path == entry.doc_path}) > 1
         return f"{entry.doc_path}#{entry.object_name}" if several and not entry.standard else entry.doc_path
 
     gone = " (missing)" if line.entry.missing else ""

@@ -7,16 +7,17 @@ How results look on a terminal: a tree, tables, the Activity box. Text of others
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from silo.bom.errors import (
     InputError,
@@ -34,14 +35,15 @@ from silo.bom.roots import choose_assembly
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.wire import Item
+    from silo.outbox.entry import Entry
     from silo.vault.plan import Plan
-    from silo.vault.reading import Reading
+    from silo.vault.reading import VaultReader
 
 
-READING = ("--index", "--no-index", "--jobs", "--dask")
+READING = ("--index", "--no-cache", "--jobs", "--dask")
 
 
-class Shared(NamedTuple):
+class SharedOption(NamedTuple):
     """An option that several commands have. ``group`` after a slash: options that exclude each other."""
 
     commands: str
@@ -56,18 +58,23 @@ _READ = "bom diff register sync where-used"
 _ASK = "bom diff register commit status sync queue pull search show log watch whoami doctor inertia mass"
 
 
-def shared_options() -> Iterator[Shared]:
+def shared_options() -> Iterator[SharedOption]:
     """Yield the options that several commands have, in the order of their help."""
     text = "the assembly to read, where a file holds several"
-    yield Shared("diff register mass", "--assembly", {"metavar": "NAME", "help": text})
+    yield SharedOption("diff register mass", "--assembly", {"metavar": "NAME", "help": text})
     text += f"; {EACH!r} for each of them"
-    yield Shared("bom sync", "--assembly", {"metavar": "NAME", "help": text})
+    yield SharedOption("bom sync", "--assembly", {"metavar": "NAME", "help": text})
     servers = "serve backup restore summaries"
     every = f"{_ASK} where-used relink bom-diff {servers} login logout install-addon schema links"
-    open_there = "also files that a running FreeCAD has open; whoever saves them there undoes this"
+    open_there = "also files that a running FreeCAD has open; saving them there undoes this"
     for commands, option, text in (
         ("diff sync", "--recursive", "the sub-assemblies too, children before parents"),
         ("diff bom-diff", "--check", "exit 1 where anything differs, for CI"),
+        (
+            "bom diff commit sync",
+            "--allow-missing",
+            "go on although linked files are missing; their known lines in Silo stay as they are",
+        ),
         ("sync relink", "--dry-run", "show what would change, and change nothing"),
         ("register relink pull", "--even-if-open", open_there),
         (
@@ -77,28 +84,52 @@ def shared_options() -> Iterator[Shared]:
         ),
         (every, "--json", "print JSON for machines"),
     ):
-        yield Shared(commands, option, {"action": "store_true", "help": text})
+        yield SharedOption(commands, option, {"action": "store_true", "help": text})
     for commands, forms in (
         ("sync", ".html .md .json .xml"),
-        ("inertia mass", ".json .csv .md"),
+        ("inertia mass", ".html .json .csv .md"),
         ("bom-diff", ".md .json"),
     ):
         text = f"write a report, by its suffix ({forms.replace(' ', ', ')}); may be repeated"
         how = {"metavar": "FILE", "action": "append", "default": [], "type": _report_in(forms), "help": text}
-        yield Shared(commands, "--report", how)
+        yield SharedOption(commands, "--report", how)
+    for commands, option, value, default, text in (
+        (
+            "commit status",
+            "--root",
+            "FOLDER",
+            None,
+            "the project's folder, which is remembered (else found above TOP)",
+        ),
+        ("where-used", "--root", "FOLDER", ".", "the folder whose files are read (else this one)"),
+        ("pull queue", "--into", "FOLDER", ".", "the folder to write to (else this one)"),
+        ("inertia mass", "--item", "PART_NUMBER", None, "with --push: the item of the whole assembly"),
+        ("watch", "--item", "PART_NUMBER", None, "only events of this item"),
+        (
+            "register doctor",
+            "--schema",
+            "NAME",
+            "kindred-rd",
+            "part number schema (else the server's only one)",
+        ),
+    ):
+        yield SharedOption(commands, option, {"metavar": value, "default": default, "help": text})
+    limit = {"metavar": "N", "type": above_zero, "default": 20, "help": "at most N, the newest first (20)"}
+    yield SharedOption("search log", "--limit", limit)
     text = "where to remember what files hold (else your cache)"
     index = {"metavar": "FILE", "type": a_path, "help": text}
-    yield Shared(f"{_READ} mass", "--index", index, "reading/index")
-    text = "read every file, and remember nothing"
-    yield Shared(f"{_READ} mass", "--no-index", {"action": "store_true", "help": text}, "reading/index")
+    yield SharedOption(f"{_READ} mass", "--index", index, "reading/index")
+    text = "read every file afresh, and remember nothing"
+    how = {"action": "store_true", "help": text}
+    yield SharedOption(f"{_READ} inertia mass links", "--no-cache", how, "reading/index")
     text = "processes that read (default: the processors)"
-    yield Shared(_READ, "--jobs", {"metavar": "N", "type": job_count, "help": text}, "reading")
+    yield SharedOption(_READ, "--jobs", {"metavar": "N", "type": job_count, "help": text}, "reading")
     text = "read on a Dask cluster that sees the same files (extra: dask)"
-    yield Shared(_READ, "--dask", {"metavar": "ADDRESS", "help": text}, "reading")
+    yield SharedOption(_READ, "--dask", {"metavar": "ADDRESS", "help": text}, "reading")
     text = "address of the Silo server (else SILO_API_URL)"
-    yield Shared(_ASK, "--server", {"metavar": "URL", "help": text}, "server")
+    yield SharedOption(_ASK, "--server", {"metavar": "URL", "help": text}, "server")
     text = "API token (else SILO_API_TOKEN, which other users cannot read)"
-    yield Shared(_ASK, "--token", {"help": text}, "server")
+    yield SharedOption(_ASK, "--token", {"help": text}, "server")
 
 
 def _report_in(forms: str) -> Callable[[str], str]:
@@ -113,22 +144,38 @@ def _report_in(forms: str) -> Callable[[str], str]:
 def add_shared(parser: argparse.ArgumentParser, command: str) -> None:
     """Give a command the options that it shares with others."""
     groups: dict[str, Any] = {"": parser}
-    for one in shared_options():
-        if command in one.commands.split():
-            title, _, exclusive = one.group.partition("/")
+    for option in shared_options():
+        if command in option.commands.split():
+            title, _, exclusive = option.group.partition("/")
             group = groups.get(title) or groups.setdefault(title, parser.add_argument_group(title))
             if exclusive:
-                group = groups.get(one.group) or groups.setdefault(
-                    one.group, group.add_mutually_exclusive_group()
+                group = groups.get(option.group) or groups.setdefault(
+                    option.group, group.add_mutually_exclusive_group()
                 )
-            group.add_argument(one.option, **one.how)
+            group.add_argument(option.option, **option.how)
 
 
-def add_top(parser: argparse.ArgumentParser) -> None:
-    """Add the assembly's file, or a folder."""
-    parser.add_argument(
-        "top", metavar="TOP", help="the assembly's file, or a folder: all assemblies below it"
-    )
+def add_top(parser: argparse.ArgumentParser, *alone: str) -> None:
+    """Add the assemblies' files or folders."""
+    text = "the assembly's file, or a folder: all assemblies below it; several are read one after the other"
+    add_each(parser, "top", *alone, metavar="TOP", help=text)
+
+
+def add_each(parser: argparse.ArgumentParser, name: str, *alone: str, **how: Any) -> None:
+    """Add what the command runs for, one after the other; ``alone``: options that need a single one."""
+    parser.add_argument(name, nargs="+", **how)
+    parser.set_defaults(each=name, alone=alone)
+
+
+def options(parser: argparse._ActionsContainer, helps: Mapping[str, str]) -> None:
+    """Add options: ``--flag``, ``--option VALUE``, or ``--option VALUE...`` for one that may be repeated."""
+    for spec, text in helps.items():
+        option, _, value = spec.partition(" ")
+        how: dict[str, Any] = {"action": "store_true"}
+        if value:
+            how = {"metavar": value.removesuffix("...")}
+            how |= {"action": "append", "default": []} if value.endswith("...") else {}
+        parser.add_argument(option, help=text, **how)
 
 
 def only_with(parser: argparse.ArgumentParser, needed: str, *options: str) -> None:
@@ -153,6 +200,9 @@ def refuse_idle_options(parser: argparse.ArgumentParser, args: argparse.Namespac
         name = next(action.dest for action in parser._actions if option in action.option_strings)
         return bool(getattr(args, name) != parser.get_default(name))
 
+    if hasattr(args, "each") and len(several := getattr(args, args.each)) > 1:
+        for option in filter(given, args.alone):
+            raise InputError(f"{option} is for one file or item, and {len(several)} are named")
     for option, needed in getattr(args, "needs", ()):
         if given(option) and not any(map(given, needed.split())):
             raise InputError(f"{option} does nothing without {' or '.join(needed.split())}")
@@ -181,16 +231,16 @@ def above_zero(text: str, most: int = 1_000_000_000) -> int:
 
 
 @contextmanager
-def reading_of(args: argparse.Namespace) -> Iterator[Reading]:
+def reading_of(args: argparse.Namespace) -> Iterator[VaultReader]:
     """What reads files, as the options say."""
     from silo.vault.index import Index, default_path
-    from silo.vault.reading import Reading, pool_of
+    from silo.vault.reading import VaultReader, pool_of
 
     given = getattr(args, "index", None)
-    path = None if getattr(args, "no_index", False) else given or default_path()
+    path = None if getattr(args, "no_cache", False) else given or default_path()
     count = getattr(args, "jobs", 1) or _processors()  # a command without the option reads one tree
     with Index(path, given=given is not None) as index, pool_of(count, getattr(args, "dask", None)) as pool:
-        yield Reading(index, pool)
+        yield VaultReader(index, pool)
 
 
 def _processors() -> int:
@@ -243,17 +293,17 @@ def read_assembly(top: str, assembly: str | None = None, *, hardware: bool = Tru
 
     with Library() as library:
         document = library.open(top)
-        found = extract(choose_assembly(document, assembly), hardware=hardware)
-        told = respelt_findings(library.notes, document.FileName)
-    return _with_suggestions(replace(found, findings=(*found.findings, *told)))
+        extraction = extract(choose_assembly(document, assembly), hardware=hardware)
+        findings = respelt_findings(library.notes, document.FileName)
+    return _with_suggestions(replace(extraction, findings=(*extraction.findings, *findings)))
 
 
-def _with_suggestions(found: Extraction) -> Extraction:
-    if not any(entry.missing for entry in walk_entries(found.entries)):
-        return found
+def _with_suggestions(extraction: Extraction) -> Extraction:
+    if not any(entry.missing for entry in walk_entries(extraction.entries)):
+        return extraction
     from silo.fcstd.linked import with_suggestions
 
-    return with_suggestions(found)
+    return with_suggestions(extraction)
 
 
 def read_tops(args: argparse.Namespace) -> list[Extraction]:
@@ -267,39 +317,86 @@ def read_tops(args: argparse.Namespace) -> list[Extraction]:
     tops = []
     with reading_of(args) as reading:
         for name in names:
-            found = reading.ask(Question(args.top, name, not args.no_hardware, below=True)).found
-            if isinstance(found, SeveralAssembliesError) and args.assembly == EACH:
-                names += found.names
-            elif isinstance(found, SiloError):
-                raise found
+            error = reading.ask(Question(args.top, name, not args.no_hardware, below=True)).found
+            if isinstance(error, SeveralAssembliesError) and args.assembly == EACH:
+                names += error.names
+            elif isinstance(error, SiloError):
+                raise error
             else:
-                tops.append(_with_suggestions(found))
+                tops.append(_with_suggestions(error))
     return tops
 
 
-class Progress:
-    """Prints on standard error how far a long run is: after 5 seconds, then every 10."""
+class ProgressPrinter:
+    """Prints on standard error what a command does, after 5 seconds and then every 10.
 
-    def __init__(self, count: int = 0, clock: Callable[[], float] = time.monotonic) -> None:
-        self._count, self._number = count, 0
-        self._clock, self._due = clock, clock() + 5
+    A thread prints it, so that a long step is reported too. An empty ``step`` is silence, for commands that
+    wait for a person.
+    """
 
-    def begin(self, top: str) -> None:
-        """Begin with the next file."""
-        self._number += 1
-        self.tell(f"[{self._number}/{self._count}] {top}")
+    def __init__(self, command: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self.step = "working"
+        self._command, self._clock, self._begun = command, clock, clock()
+        self._due, self._ended = self._begun + 5, threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
 
-    def tell(self, text: str) -> None:
-        """Print the text if it is time."""
-        from silo.cli.show import plain
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
 
-        if self._clock() >= self._due:
-            self._due = self._clock() + 10
-            print(plain(text), file=sys.stderr)
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        while not self._ended.wait(0.2):
+            self.report()
+
+    def report(self) -> None:
+        """Print the step if it is time."""
+        now = self._clock()
+        if now >= self._due:
+            self._due = now + 10
+            if self.step:
+                from silo.cli.show import plain
+
+                text = plain(f"silo-mod {self._command}: {self.step}, {now - self._begun:.0f} s")
+                print(text, file=sys.stderr, flush=True)
+
+
+_running: list[ProgressPrinter] = []
 
 
 @contextmanager
-def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, Reading, str]]:
+def progress_of(command: str) -> Iterator[None]:
+    """Report the progress of a command until the block ends."""
+    with ProgressPrinter(command) as progress:
+        _running.append(progress)
+        try:
+            yield
+        finally:
+            _running.remove(progress)
+
+
+def at(step: str) -> None:
+    """Set what the running command does now."""
+    for progress in _running[-1:]:
+        progress.step = step
+
+
+def sending(entry: Entry, done: int, total: int) -> None:
+    """Set that a file of the queue is sent; both counts in bytes."""
+    at(f"sending {entry.label or entry.file_name}, {done * 100 // max(total, 1)} %")
+
+
+def count_steps(count: int) -> Callable[[str], None]:
+    """Return what sets the next of ``count`` steps, by its name."""
+    numbers = itertools.count(1)
+    return lambda name: at(f"[{next(numbers)}/{count}] {name}")
+
+
+@contextmanager
+def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, VaultReader, str]]:
     """All assemblies of the folder that the options name, and the folder. InputError where it has none."""
     from silo.files import documents_in
     from silo.vault.plan import make_plan
@@ -311,7 +408,7 @@ def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, Reading, str]]:
         raise InputError(f"no FreeCAD files (*.FCStd) in {args.top}")
     with reading_of(args) as reading:
         reading.index.expect(base)
-        plan = make_plan(tops, reading, hardware=not args.no_hardware, progress=Progress(len(tops)).begin)
+        plan = make_plan(tops, reading, hardware=not args.no_hardware, progress=count_steps(len(tops)))
         yield plan, reading, base
 
 
@@ -336,7 +433,7 @@ def reach(client: SiloClient, extraction: Extraction | None = None) -> None:
     entries = () if extraction is None else walk_entries((extraction.assembly, *extraction.entries))
     if any(entry.silo_uuid for entry in entries):
         return
-    with suppress(NotFoundError):  # a server that does not say who we are has answered all the same
+    with suppress(NotFoundError):  # a server that does not say who we are has answered anyway
         client.whoami()
 
 

@@ -21,18 +21,17 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 from xml.etree import ElementTree
 
-from silo.activity import activity_text
 from silo.batch import source_document
 from silo.bom.errors import DocumentError, Exit, InputError, ServerFaultError
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
 from silo.bom.resolve import consolidation_findings
-from silo.bom_sync import Outcome, Status, resolve, sync_tree
+from silo.bom_sync import Outcome, Status, activity_text, resolve, sync_tree
 from silo.cli import common, show
 from silo.cli.setup import need_server_extra
 from silo.files import shipped
 from silo.platform import replace_patiently, scratch_folder
-from silo.registering.on_disk import proposals_for, register_all
+from silo.registering.orders import proposals_for, register_all
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,9 +50,9 @@ DOCUMENT_XML = "Document.xml"
 
 def add_demo(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser.add_argument("--keep", action="store_true", help="leave the server running until Ctrl-C")
+    common.options(parser, {"--keep": "leave the server running until Ctrl-C"})
     parser.add_argument("--port", type=int, default=0, help="port of the server (default: a free one)")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, waits=True)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -273,10 +272,10 @@ def _object_with_label(path: Path, document: ElementTree.Element, label: str) ->
     raise DocumentError(str(path), f"it holds no object labelled {label!r}")
 
 
-def _only(path: Path, found: ElementTree.Element | None, what: str) -> ElementTree.Element:
-    if found is None:
+def _only(path: Path, element: ElementTree.Element | None, what: str) -> ElementTree.Element:
+    if element is None:
         raise DocumentError(str(path), f"it holds no {what}")
-    return found
+    return element
 
 
 def _edit(path: Path, edit: Callable[[ElementTree.Element], None]) -> None:

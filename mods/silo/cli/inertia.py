@@ -10,8 +10,6 @@ import argparse
 import math
 import os
 import sys
-import threading
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -28,17 +26,15 @@ if TYPE_CHECKING:
     from silo.inertia.geometry import ReadOptions
     from silo.inertia.materials import MaterialTable
     from silo.inertia.model import Assembly
-    from silo.inertia.output.push import PushPlan
-    from silo.inertia.output.urdf import Urdf
+    from silo.inertia.push import PushPlan
     from silo.inertia.report import InertiaReport
+    from silo.inertia.urdf import Urdf
 
 
 def add_geometry_options(parser: argparse.ArgumentParser) -> None:
     """How files are read."""
     group = parser.add_argument_group("geometry")
-    group.add_argument(
-        "--mesh-unit", metavar="UNIT", help="length unit of meshes that state none (mm, cm, m, in)"
-    )
+    common.options(group, {"--mesh-unit UNIT": "length unit of meshes that state none (mm, cm, m, in)"})
     group.add_argument(
         "--timeout", type=float, default=600.0, metavar="S", help="give up reading after S seconds"
     )
@@ -50,62 +46,58 @@ def add_geometry_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="processes that read one large file or split assembly (default: the processors)",
     )
-    group.add_argument(
-        "--no-siblings", action="store_true", help="do not look for the files of split assemblies"
-    )
-    group.add_argument(
-        "--no-cache", action="store_true", help="read afresh, and keep nothing for the next time"
+    common.options(
+        group,
+        {
+            "--no-siblings": "do not look for the files of split assemblies",
+        },
     )
 
 
 def add_material_options(parser: argparse.ArgumentParser) -> None:
     """Where densities come from."""
     group = parser.add_argument_group("materials")
-    group.add_argument(
-        "--materials", action="append", default=[], metavar="FILE", help="your own densities (.csv or .toml)"
-    )
-    group.add_argument(
-        "--no-freecad-materials", action="store_true", help="do not look into an installed FreeCAD's cards"
+    common.options(
+        group,
+        {
+            "--materials FILE...": "your own densities (.csv or .toml)",
+            "--no-freecad-materials": "do not look into an installed FreeCAD's cards",
+        },
     )
 
 
 def add_bom_options(parser: argparse.ArgumentParser) -> None:
-    """How the BOM is read, where what is found out from it is wrong."""
+    """How the BOM is read, where what is detected is wrong."""
     group = parser.add_argument_group("BOM")
-    group.add_argument("--bom", metavar="BOM", help="CSV, XLSX, XLS or ODS; names, masses or materials")
-    group.add_argument(
-        "--column",
-        action="append",
-        default=[],
-        metavar="ROLE=HEADER",
-        help="a renamed column; roles: name, part_number, description, material, mass, total_mass, "
-        "mass_unit, quantity, item, level, find_number",
+    common.options(
+        group,
+        {
+            "--bom BOM": "CSV, XLSX, XLS or ODS; names, masses or materials",
+            "--column ROLE=HEADER...": (
+                "a renamed column; roles: name, part_number, description, material, mass, total_mass,"
+                " mass_unit, quantity, item, level, find_number"
+            ),
+        },
     )
     group.add_argument("--encoding", help="of the BOM, for example cp1252")
     group.add_argument("--delimiter", help="of the BOM, one character")
     group.add_argument("--decimal", choices=(".", ","), help="decimal mark of the BOM")
-    group.add_argument("--mass-unit", metavar="UNIT", help="of masses without one (kg, g, lb, …)")
+    common.options(group, {"--mass-unit UNIT": "of masses without one (kg, g, lb, …)"})
     common.only_with(parser, "--bom", "--column", "--encoding", "--delimiter", "--decimal", "--mass-unit")
 
 
 def add_result_options(parser: argparse.ArgumentParser) -> None:
     """Where results go, and when a warning is a failure."""
     group = parser.add_argument_group("results")
-    group.add_argument(
-        "--preview",
-        action="append",
-        default=[],
-        metavar="OUT",
-        help="write a 3D scene (.glb) with centres of mass and inertia ellipsoids; may be repeated",
-    )
-    group.add_argument(
-        "--html",
-        metavar="OUT",
-        help="write one page to look at: a 3D view to turn, masses by source, warnings, tables",
-    )
-    group.add_argument("--strict", action="store_true", help="exit 1 where there is any warning")
-    group.add_argument(
-        "--allow", action="append", default=[], metavar="CODE", help="with --strict: this warning is fine"
+    common.options(
+        group,
+        {
+            "--preview FILE...": (
+                "write a 3D scene (.glb) with centres of mass and inertia ellipsoids; may be repeated"
+            ),
+            "--strict": "exit 1 where there is any warning",
+            "--allow CODE...": "with --strict: this warning is fine",
+        },
     )
     common.only_with(parser, "--strict", "--allow")
 
@@ -113,11 +105,13 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
 def add_push_options(parser: argparse.ArgumentParser) -> None:
     """Back to Silo."""
     group = parser.add_argument_group("back to Silo")
-    group.add_argument(
-        "--push", action="store_true", help="write mass, volume and centre of mass into the items' properties"
+    common.options(
+        group,
+        {
+            "--push": "write mass, volume and centre of mass into the items' properties",
+            "--dry-run": "with --push: only show what would be written",
+        },
     )
-    group.add_argument("--dry-run", action="store_true", help="with --push: only show what would be written")
-    group.add_argument("--item", metavar="NUMBER", help="with --push: part number of the whole assembly")
     common.only_with(parser, "--push", "--dry-run", "--item", "--server", "--token")
 
 
@@ -133,7 +127,7 @@ def need_inertia_extra() -> None:
 
 def bom_table(args: argparse.Namespace) -> BomTable | None:
     """The BOM by the user's options."""
-    from silo.inertia.bom import BOMParser
+    from silo.inertia.bom.parser import BOMParser
 
     columns = _pairs(args.column, "--column", "ROLE=HEADER, for example mass=Gewicht")
     delimiter = "\t" if args.delimiter in ("\\t", "tab") else args.delimiter
@@ -180,22 +174,22 @@ def check_outputs(args: argparse.Namespace) -> None:
     from silo.inertia.geometry.graph import is_model_name
 
     report: list[str] = getattr(args, "report", [])
-    single = [getattr(args, name) for name in ("urdf_out", "html", "out") if getattr(args, name, None)]
+    single = [getattr(args, name) for name in ("urdf_out", "out") if getattr(args, name, None)]
     written = [*report, *args.preview, *single]
     for name in single:
         if is_model_name(Path(name)) and os.path.lexists(name):
             raise InputError(f"{name} is there already and is named like a model; write to another file")
     if bad := [name for name in args.preview if Path(name).suffix.lower() != ".glb"]:
-        raise InputError(f"--preview writes .glb, --html a page to look at; got {', '.join(bad)}")
+        raise InputError(f"--preview writes .glb, --report FILE.html a page to look at; got {', '.join(bad)}")
     read = [getattr(args, "top", args.assembly), *getattr(args, "materials", [])]
     read += filter(None, (getattr(args, name, None) for name in ("bom", "links", "urdf")))
-    known = {os.path.realpath(name) for name in read}
+    inputs = {os.path.realpath(name) for name in read}
     for name in written:
         if not Path(name).absolute().parent.is_dir():
             raise InputError(f"{name}: there is no folder {Path(name).parent}")
-        if (real := os.path.realpath(name)) in known:
+        if (real := os.path.realpath(name)) in inputs:
             raise InputError(f"{name} is read by this command, or written twice; write to another file")
-        known.add(real)
+        inputs.add(real)
 
 
 def read_options(args: argparse.Namespace, **more: Any) -> ReadOptions:
@@ -216,35 +210,18 @@ def read(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
     """Return the geometry, with progress on standard error; Ctrl-C stops it at once."""
     from silo.inertia.calculator import read_geometry
 
-    with _progress(Path(path).name) as told:
-        return read_geometry(path, read_options(args, progress=told, **more))
-
-
-@contextmanager
-def _lines(name: str, progress: common.Progress | None = None) -> Iterator[Any]:
-    """Print from time to time what is being done, for logs and pipes; the kernel calls nobody meanwhile."""
-    begun, ended, at = time.monotonic(), threading.Event(), ["reading"]
-    progress = progress or common.Progress()
-
-    def say() -> None:
-        while not ended.wait(0.2):
-            progress.tell(f"{name}: {at[0]}, {time.monotonic() - begun:.0f} s")
-
-    thread = threading.Thread(target=say, daemon=True)
-    thread.start()
-    try:
-        yield lambda progress: at.__setitem__(0, str(progress))
-    finally:
-        ended.set()
-        thread.join()
+    with _progress(Path(path).name) as progress:
+        assembly = read_geometry(path, read_options(args, progress=progress, **more))
+    common.at("calculating")
+    return assembly
 
 
 @contextmanager
 def _progress(name: str) -> Iterator[Any]:
     if not sys.stderr.isatty():
-        with _lines(name) as told:
-            yield told
+        yield lambda progress: common.at(f"{name}: {progress}")
         return
+    common.at("")  # the bar says it
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -273,48 +250,54 @@ def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly, *,
 
     _write_files(args, report, assembly)
     if quiet:
-        from silo.inertia.output.text import report_warnings
+        from silo.inertia.output import report_warnings
 
         console(sys.stderr).print(report_warnings(report, whole=not sys.stderr.isatty()))
         return
     if args.json:
-        from silo.inertia.output.text import report_json
+        from silo.inertia.output import report_json
 
         # A pipe on Windows takes the country's code page: names must not turn into question marks there.
         sys.stdout.write(report_json(report, sys.stdout.encoding or "ascii"))
         return
-    from silo.inertia.output.text import report_tables
+    from silo.inertia.output import report_tables
 
     console().print(report_tables(report, whole=not sys.stdout.isatty()))
 
 
 def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:
-    from silo.inertia.output.text import write_whole
+    from silo.inertia.output import write_whole
 
     for name in args.preview:
-        from silo.inertia.preview import views_of, write_glb
+        from silo.drawing.page import views_of, write_glb
 
         write_whole(name, write_glb(assembly, views_of(report, assembly)))
-    if args.html:
-        from silo.inertia.preview import report_html
-
-        write_whole(args.html, report_html(report, assembly).encode("utf-8"))
     for name in args.report:
-        from silo.inertia.output.text import report_csv, report_json, report_markdown
+        from silo.drawing.page import report_html
+        from silo.inertia.output import report_csv, report_json, report_markdown
 
-        writers = {".json": report_json, ".csv": report_csv, ".md": report_markdown}
+        writers = {
+            ".html": lambda inertia_report: report_html(inertia_report, assembly),
+            ".json": report_json,
+            ".csv": report_csv,
+            ".md": report_markdown,
+        }
         write_whole(name, writers[Path(name).suffix.lower()](report).encode("utf-8"))
 
 
 def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
-    """The exit code: with --strict, 1 where a warning is not allowed."""
-    if not args.strict:
-        return Exit.DONE
-    left = [w for w in report.warnings if str(w.code) not in args.allow]
+    """The exit code: 1 where something could not be read, with --strict where a warning is not allowed."""
+    from silo.inertia.model import GeometryCode
+
+    left = [
+        w.code
+        for w in report.warnings
+        if w.code not in args.allow and (args.strict or w.code == GeometryCode.NOT_READ)
+    ]
     if left:
-        codes = sorted({str(w.code) for w in left})
-        count = counted(len(left), "warning")
-        print(f"silo-mod: --strict: {count} ({', '.join(codes)})", file=sys.stderr)
+        why = "--strict" if args.strict else "what cannot be read is in no mass"
+        count, codes = counted(len(left), "warning"), ", ".join(sorted({*left}))
+        print(f"silo-mod: {why}: {count} ({codes})", file=sys.stderr)
     return Exit.UNDONE if left else Exit.DONE
 
 
@@ -322,16 +305,19 @@ def push_report(
     args: argparse.Namespace, report: InertiaReport, part_numbers: Mapping[str, str] | None = None
 ) -> int:
     """Write the masses to the server, or show the plan; 1 where an item is unknown there."""
-    from silo.inertia.output.push import plan_push, push
+    from silo.inertia.push import plan_push, push
 
     plan = plan_push(report, part_numbers, args.item)
     if args.dry_run:
         _tell_plan(plan)
         return Exit.DONE
     with common.client_of(args) as client:
+        common.at("writing masses")
         done = push(client, plan)
     written = counted(len(done.written), "item")
     _say(f"Silo: {written} written, {len(done.unchanged)} had these numbers already.")
+    if done.by_hand:
+        _say(f"Typed by hand or weighed, so it stays: {', '.join(done.by_hand)}")
     if done.unknown:
         _say(f"Unknown to the server: {', '.join(done.unknown)}")
     for number, error in done.failed:
@@ -341,7 +327,7 @@ def push_report(
 
 
 def _tell_plan(plan: PushPlan) -> None:
-    from silo.inertia.output.push import describe
+    from silo.inertia.push import describe
 
     _say(f"Would write {counted(len(plan.items), 'item')} ({plan.comment}):")
     for item in plan.items:
@@ -366,25 +352,28 @@ SNIPPETS = ("urdf", "sdf", "mjcf")
 
 
 def add_inertia(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "assembly", metavar="ASSEMBLY", help="STEP, mesh (STL, OBJ, 3MF, GLB, PLY) or FCStd file"
+    common.add_each(
+        parser,
+        "assembly",
+        "--report",
+        "--preview",
+        "--item",
+        "--urdf-out",
+        "--in-place",
+        metavar="ASSEMBLY",
+        help="a STEP, mesh or FCStd file",
     )
     group = parser.add_argument_group("links")
-    group.add_argument(
-        "--links", metavar="MAP", help="YAML map: link → instance path patterns (see docs/inertia.md)"
-    )
-    group.add_argument(
-        "--loose",
-        metavar="LINK",
-        help="the link of what no other link claims (without a map: base_link, warned of)",
-    )
-    group.add_argument(
-        "--mass",
-        action="append",
-        default=[],
-        metavar="NAME=MASS",
-        help="what a scale says of a link, or of each component of a pattern, for example arm=1.25kg; its "
-        "parts are scaled to it; may be repeated",
+    common.options(
+        group,
+        {
+            "--links MAP": "YAML map: link → instance path patterns (see docs/inertia.md)",
+            "--loose LINK": "the link of what no other link claims (without a map: base_link, warned of)",
+            "--mass NAME=MASS...": (
+                "what a scale says of a link, or of each component of a pattern, for example "
+                "arm=1.25kg; its parts are scaled to it; may be repeated"
+            ),
+        },
     )
     group.add_argument(
         "--frame",
@@ -392,13 +381,14 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         help="frame of the numbers: the assembly's, each sub-assembly's own, or the URDF's link frames "
         "(default: urdf with --urdf, else assembly)",
     )
-    group.add_argument(
-        "--urdf", metavar="FILE", help="take names and frames of the links from this URDF, to fill it"
+    common.options(
+        group,
+        {
+            "--urdf FILE": "take names and frames of the links from this URDF, to fill it",
+            "--urdf-out FILE": "write the URDF with its <inertial> here, the rest of it untouched",
+            "--in-place": "write the <inertial> into the --urdf itself",
+        },
     )
-    group.add_argument(
-        "--urdf-out", metavar="FILE", help="write the URDF with its <inertial> here, the rest of it untouched"
-    )
-    group.add_argument("--in-place", action="store_true", help="write the <inertial> into the --urdf itself")
     group.add_argument(
         "--snippet",
         choices=SNIPPETS,
@@ -413,9 +403,7 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         metavar="RHO",
         help="kg/m³ of parts that the BOM lacks (default: 1000)",
     )
-    parser.add_argument(
-        "--density-from-step", action="store_true", help="use densities in the file before the default one"
-    )
+    common.options(parser, {"--density-from-step": "use densities in the file before the default one"})
     add_geometry_options(parser)
     add_result_options(parser)
     add_push_options(parser)
@@ -430,7 +418,7 @@ def run_inertia(args: argparse.Namespace) -> int:
     if args.urdf_out and args.in_place:
         raise InputError("--urdf-out and --in-place name two places for one URDF; give one of them")
     if args.snippet and args.json:
-        raise InputError("--snippet and --json both go to standard output; use --report OUT.json")
+        raise InputError("--snippet and --json both go to standard output; use --report FILE.json")
     from silo.inertia.calculator import calculate
 
     # The small files first: a mistake in them should not cost the reading of the geometry.
@@ -452,7 +440,7 @@ def _task(args: argparse.Namespace) -> Task:
     from silo.inertia.calculator import Task
     from silo.inertia.links import FrameChoice, read_link_map
     from silo.inertia.masses import Options
-    from silo.inertia.output.urdf import read_urdf
+    from silo.inertia.urdf import read_urdf
 
     frame = FrameChoice(args.frame or ("urdf" if args.urdf else "assembly"))
     if frame is FrameChoice.URDF and not args.urdf:
@@ -469,8 +457,8 @@ def _task(args: argparse.Namespace) -> Task:
 
 
 def _write_urdf(args: argparse.Namespace, report: InertiaReport, urdf: Urdf) -> None:
-    from silo.inertia.output.text import writable
-    from silo.inertia.output.urdf import write_urdf
+    from silo.inertia.output import writable
+    from silo.inertia.urdf import write_urdf
 
     links = writable(report.links.values())
     target = args.urdf if args.in_place else args.urdf_out
@@ -494,7 +482,7 @@ def _write_urdf(args: argparse.Namespace, report: InertiaReport, urdf: Urdf) -> 
 
 def _print_snippet(kind: str, report: InertiaReport) -> None:
     from silo.cli.show import plain
-    from silo.inertia.output.text import document, writable
+    from silo.inertia.output import document, writable
 
     text = document(writable(report.links.values()), kind, report.assembly)
     # A file that says nothing of its encoding is UTF-8; a pipe of another code page gets ASCII.
@@ -506,24 +494,23 @@ def _print_snippet(kind: str, report: InertiaReport) -> None:
 
 
 def add_links(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "assembly", metavar="ASSEMBLY", help="STEP, mesh (STL, OBJ, 3MF, GLB, PLY) or FCStd file"
+    common.add_each(
+        parser, "assembly", "--out", "--preview", metavar="ASSEMBLY", help="a STEP, mesh or FCStd file"
     )
-    parser.add_argument("--urdf", metavar="FILE", help="give parts to links by the names in this URDF")
+    common.options(parser, {"--urdf FILE": "give parts to links by the names in this URDF"})
     parser.add_argument(
         "--clusters",
         type=int,
         metavar="N",
         help="make N links of parts that lie together, whatever their names",
     )
-    parser.add_argument(
-        "--preview",
-        action="append",
-        default=[],
-        metavar="OUT",
-        help="write the links as a 3D scene (.glb), one colour each; may be repeated",
+    common.options(
+        parser,
+        {
+            "--preview FILE...": "write the links as a 3D scene (.glb), one colour each; may be repeated",
+            "--out MAP": "write the map here, not to standard output",
+        },
     )
-    parser.add_argument("--out", metavar="MAP", help="write the map here, not to standard output")
     add_geometry_options(parser)
     parser.set_defaults(run=run_links)
 
@@ -537,8 +524,8 @@ def run_links(args: argparse.Namespace) -> int:
         raise InputError("--clusters groups by position and --urdf by names; give one of them")
     check_outputs(args)
     from silo.inertia.links import ROOT_LINK, as_map, as_yaml, claim, starting_map
-    from silo.inertia.output.text import write_whole
-    from silo.inertia.output.urdf import read_urdf
+    from silo.inertia.output import write_whole
+    from silo.inertia.urdf import read_urdf
 
     urdf = read_urdf(args.urdf) if args.urdf else None
     links, root = (urdf.meshes, urdf.root) if urdf is not None else (None, ROOT_LINK)
@@ -559,7 +546,7 @@ def run_links(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     for name in args.preview:
-        from silo.inertia.preview import LinkView, write_glb
+        from silo.drawing.page import LinkView, write_glb
 
         views = [
             LinkView(link, tuple(assembly.instances[index] for index in ids))
@@ -575,7 +562,9 @@ def run_links(args: argparse.Namespace) -> int:
 
 
 def add_mass(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("top", metavar="TOP.FCStd", help="the assembly's file")
+    common.add_each(
+        parser, "top", "--report", "--preview", "--item", metavar="TOP.FCStd", help="the assembly's file"
+    )
     add_bom_options(parser)
     add_material_options(parser)
     parser.add_argument(
@@ -588,7 +577,7 @@ def add_mass(parser: argparse.ArgumentParser) -> None:
     add_result_options(parser)
     add_push_options(parser)
     # The index is asked only for part numbers.
-    common.only_with(parser, "--push", "--index", "--no-index")
+    common.only_with(parser, "--push", "--index")
     parser.set_defaults(run=run_mass)
 
 
@@ -627,7 +616,7 @@ def _push(args: argparse.Namespace, report: InertiaReport) -> int:
     """The documents' identities give the part numbers; the top assembly's own, unless --item says another."""
     from silo.bom.report import base_of
     from silo.bom_sync import resolve
-    from silo.inertia.geometry.freecad.walk import product_key
+    from silo.inertia.geometry.freecad import product_key
 
     extraction = common.read_tops(args)[0]
     base = base_of(extraction)

@@ -9,13 +9,14 @@ from __future__ import annotations
 import argparse
 import importlib
 import io
+import json
 import os
 import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from typing import NoReturn, TextIO, TypeVar
+from contextlib import nullcontext, redirect_stdout, suppress
+from typing import Any, NoReturn, TextIO, TypeVar
 
 from silo.bom.errors import CancelledError, Exit, InputError, SiloError, did_you_mean, exit_of
 
@@ -37,7 +38,7 @@ THEMES = {
         "where-used": (
             "bom",
             "show which files of a vault link to a file, and which tops a change of it touches",
-            "silo-mod where-used vault/parts/Bracket.FCStd vault/",
+            "silo-mod where-used vault/parts/Bracket.FCStd --root vault/",
         ),
         "diff": (
             "bom",
@@ -82,15 +83,15 @@ THEMES = {
     },
     "Look at Silo": {
         "search": (
-            "items",
+            "show",
             "find items by words of their name or by part number",
             "silo-mod search base plate",
         ),
-        "show": ("items", "show an item with its BOM lines", "silo-mod show A01-0001"),
+        "show": ("show", "show an item with its BOM lines", "silo-mod show A01-0001"),
         "log": (
             "sync",
-            "show the revisions of a file's item, and which one the file is",
-            "silo-mod log TopAssembly.FCStd --bom",
+            "show the revisions of a file's item, and which one the file is; or what changed in a product",
+            "silo-mod log TopAssembly.FCStd --changes",
         ),
         "watch": (
             "setup",
@@ -102,7 +103,7 @@ THEMES = {
         "pull": (
             "sync",
             "fetch the file of an item with all that it links to; edited files stay as they are",
-            "silo-mod pull A01-0001 --to robot",
+            "silo-mod pull A01-0001 --into robot",
         ),
     },
     "Mass and inertia": {
@@ -128,8 +129,8 @@ THEMES = {
             "try a server's address and a token, and remember both for this user",
             "silo-mod login https://silo.example.com",
         ),
-        "logout": ("items", "forget the server and the token that login remembered", "silo-mod logout"),
-        "whoami": ("items", "show which server is meant, and as whom", "silo-mod whoami"),
+        "logout": ("show", "forget the server and the token that login remembered", "silo-mod logout"),
+        "whoami": ("show", "show which server is meant, and as whom", "silo-mod whoami"),
         "doctor": (
             "setup",
             "show what is where on this machine, which server is meant, and what fails; changes nothing",
@@ -154,7 +155,7 @@ THEMES = {
         ),
         "summaries": (
             "setup",
-            "sum all products of a server up anew, while it serves",
+            "sum all products of a server up again, while it serves",
             "silo-mod summaries --database postgresql://silo@localhost/silo",
         ),
         "demo": (
@@ -170,7 +171,7 @@ THEMES = {
             "silo-mod install-addon --freecadcmd /usr/bin/freecadcmd",
         ),
         "completion": (
-            "items",
+            "show",
             "print what completes commands and options in a shell",
             "silo-mod completion bash > ~/.local/share/bash-completion/completions/silo-mod",
         ),
@@ -192,10 +193,10 @@ class _Parser(argparse.ArgumentParser):
     """Names the command or option that was probably meant, and lists commands by theme."""
 
     def error(self, message: str) -> NoReturn:
-        known = self._known()
+        words = self._known_words()
         given = re.search(r"(?:invalid choice: '|unrecognized arguments: )([^' =]+)", message)
         self.print_usage(sys.stderr)
-        raise InputError(message + (did_you_mean(given[1], known) if given else ""))
+        raise InputError(message + (did_you_mean(given[1], words) if given else ""))
 
     def format_help(self) -> str:
         for action in self._actions:
@@ -203,11 +204,11 @@ class _Parser(argparse.ArgumentParser):
                 action.help = argparse.SUPPRESS  # the end of the help has them, by theme
         return super().format_help()
 
-    def _known(self) -> set[str]:
+    def _known_words(self) -> set[str]:
         if self._subparsers is None:
             return {str(choice) for action in self._actions for choice in action.choices or ()}
         (commands,) = (action for action in self._actions if isinstance(action, argparse._SubParsersAction))
-        options = (one._option_string_actions for one in commands.choices.values())
+        options = (parser._option_string_actions for parser in commands.choices.values())
         return set(commands.choices).union(*options)
 
 
@@ -265,15 +266,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     output, errors = sys.stdout, sys.stderr
     sys.stdout = kept = _Output(output)
-    sys.stderr = told = _Output(errors)
+    sys.stderr = main_output = _Output(errors)
     try:
         code = _run(argv)
         kept.flush()
     finally:
         sys.stdout, sys.stderr = output, errors
-        for one in (kept, told):  # else each is when it is collected, and its stream may be closed by then
+        for each_output in (
+            kept,
+            main_output,
+        ):  # else each is when it is collected, and its stream may be closed by then
             with suppress(OSError, ValueError):
-                one.close()
+                each_output.close()
     if kept.failure is None or isinstance(kept.failure, BrokenPipeError):
         return code
     return max(code, _failed(_system_said_no(kept.failure), ()))
@@ -291,11 +295,11 @@ def _run(argv: Sequence[str] | None) -> int:
         if getattr(args, "ends_with_its_reader", False):
             sys.stdout.strict = True  # type: ignore[union-attr]
         _refuse_empty(args)
-        from silo.cli.common import refuse_idle_options
+        from silo.cli.common import progress_of, refuse_idle_options
 
         refuse_idle_options(args.parser, args)
-        code: int = args.run(args)
-        return code
+        with nullcontext() if hasattr(args, "waits") else progress_of(args.command):
+            return _run_each(args)
     except SystemExit as end:  # argparse: --help and --version are output like any other
         return end.code if isinstance(end.code, int) else Exit.BAD_INPUT
     except KeyboardInterrupt:
@@ -310,17 +314,56 @@ def _run(argv: Sequence[str] | None) -> int:
         return _failed(error, words)
 
 
+def _run_each(args: argparse.Namespace) -> int:
+    """Run the command, once for each file or item that is named; return the worst exit code.
+
+    For several, ``--json`` prints a list: what the command prints for each, or its error.
+    """
+    if not (name := getattr(args, "each", "")):
+        return int(args.run(args))
+    several = getattr(args, name)
+    if len(several) == 1:
+        setattr(args, name, several[0])
+        return int(args.run(args))
+    if name in ("top", "assembly"):
+        from silo.files import must_exist
+
+        must_exist(*several)
+    codes, printed = [], []
+    for path in several:
+        output = io.StringIO() if args.json else sys.stdout
+        try:
+            with redirect_stdout(output):
+                codes.append(int(args.run(argparse.Namespace(**{**vars(args), name: path}))))
+            if isinstance(output, io.StringIO):
+                printed.append(json.loads(output.getvalue()))
+        except CancelledError:
+            raise
+        except SiloError as error:
+            codes.append(_failed(error, ()))
+            printed.append(_as_json(error))
+    if args.json:
+        from silo.cli.common import print_json
+
+        print_json(printed)
+    return max(codes)
+
+
+def _as_json(error: SiloError) -> dict[str, Any]:
+    problems = list(getattr(error, "problems", ()))
+    return {"error": {"code": error.code, "message": str(error).strip(), "problems": problems}}
+
+
 def _failed(error: SiloError, words: Sequence[str]) -> int:
     """Print an error as a sentence, and with --json as an object on standard output."""
     text = str(error)
     print(text if isinstance(error, CancelledError) else f"silo-mod: {text}", file=sys.stderr)
-    problems = list(getattr(error, "problems", ()))
-    for problem in problems:
+    for problem in getattr(error, "problems", ()):
         print(f"  - {problem}", file=sys.stderr)
     if "--json" in words and not getattr(sys.stdout, "begun", True):
         from silo.cli.common import print_json
 
-        print_json({"error": {"code": error.code, "message": text.strip(), "problems": problems}})
+        print_json(_as_json(error))
     return exit_of(error)
 
 
@@ -346,7 +389,7 @@ def _open_streams() -> None:
 class _Output(io.TextIOBase):
     """A stream whose end does not end the work: what nobody can read any more is dropped, the rest is done.
 
-    ``head`` closes its pipe after ten lines, a disk is full: a sync is finished all the same, and its report
+    ``head`` closes its pipe after ten lines, a disk is full: a sync is finished anyway, and its report
     written. ``failure`` is what went wrong. ``strict``: raise it instead, for commands without an end.
     """
 

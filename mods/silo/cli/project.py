@@ -4,24 +4,22 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import Exit, UnreachableError, exit_of
+from silo.bom.errors import Exit, UnreachableError, counted, exit_of
+from silo.bom_sync import draft_text
 from silo.cli import common
 
 if TYPE_CHECKING:
+    from silo.api.client import SiloClient
     from silo.outbox.send import Report
-    from silo.vault.project import Belonging, Standing
+    from silo.vault.project import Belonging, FileStanding
 
 
 def _add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "tops", metavar="TOP", nargs="+", help="assembly files with all below them, or the project's folder"
-    )
-    parser.add_argument(
-        "--root",
-        metavar="FOLDER",
-        help="the project's folder; it is remembered (else the folder above that is one, or that holds all)",
     )
 
 
@@ -35,15 +33,11 @@ def add_commit(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
     _add(parser)
     parser.add_argument("-m", "--comment", metavar="TEXT", help="what changed")
-    parser.add_argument(
-        "--allow-missing",
-        action="store_true",
-        help="sync BOMs although files are missing; their known lines stay as they are",
-    )
-    parser.add_argument(
-        "--on-top",
-        action="store_true",
-        help="send files that a colleague has committed since, on top of the colleague's",
+    common.options(
+        parser,
+        {
+            "--on-top": "send files that a colleague has committed since, on top of the colleague's",
+        },
     )
     parser.set_defaults(run=run_commit)
 
@@ -51,19 +45,19 @@ def add_commit(parser: argparse.ArgumentParser) -> None:
 def run_status(args: argparse.Namespace) -> int:
     """Print how each file stands. 1 where folder and server differ."""
     from silo.outbox.store import Store
-    from silo.vault.project import compare, find_project, name_documents, read_project
+    from silo.vault.project import find_project, stand
 
-    found = read_project(args.tops, find_project(args.tops, args.root))
+    project = find_project(args.tops, args.root)
     with common.client_of(args) as client:
         common.reach(client)
-        found = name_documents(found, client, new=False)
-        standings = compare(found, client, Store())
+        belonging, standings = stand(args.tops, project, client, Store())
     if args.json:
-        common.print_json(_told(found, standings))
+        common.print_json(_status_json(belonging, standings))
     else:
-        _show(found, standings)
-    fine = all(one.state.name == "SAME" for one in standings)
-    return Exit.DONE if fine and not _unsound(found) and not found.gone else Exit.UNDONE
+        _show(belonging, standings)
+    fine = all(standing.state.name == "SAME" for standing in standings)
+    whole = not (_unsound(belonging) or belonging.gone or belonging.missing)
+    return Exit.DONE if fine and whole else Exit.UNDONE
 
 
 def run_commit(args: argparse.Namespace) -> int:
@@ -72,7 +66,7 @@ def run_commit(args: argparse.Namespace) -> int:
     from silo.outbox.send import Report, send_all
     from silo.outbox.store import Store
     from silo.vault.project import (
-        State,
+        ProjectState,
         commits,
         compare,
         find_project,
@@ -82,7 +76,7 @@ def run_commit(args: argparse.Namespace) -> int:
         remember,
     )
 
-    found = read_project(args.tops, find_project(args.tops, args.root))
+    belonging = read_project(args.tops, find_project(args.tops, args.root))
     store = Store()
     away: UnreachableError | None = None
     with common.client_of(args) as client:
@@ -91,68 +85,101 @@ def run_commit(args: argparse.Namespace) -> int:
         except UnreachableError as error:
             away = error
         there = None if away else client
-        found = name_documents(found, there)
-        standings = compare(found, there, store)
+        belonging = name_documents(belonging, there)
+        standings = compare(belonging, there, store)
         if not args.json:
-            _show(found, standings)
-        remember(found.project, (one.file for one in standings if one.state is State.SAME))
+            _show(belonging, standings)
+        remember(
+            belonging.project,
+            (standing.file for standing in standings if standing.state is ProjectState.SAME),
+        )
         mine = set()
-        options = {"allow_missing": args.allow_missing, "over_newer": args.on_top}
-        for file, commit in commits(found, standings, comment=args.comment or "", **options):
-            keep(found.project, store, file, commit, client.base_url if there else "")
+        over = {file.path for file in belonging.files} if args.on_top else set()
+        options = {"allow_missing": args.allow_missing, "over_newer": over}
+        for file, commit in commits(belonging, standings, comment=args.comment or "", **options):
+            keep(belonging.project, store, file, commit, client.base_url if there else "")
             mine.add(commit.key)
-        report = Report(stopped_by=away) if away else send_all(store, client, force=True)
+        report = (
+            Report(stopped_by=away)
+            if away
+            else send_all(store, client, force=True, on_progress=common.sending)
+        )
+        models, undrawn = (0, []) if report.stopped_by else _send_models(belonging, client)
     left = [entry for entry in store.entries() if entry.key in mine]
-    refused = {State.NEWER, State.NO_ITEM} | (set() if args.on_top else {State.BOTH})
+    refused = {ProjectState.NEWER, ProjectState.NO_ITEM} | (set() if args.on_top else {ProjectState.BOTH})
     sent = _sent(report, mine)
-    behind = [one for one in standings if one.state in refused]
-    incomplete = [told for told in sent if told["bom"] == "blocked"]
+    behind = [standing for standing in standings if standing.state in refused]
+    incomplete = [sent_row for sent_row in sent if sent_row["bom"] == "blocked"]
     if args.json:
         waiting = [{"path": entry.label, "reason": entry.reason} for entry in left]
-        common.print_json({**_told(found, standings), "sent": sent, "waiting": waiting})
+        result = {"sent": sent, "waiting": waiting, "models": models, "undrawn": undrawn}
+        common.print_json({**_status_json(belonging, standings), **result})
     else:
         _show_sent(report, sent, left, behind)
-    done = not (left or behind or incomplete or _unsound(found) or report.stopped_by or report.busy)
+        _show_models(models, undrawn)
+    done = not (left or behind or incomplete or _unsound(belonging) or report.stopped_by or report.busy)
     return exit_of(away) if away else Exit.DONE if done else Exit.UNDONE
 
 
-def _unsound(found: Belonging) -> bool:
-    return bool(found.outside or found.unreadable)
+def _send_models(belonging: Belonging, client: SiloClient) -> tuple[int, list[str]]:
+    """Send what the server does not draw yet of these files; the commits stand, whatever becomes of it."""
+    try:
+        from silo.drawing.models import send_models
+    except ImportError:
+        missing = 'Silo gets no models, sizes or masses of these files: pip install "silo-mod[inertia]"'
+        return 0, [missing]
+    files = [(Path(file.path), file.sha256) for file in belonging.files]
+    return send_models(client, files, at=common.at)
+
+
+def _show_models(models: int, undrawn: list[str]) -> None:
+    from rich.text import Text
+
+    from silo.cli import show
+
+    if models:
+        show.console().print(Text(f"Silo can show {counted(models, 'more file')} in 3D", "dim"))
+    for problem in undrawn:
+        show.console().print(Text(show.plain(f"! {problem}. The commit stands"), "yellow"))
+
+
+def _unsound(belonging: Belonging) -> bool:
+    return bool(belonging.outside or belonging.unreadable)
 
 
 def _sent(report: Report, mine: set[str]) -> list[dict[str, Any]]:
     return [
         {
-            "path": one.entry.label,
-            "part_number": one.number,
-            "revision": one.revision if one.entry.has_file else None,
-            "bom": one.status.value if one.status is not None else None,
-            "remark": one.entry.remark,
+            "path": file.entry.label,
+            "part_number": file.number,
+            "revision": file.revision if file.entry.has_file else None,
+            "bom": file.status.value if file.status is not None else None,
+            "remark": file.entry.remark or draft_text(file.result or file.uploaded),
         }
-        for one in report.sent
-        if one.entry.key in mine
+        for file in report.sent
+        if file.entry.key in mine
     ]
 
 
-def _told(found: Belonging, standings: list[Standing]) -> dict[str, Any]:
+def _status_json(belonging: Belonging, standings: list[FileStanding]) -> dict[str, Any]:
     return {
-        "root": found.project.root,
+        "root": belonging.project.root,
         "files": [
             {
-                "path": one.file.place,
-                "state": one.state.name.lower().replace("_", " "),
-                "document": one.file.document or None,
-                "items": len({item for item, _ in one.file.held}),
-                "moved_from": one.file.moved_from or None,
-                "newest": one.newest.revision_number if one.newest is not None else None,
+                "path": standing.file.place,
+                "state": standing.state.name.lower().replace("_", " "),
+                "document": standing.file.document or None,
+                "items": len({item for item, _ in standing.file.held}),
+                "moved_from": standing.file.moved_from or None,
+                "newest": standing.newest.revision_number if standing.newest is not None else None,
             }
-            for one in standings
+            for standing in standings
         ],
-        "outside": [{"file": place, "link": link} for place, link in found.outside],
-        "missing": [{"file": place, "link": link} for place, link in found.missing],
-        "unreadable": [{"file": place, "reason": reason} for place, reason in found.unreadable],
-        "gone": list(found.gone),
-        "copies": [{"file": place, "of": first} for place, first in found.doubtful],
+        "outside": [{"file": place, "link": link} for place, link in belonging.outside],
+        "missing": [{"file": place, "link": link} for place, link in belonging.missing],
+        "unreadable": [{"file": place, "reason": reason} for place, reason in belonging.unreadable],
+        "gone": list(belonging.gone),
+        "copies": [{"file": place, "of": first} for place, first in belonging.doubtful],
     }
 
 
@@ -167,56 +194,60 @@ _MARKS = {
 }
 
 
-def _show(found: Belonging, standings: list[Standing]) -> None:
+def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
     from rich.text import Text
 
     from silo.cli import show
 
     out = show.console()
-    out.print(Text(show.plain(f"Project {found.project.root}"), "bold"))
-    for one in standings:
-        mark, style = _MARKS[one.state.name]
+    out.print(Text(show.plain(f"Project {belonging.project.root}"), "bold"))
+    for standing in standings:
+        mark, style = _MARKS[standing.state.name]
         line = (
-            Text(f"{mark} ", style).append(show.plain(one.file.place)).append(f"  {one.state.value}", style)
+            Text(f"{mark} ", style)
+            .append(show.plain(standing.file.place))
+            .append(f"  {standing.state.value}", style)
         )
-        if one.newest is not None:
-            line.append(f"  revision {one.newest.revision_number}", "dim")
-        if not one.file.item:
-            count = len({item for item, _ in one.file.held})
+        if standing.newest is not None:
+            line.append(f"  revision {standing.newest.revision_number}", "dim")
+        if not standing.file.item:
+            count = len({item for item, _ in standing.file.held})
             line.append(f"  {f'{count} items in it' if count else 'a file without a part number'}", "dim")
-        if one.file.moved_from:
-            line.append(show.plain(f"  was {one.file.moved_from}"), "cyan")
+        if standing.file.moved_from:
+            line.append(show.plain(f"  was {standing.file.moved_from}"), "cyan")
         out.print(line)
-        if one.file.problem:
-            out.print(Text(show.plain(f"  {one.file.problem}"), "yellow"))
+        if standing.file.problem:
+            out.print(Text(show.plain(f"  {standing.file.problem}"), "yellow"))
     notes = [
         *(
             (f"{place}: its link {link} leads out of the project, and is not sent")
-            for place, link in found.outside
+            for place, link in belonging.outside
         ),
-        *((f"{place}: its link {link} leads to no file") for place, link in found.missing),
-        *((f"{place} cannot be read: {reason}") for place, reason in found.unreadable),
-        *((f"{place} is gone from the folder; Silo keeps it") for place in found.gone),
+        *((f"{place}: its link {link} leads to no file") for place, link in belonging.missing),
+        *((f"{place} cannot be read: {reason}") for place, reason in belonging.unreadable),
+        *((f"{place} is gone from the folder; Silo keeps it") for place in belonging.gone),
         *(
             f"{place} has the identity of {first}: the same part, or a copy? Register the copy as a new part"
-            for place, first in found.doubtful
+            for place, first in belonging.doubtful
         ),
     ]
     for note in notes:
         out.print(Text(show.plain(f"! {note}"), "yellow"))
 
 
-def _show_sent(report: Report, sent: list[dict[str, Any]], left: list[Any], behind: list[Standing]) -> None:
+def _show_sent(
+    report: Report, sent: list[dict[str, Any]], left: list[Any], behind: list[FileStanding]
+) -> None:
     from rich.text import Text
 
     from silo.cli import show
 
     out = show.console()
-    for one in sent:
-        revision = f"revision {one['revision']}" if one["revision"] else ""
-        bom = f"BOM {one['bom'].replace('_', ' ')}" if one["bom"] else ""
-        told = ", ".join(filter(None, (one["part_number"], revision, bom, one["remark"])))
-        out.print(Text("✓ ", "green").append(show.plain(f"{one['path']}  {told}")))
+    for row in sent:
+        revision = f"revision {row['revision']}" if row["revision"] else ""
+        bom = f"BOM {row['bom'].replace('_', ' ')}" if row["bom"] else ""
+        text = ", ".join(filter(None, (row["part_number"], revision, bom, row["remark"])))
+        out.print(Text("✓ ", "green").append(show.plain(f"{row['path']}  {text}")))
     for entry in left:
         out.print(Text("✗ ", "red").append(show.plain(f"{entry.label} waits in the queue: {entry.reason}")))
     for late in behind:

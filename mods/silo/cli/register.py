@@ -30,19 +30,30 @@ from silo.cli import common
 from silo.cli.show import plain
 from silo.files import check_writable
 from silo.freecads import open_in_any
-from silo.registering.items import Ask, Registration, finished, unclear
-from silo.registering.journal import Journal
-from silo.registering.modelled import chosen, modelled
-from silo.registering.offer import ITEM_TYPES, Candidate, Contents, Offer, State, offer
-from silo.registering.on_disk import OPEN, carry_out_on_disk, is_own, seen_on_disk, whole_folder
-from silo.registering.orders import Order
-from silo.registering.table import (
-    Row,
+from silo.registering.items import Ask, Journal, Registration, finished, unclear
+from silo.registering.offer import (
+    ITEM_TYPES,
+    Candidate,
+    CandidateFiles,
+    ComponentState,
+    Offer,
+    chosen,
+    modelled,
+    offer,
+)
+from silo.registering.orders import (
+    OPEN,
+    Order,
+    TableRow,
+    carry_out_on_disk,
     doubts,
     find_item,
+    is_own,
     orders_of,
     read_table,
     remarks,
+    seen_on_disk,
+    whole_folder,
     write_table,
     wrong_name,
 )
@@ -65,6 +76,7 @@ Nothing is registered before the last question. Ctrl-C leaves everything as it w
 
 def read_line(prompt: str) -> str | None:
     """What a person types; None at the end of the input. Standard output may be JSON, so they read stderr."""
+    common.at("")
     print(prompt, end="", file=sys.stderr, flush=True)
     try:
         return input()
@@ -91,23 +103,25 @@ class Dialog:
         self._candidates, self._found, self._api, self._base = candidates, found, api, base
         self._own, self._read = own, read
         self._all = self._quit = False
-        self._earlier = Contents()
+        self._earlier = CandidateFiles()
 
     def ask(self) -> tuple[list[Order], list[Candidate]]:
         """The orders, and the components that are left without a number."""
         orders: list[Order] = []
         left: list[Candidate] = []
-        for number, one in enumerate(self._candidates):
-            fine = one.state.usable and one.state is not State.ELSEWHERE
+        for number, candidate in enumerate(self._candidates):
+            fine = candidate.state.usable and candidate.state is not ComponentState.ELSEWHERE
             # A file that cannot be written is not asked about; carrying it out reports the reason.
-            order = None if self._quit else self._one(one, number) if fine else Order.of(one)
+            order = (
+                None if self._quit else self._order_for(candidate, number) if fine else Order.of(candidate)
+            )
             if order is not None:
                 orders.append(order)
-            elif not one.same_as:
-                left.append(one)
+            elif not candidate.same_as:
+                left.append(candidate)
         return orders, left
 
-    def _one(self, candidate: Candidate, number: int) -> Order | None:
+    def _order_for(self, candidate: Candidate, number: int) -> Order | None:
         self._earlier.add(candidate)
         doubtful = bool(doubts(candidate, self._earlier)) and not self._own(candidate)
         order = Order.of(candidate)
@@ -150,7 +164,7 @@ class Dialog:
         return f"{order.item_type} {order.name!r}, category {order.category} ({meaning})"
 
     def _changed(self, order: Order, what: str, text: str) -> Order:
-        """The order with what was said; as it was where that is not possible, which is explained."""
+        """Return the order with the change; unchanged, with an explanation, if it is not possible."""
         if what == "name":
             if problem := wrong_name(text, order.candidate):
                 _say(f"  {problem}")
@@ -172,16 +186,18 @@ class Dialog:
         return order
 
     def _category(self, order: Order, text: str) -> Order:
-        known = self._found.categories
-        if text.upper() in known:
+        categories = self._found.categories
+        if text.upper() in categories:
             return replace(order, category=text.upper())
-        if text in known:
+        if text in categories:
             return replace(order, category=text)
-        found = [code for code, words in known.items() if text.casefold() in f"{code} {words}".casefold()]
-        if not found:
+        codes = [
+            code for code, words in categories.items() if text.casefold() in f"{code} {words}".casefold()
+        ]
+        if not codes:
             _say(f"  There is no category {text!r}; cat alone lists them all.")
-        for code in found:
-            _say(f"    {code}  {known[code]}")
+        for code in codes:
+            _say(f"    {code}  {categories[code]}")
         return order
 
 
@@ -192,22 +208,30 @@ def _say(text: str) -> None:
 
 def add_register(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    common.add_top(parser)
+    common.add_top(parser, "--plan", "--apply", "--declare", "--undeclare", "--not-a-part")
     how = parser.add_mutually_exclusive_group()
-    how.add_argument("--yes", action="store_true", help="take every proposal without asking")
-    how.add_argument(
-        "--adopt",
-        action="store_true",
-        help="take over what was registered on another server: an item for each identity that this server "
-        "does not know, with the same UUID",
+    common.options(
+        how,
+        {
+            "--yes": "take every proposal without asking",
+            "--adopt": (
+                "take over what was registered on another server: an item for each identity that this"
+                " server does not know, with the same UUID"
+            ),
+        },
     )
     how.add_argument(
         "--orphans",
         choices=("list", "archive"),
         help="the items of interrupted registrations, which no file names: list or archive them",
     )
-    how.add_argument("--plan", metavar="FILE", help="write the proposals as a table (CSV) to edit; no more")
-    how.add_argument("--apply", metavar="FILE", help="register what an edited table says")
+    common.options(
+        how,
+        {
+            "--plan FILE": "write the proposals as a table (CSV) to edit; no more",
+            "--apply FILE": "register what an edited table says",
+        },
+    )
     parser.add_argument(
         "--duplicates",
         choices=("leave", "join", "new"),
@@ -216,39 +240,27 @@ def add_register(parser: argparse.ArgumentParser) -> None:
         "item that it seems to be, or make a new item",
     )
     parser.add_argument(
-        "--schema",
-        default="kindred-rd",
-        help="part number schema (default: kindred-rd, else the server's only one)",
-    )
-    parser.add_argument(
         "--unclear",
         choices=("ask", "take", "new"),
         default="ask",
         help="an item may be that of a part: made by an interrupted run, or registered from this document "
         "before (which may be a copy now): ask (default), take it where only one fits, or make a new one",
     )
-    parser.add_argument(
-        "--declare",
-        metavar="OBJECT",
-        action="append",
-        default=[],
-        help="count what is modelled in the assembly's own file (name or label); equal copies are one item",
-    )
-    parser.add_argument("--apart", action="store_true", help="with --declare: an item for each copy")
-    parser.add_argument(
-        "--undeclare",
-        metavar="OBJECT",
-        action="append",
-        default=[],
-        help="take back what was said of an object in the assembly's own file: its identity, whose item "
-        "stays, or that it is no part",
-    )
-    parser.add_argument(
-        "--not-a-part",
-        metavar="OBJECT",
-        action="append",
-        default=[],
-        help="say of what is modelled in the assembly's own file that it is no part; the file keeps that",
+    common.options(
+        parser,
+        {
+            "--declare OBJECT...": (
+                "count what is modelled in the assembly's own file (name or label); equal copies are one item"
+            ),
+            "--apart": "with --declare: an item for each copy",
+            "--undeclare OBJECT...": (
+                "take back a decision about an object in the assembly's own file: its identity, whose"
+                " item stays, or that it is no part"
+            ),
+            "--not-a-part OBJECT...": (
+                "say of what is modelled in the assembly's own file that it is no part; the file keeps that"
+            ),
+        },
     )
     parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
     common.only_with(parser, "--yes", "--duplicates")
@@ -286,12 +298,12 @@ def run(args: argparse.Namespace) -> int:
     base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_of(extraction)
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)
-        found = _offer(extraction, client, schema, args)
-        _tell_rules(found.categories)
-        if args.category and args.category not in found.categories:
-            known = ", ".join(found.categories)
-            raise InputError(f"--category: schema {schema} has no {args.category}; it has {known}")
-        code = _Run(args, client, schema, found, base).as_asked(rows, unused)
+        offer_made = _offer(extraction, client, schema, args)
+        _tell_rules(offer_made.categories)
+        if args.category and args.category not in offer_made.categories:
+            text = ", ".join(offer_made.categories)
+            raise InputError(f"--category: schema {schema} has no {args.category}; it has {text}")
+        code = _Run(args, client, schema, offer_made, base).as_asked(rows, unused)
         return code or (Exit.UNDONE if unread else Exit.DONE)
 
 
@@ -325,25 +337,34 @@ def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argpar
     paths = {entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))}
     seen = seen_on_disk(paths, even_if_open=args.even_if_open)
     journal = Journal()
-    found = offer(
+    offer_made = offer(
         extraction, seen, client, schema, _Told(), journal.pending(), most=None, own_file=not folder
     )
-    if found.unsearched:
-        print(f"silo-mod: Silo was not searched for probable duplicates: {found.unsearched}", file=sys.stderr)
-    candidates = [one for one in found.candidates if not folder or one.entry.key != extraction.assembly.key]
+    if offer_made.unsearched:
+        print(
+            f"silo-mod: Silo was not searched for probable duplicates: {offer_made.unsearched}",
+            file=sys.stderr,
+        )
+    candidates = [
+        candidate
+        for candidate in offer_made.candidates
+        if not folder or candidate.entry.key != extraction.assembly.key
+    ]
     if args.category:
         candidates = [
-            one
-            if one.entry.is_assembly
-            else replace(one, proposal=replace(one.proposal, category=args.category, is_guess=False))
-            for one in candidates
+            candidate
+            if candidate.entry.is_assembly
+            else replace(
+                candidate, proposal=replace(candidate.proposal, category=args.category, is_guess=False)
+            )
+            for candidate in candidates
         ]
-    return replace(found, candidates=tuple(candidates))
+    return replace(offer_made, candidates=tuple(candidates))
 
 
 def _tell_rules(categories: Mapping[str, str]) -> None:
-    """A mistake in the site's rules costs proposals, no more; it is said on stderr."""
-    from silo.activity import rules_text
+    """A mistake in the site's rules costs proposals, no more; it is reported on standard error."""
+    from silo.bom_sync import rules_text
     from silo.cli.show import plain
 
     if problem := getattr(categories, "problem", ""):
@@ -353,14 +374,11 @@ def _tell_rules(categories: Mapping[str, str]) -> None:
 class _Told:
     """A long run says where it is; Ctrl-C ends it."""
 
-    def __init__(self) -> None:
-        self._progress = common.Progress()
-
     def progress(self, detail: str = "", fraction: float | None = None) -> None:
         if fraction is None:
             print(f"silo-mod: {plain(detail)}", file=sys.stderr)
         elif fraction:
-            self._progress.tell(f"[{fraction:4.0%}] {detail}")
+            common.at(f"{detail}, {fraction:.0%}")
 
     def check(self) -> None:
         return
@@ -378,7 +396,7 @@ class _Run:
         self.args, self.client, self.schema, self.found, self.base = args, client, schema, found, base
         self.done: list[Registration] = []
 
-    def as_asked(self, rows: Sequence[Row], unused: frozenset[str]) -> int:
+    def as_asked(self, rows: Sequence[TableRow], unused: frozenset[str]) -> int:
         """With a table, with --yes, or with the answers of a person."""
         if self.args.plan:
             return self.write_plan(unused)
@@ -387,20 +405,20 @@ class _Run:
             return self.register(planned.orders, planned.unlisted, already=planned.done)
         if self.args.yes or self.args.adopt:
             return self.register(*self.all_but_duplicates(unused))
-        counted = (one for one in self.found.candidates if one.article is None)
-        offered = [one for one in counted if one.entry.doc_path not in unused]
+        counted = (candidate for candidate in self.found.candidates if candidate.article is None)
+        offered = [candidate for candidate in counted if candidate.entry.doc_path not in unused]
         return self.register(*Dialog(offered, self.found, self.client, self.base, is_own).ask())
 
     def write_plan(self, unused: frozenset[str]) -> int:
         """The table; nothing is registered."""
         from silo.platform import replacing
 
-        earlier = Contents()
+        earlier = CandidateFiles()
 
-        def wanted(one: Candidate) -> bool:
-            earlier.add(one)
-            doubtful = bool(doubts(one, earlier)) and not is_own(one)
-            return not doubtful and one.article is None and one.entry.doc_path not in unused
+        def wanted(candidate: Candidate) -> bool:
+            earlier.add(candidate)
+            doubtful = bool(doubts(candidate, earlier)) and not is_own(candidate)
+            return not doubtful and candidate.article is None and candidate.entry.doc_path not in unused
 
         table = write_table(self.found, wanted, self.base)
         if self.args.plan == "-":
@@ -408,7 +426,7 @@ class _Run:
             return Exit.DONE
         with replacing(Path(self.args.plan)) as file:
             file.write(table)
-        count = sum(not one.decided for one in self.found.candidates)
+        count = sum(not each_candidate.decided for each_candidate in self.found.candidates)
         print(
             f"{self.args.plan}: {counted(count, 'row')}. Edit it, then: "
             f"silo-mod register {shlex.quote(self.args.top)} --apply {shlex.quote(self.args.plan)}",
@@ -419,21 +437,21 @@ class _Run:
     def all_but_duplicates(self, unused: frozenset[str]) -> tuple[list[Order], list[Candidate]]:
         """Every proposal; what seems to be an item already is treated as ``--duplicates`` says."""
         orders, left = [], []
-        earlier = Contents()
-        for one in self.found.candidates:
-            if one.article is not None or one.same_as or one.entry.doc_path in unused:
+        earlier = CandidateFiles()
+        for candidate in self.found.candidates:
+            if candidate.article is not None or candidate.same_as or candidate.entry.doc_path in unused:
                 continue
-            earlier.add(one)
-            told, is_foreign = doubts(one, earlier), one.foreign and not is_own(one)
-            doubtful = len(told) > one.foreign and not is_own(one)
+            earlier.add(candidate)
+            doubts_here, is_foreign = doubts(candidate, earlier), candidate.foreign and not is_own(candidate)
+            doubtful = len(doubts_here) > candidate.foreign and not is_own(candidate)
             if is_foreign != self.args.adopt:
-                left.append(one)
+                left.append(candidate)
             elif not doubtful or self.args.duplicates == "new":
-                orders.append(Order.of(one))
-            elif self.args.duplicates == "join" and len(one.similar) == 1:
-                orders.append(replace(Order.of(one), existing=one.similar[0]))
+                orders.append(Order.of(candidate))
+            elif self.args.duplicates == "join" and len(candidate.similar) == 1:
+                orders.append(replace(Order.of(candidate), existing=candidate.similar[0]))
             else:
-                left.append(one)
+                left.append(candidate)
         if unused:
             files = counted(len(unused), "file")
             words = f"{files} that no assembly uses: left alone (name the file, or use --plan)"
@@ -454,24 +472,26 @@ class _Run:
             )
         finally:
             self._report(left, already)
-        return Exit.UNDONE if left or any(one.error for one in done) else Exit.DONE
+        return Exit.UNDONE if left or any(registration.error for registration in done) else Exit.DONE
 
     def _report(self, left: Sequence[Candidate], already: int) -> None:
         articles = [
-            one.article for one in self.found.candidates if one.article is not None and not one.decided
+            candidate.article
+            for candidate in self.found.candidates
+            if candidate.article is not None and not candidate.decided
         ]
-        declared = {one.proposal.entry.key for one in self.done}
+        declared = {registration.proposal.entry.key for registration in self.done}
         from silo.cli import show
 
-        contents = Contents()
-        for one in self.found.candidates:
-            contents.add(one)
+        contents = CandidateFiles()
+        for candidate in self.found.candidates:
+            contents.add(candidate)
         show.registrations(
             self.args,
             self.base,
             self.done,
-            [(one.proposal, "; ".join(doubts(one, contents))) for one in left],
-            [one for one in articles if one.entry.key not in declared],
+            [(candidate.proposal, "; ".join(doubts(candidate, contents))) for candidate in left],
+            [article for article in articles if article.entry.key not in declared],
         )
         if already and not self.args.json:
             print(f"{already} of the table's components had their number already.")
@@ -481,26 +501,28 @@ def _declare(args: argparse.Namespace) -> int:
     """Give what is modelled in the file an identity; 1 where that failed."""
     articles = modelled(args.top, args.assembly)
     wanted = chosen(articles, args.declare, apart=args.apart)
-    for one in wanted:
-        if one.decided:
-            what = "no part, as somebody said" if one.no_part else "a component already"
-            raise InputError(f"{one.entry.label} is {what}; --undeclare takes that back")
+    for part in wanted:
+        if part.decided:
+            what = "no part, as somebody said" if part.no_part else "a component already"
+            raise InputError(f"{part.entry.label} is {what}; --undeclare takes that back")
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)
         categories = client.categories(schema)
         _tell_rules(categories)
-        found = Offer(
+        own_offer = Offer(
             tuple(
-                Candidate(propose(one.entry, categories, shares_file=True), State.READY, article=one)
-                for one in (*wanted, *(one for one in articles if one not in wanted))
+                Candidate(
+                    propose(part.entry, categories, shares_file=True), ComponentState.READY, article=part
+                )
+                for part in (*wanted, *(article for article in articles if article not in wanted))
             ),
             categories,
         )
-        orders = [Order.of(one) for one in found.candidates[: len(wanted)]]
+        orders = [Order.of(part) for part in own_offer.candidates[: len(wanted)]]
         if args.category:
-            orders = [replace(one, category=args.category) for one in orders]
+            orders = [replace(part, category=args.category) for part in orders]
         base = os.path.dirname(os.path.realpath(args.top))
-        return _Run(args, client, schema, found, base).register(orders, ())
+        return _Run(args, client, schema, own_offer, base).register(orders, ())
 
 
 def _undeclare(args: argparse.Namespace) -> int:
@@ -509,13 +531,13 @@ def _undeclare(args: argparse.Namespace) -> int:
 
     no_part = bool(args.not_a_part)
     articles = [
-        one for one in modelled(args.top, args.assembly) if (not one.no_part if no_part else one.decided)
+        part for part in modelled(args.top, args.assembly) if (not part.no_part if no_part else part.decided)
     ]
     path = articles[0].entry.doc_path if articles else os.path.realpath(args.top)
     wanted = chosen(articles, args.not_a_part or args.undeclare)
     if not args.even_if_open and open_in_any().has_file(path):
         raise DocumentError(path, OPEN)
-    names = [name for one in wanted for name in one.objects]
+    names = [name for part in wanted for name in part.objects]
     taken = [name for name in names if unstamp(path, name, no_part=no_part)]
     if args.json:
         common.print_json({"undeclared": taken})
@@ -534,8 +556,8 @@ def _orphans(args: argparse.Namespace) -> int:
         for record in journal.unfinished():
             if not os.path.join(record.component.rpartition("#")[0], "").startswith(base):
                 continue
-            found = filter(None, map(client.get_item_by_uuid, {record.item_id, record.wanted}))
-            if (item := next(found, None)) is None or finished(record, journal):
+            items = filter(None, map(client.get_item_by_uuid, {record.item_id, record.wanted}))
+            if (item := next(items, None)) is None or finished(record, journal):
                 continue
             if done:
                 client.archive_item(item.part_number)
@@ -554,22 +576,23 @@ def _orphans(args: argparse.Namespace) -> int:
 def _asker(how: str) -> Ask:
     """Which of the items that fit is the component's: as ``--unclear`` says."""
 
-    def ask(proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    def ask(proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
         if how == "new":
             return None
-        if how == "take" and len(found) == 1:
-            return found[0]
+        if how == "take" and len(matches) == 1:
+            return matches[0]
         if how == "take" or not sys.stdin.isatty():
             try:
-                return unclear(proposal, found)
+                return unclear(proposal, matches)
             except ConflictError as error:
                 raise ConflictError(f"{error}: --unclear take, or --unclear new") from None
         print(f"{proposal.name}: is it one of these items? A copy of it is not.", file=sys.stderr)
-        for number, item in enumerate(found, start=1):
+        for number, item in enumerate(matches, start=1):
             print(f"  {number}  {item['part_number']}  {item.get('created_at') or ''}", file=sys.stderr)
+        common.at("")
         answer = input("which one is it? [number, n = make a new item] ").strip()
-        if answer.isdecimal() and 1 <= int(answer) <= len(found):
-            return found[int(answer) - 1]
-        return None if answer.lower() == "n" else unclear(proposal, found)
+        if answer.isdecimal() and 1 <= int(answer) <= len(matches):
+            return matches[int(answer) - 1]
+        return None if answer.lower() == "n" else unclear(proposal, matches)
 
     return ask

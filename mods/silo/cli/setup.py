@@ -23,7 +23,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from silo.activity import activity_text
 from silo.bom.errors import (
     AuthError,
     ConfigError,
@@ -35,12 +34,13 @@ from silo.bom.errors import (
     SiloError,
     exit_of,
 )
+from silo.bom_sync import activity_text
 from silo.cli import common
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.events import ConnectionState, ServerEvent
-    from silo.freecads import Place
+    from silo.freecads import Installation
 
 
 def add_serve(parser: argparse.ArgumentParser) -> None:
@@ -48,14 +48,10 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
         "--host", default="127.0.0.1", help="address to listen on (default: this machine only)"
     )
     parser.add_argument("--port", type=int, default=8080, help="port; 0 takes a free one (default: 8080)")
-    parser.add_argument(
-        "--database", metavar="URL", help="sqlite:///FILE or postgresql://…; default: your data folder"
-    )
+    common.options(parser, {"--database URL": "sqlite:///FILE or postgresql://…; default: your data folder"})
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="server processes (PostgreSQL)")
-    parser.add_argument(
-        "--reset-admin", metavar="NAME", help="make this user an active admin, and print a login link"
-    )
-    parser.set_defaults(run=run_serve)
+    common.options(parser, {"--reset-admin NAME": "make this user an active admin, and print a login link"})
+    parser.set_defaults(run=run_serve, waits=True)
 
 
 def need_server_extra() -> None:
@@ -76,7 +72,7 @@ def run_serve(args: argparse.Namespace) -> int:
 
     def tell(greeting: Greeting) -> None:
         text = json.dumps(asdict(greeting)) if args.json else "\n".join(greeting.lines())
-        # Whoever reads the output of a pipe waits for the address, and the server never ends by itself.
+        # A reader of a pipe waits for the address, and the server never ends by itself.
         print(text, flush=True)
 
     with suppress(KeyboardInterrupt):
@@ -94,11 +90,12 @@ def add_backup(parser: argparse.ArgumentParser) -> None:
 
 def add_restore(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("source", metavar="SOURCE", type=common.a_path, help="the folder of a backup")
-    parser.add_argument(
-        "--replace", action="store_true", help="replace a database that has items; they are lost"
-    )
-    parser.add_argument(
-        "--verify", action="store_true", help="only check that the backup is whole; change nothing"
+    common.options(
+        parser,
+        {
+            "--replace": "replace a database that has items; they are lost",
+            "--verify": "only check that the backup is whole; change nothing",
+        },
     )
     _add_place(parser)
     common.not_with(parser, "--verify", "--replace", "--database", "--files")
@@ -132,9 +129,7 @@ def run_summaries(args: argparse.Namespace) -> int:
 
 
 def _add_place(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--database", metavar="URL", help="sqlite:///FILE or postgresql://… (else SILO_DATABASE_URL)"
-    )
+    common.options(parser, {"--database URL": "sqlite:///FILE or postgresql://… (else SILO_DATABASE_URL)"})
     parser.add_argument(
         "--files",
         metavar="FOLDER",
@@ -146,7 +141,7 @@ def _add_place(parser: argparse.ArgumentParser) -> None:
 def run_backup(args: argparse.Namespace) -> int:
     """0; 1 where files are missing that the server itself has lost."""
     need_server_extra()
-    from silo_server.operation.backup import back_up
+    from silo_server.backup import back_up
     from silo_server.settings import settings_from_environment
 
     settings = settings_from_environment(database_url=args.database, files_dir=args.files)
@@ -161,7 +156,7 @@ def run_backup(args: argparse.Namespace) -> int:
 def run_restore(args: argparse.Namespace) -> int:
     """0 where the backup was whole and is now the server's state."""
     need_server_extra()
-    from silo_server.operation.backup import restore, verify
+    from silo_server.backup import restore, verify
     from silo_server.settings import settings_from_environment
 
     if args.verify:
@@ -184,18 +179,17 @@ _CTRL_C_S = 0.5
 
 
 def add_watch(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--item", metavar="PART_NUMBER", help="only events of this item")
     parser.add_argument("--count", type=common.above_zero, metavar="N", help="end after N events")
-    parser.set_defaults(run=run_watch, ends_with_its_reader=True)
+    parser.set_defaults(run=run_watch, ends_with_its_reader=True, waits=True)
 
 
 def run_watch(args: argparse.Namespace) -> int:
-    """Print events until stopped; the connection is made anew whenever it is lost."""
+    """Print events until stopped; the connection is made again whenever it is lost."""
     from silo.api.events import EventListener
 
     events: queue.Queue[ServerEvent | ConnectionState] = queue.Queue()
     with common.client_of(args) as client:
-        with suppress(NotFoundError):  # a server that does not say who we are has answered all the same
+        with suppress(NotFoundError):  # a server that does not say who we are has answered anyway
             client.whoami()  # a wrong address or token is reported at once, not retried
         if args.item:
             args.item = common.named_item(client, args.item).part_number
@@ -264,11 +258,14 @@ LOGIN_SECONDS = 600
 def add_login(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("url", metavar="URL", help="address of the Silo server")
     parser.add_argument("--token", help="API token (else the browser asks you, or standard input has it)")
-    parser.add_argument(
-        "--paste", action="store_true", help="type the token at the terminal, without a browser"
+    common.options(
+        parser,
+        {
+            "--paste": "type the token at the terminal, without a browser",
+            "--ca FILE": "certificate authorities to trust",
+        },
     )
-    parser.add_argument("--ca", metavar="FILE", help="certificate authorities to trust")
-    parser.set_defaults(run=run_login)
+    parser.set_defaults(run=run_login, waits=True)
 
 
 def run_login(args: argparse.Namespace) -> int:
@@ -342,23 +339,22 @@ T = TypeVar("T")
 
 
 def add_doctor(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--schema", default="kindred-rd", help="part number schema (default: kindred-rd)")
     parser.set_defaults(run=run_doctor)
 
 
 def run_doctor(args: argparse.Namespace) -> int:
     """Print what was found; 2 or 3 where something that the commands need does not work."""
-    found = {**_machine(), **_server(args)}
-    failed = {name: value for name, value in found.items() if isinstance(value, SiloError)}
+    checks = {**_machine(), **_server(args)}
+    failed = {name: value for name, value in checks.items() if isinstance(value, SiloError)}
     if args.json:
-        common.print_json({"ok": not failed, **{name: str(value) for name, value in found.items()}})
+        common.print_json({"ok": not failed, **{name: str(value) for name, value in checks.items()}})
     else:
         from silo.cli import show
 
-        width = max(map(len, found))
-        for name, value in found.items():
+        width = max(map(len, checks))
+        for name, value in checks.items():
             print(f"{'✗' if name in failed else ' '} {name:<{width}}  {show.plain(str(value))}")
-    return max((exit_of(one) for one in failed.values()), default=Exit.DONE)
+    return max((exit_of(error) for error in failed.values()), default=Exit.DONE)
 
 
 def _machine() -> Rows:
@@ -381,8 +377,8 @@ def _machine() -> Rows:
 
 def _program() -> str:
     """The version; ConfigError if another distribution has files in the same package."""
-    found = {name.replace("_", "-") for name in importlib.metadata.packages_distributions().get("silo", ())}
-    if others := sorted(found - {"silo-mod"}):
+    names = {name.replace("_", "-") for name in importlib.metadata.packages_distributions().get("silo", ())}
+    if others := sorted(names - {"silo-mod"}):
         raise ConfigError(
             f"{', '.join(others)} also has a package named silo, in the same place. Uninstall it, and "
             "install silo-mod again"
@@ -414,19 +410,19 @@ def _extra(name: str, package: str, used_by: str) -> str:
     return f"not installed ({used_by} need it): pip install 'silo-mod[{name}]'"
 
 
-def _freecad() -> str | tuple[str, Place]:
+def _freecad() -> str | tuple[str, Installation]:
     from silo.freecads import ask_freecad, commands, find_freecadcmd
 
     if not os.environ.get("SILO_FREECADCMD") and next(commands(), None) is None:
         return "none found (files are read without it; only the add-on and bom --verify need one)"
     command = find_freecadcmd()
     place = ask_freecad(command)
-    others = [one for one in commands() if one != command]
+    others = [path for path in commands() if path != command]
     versions = "{}.{}, Python {}.{}".format(*place.freecad, *place.python)
     return f"{command}: {versions}" + (f"; also {_listed(others)}" if others else ""), place
 
 
-def _addon(place: Place) -> str:
+def _addon(place: Installation) -> str:
     if not place.mod.exists():
         return f"not in {place.mod}: silo-mod install-addon puts it there"
     if place.missing:
@@ -447,7 +443,7 @@ def _server(args: argparse.Namespace) -> Rows:
     try:
         where = resolve_server(args.server, args.token)
         with common.client_of(args) as client:
-            client.abilities = Abilities()  # looked at anew, and kept for the other commands
+            client.abilities = Abilities()  # looked at again, and kept for the other commands
             return {
                 "address": f"{client.base_url} (from {where.url_from})",
                 "token": f"from {where.token_from}" if where.token else "none",
@@ -509,9 +505,14 @@ def _events(client: SiloClient) -> str:
 
 
 def add_install_addon(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--freecadcmd", metavar="PATH", help="freecadcmd (default: found on the PATH)")
-    parser.add_argument("--freecad-data", metavar="DIR", help="its data folder (default: FreeCAD is asked)")
-    parser.add_argument("--copy", action="store_true", help="copy the add-on, do not link to this checkout")
+    common.options(
+        parser,
+        {
+            "--freecadcmd PATH": "freecadcmd (default: found on the PATH)",
+            "--freecad-data DIR": "its data folder (default: FreeCAD is asked)",
+            "--copy": "copy the add-on, do not link to this checkout",
+        },
+    )
     parser.set_defaults(run=run_install_addon)
 
 
@@ -520,15 +521,15 @@ def run_install_addon(args: argparse.Namespace) -> int:
     from silo.freecads import ask_freecad, install_folder, install_packages
 
     place = ask_freecad(args.freecadcmd, Path(args.freecad_data) if args.freecad_data else None)
-    found = {
+    report = {
         "freecad": "FreeCAD {}.{} with Python {}.{}".format(*place.freecad, *place.python),
         "addon": str(install_folder(place, copy=args.copy)),
         "packages": str(install_packages(place)),
     }
     if args.json:
-        common.print_json(found)
+        common.print_json(report)
     else:
-        print(f"{found['freecad']}\nAdd-on:   {found['addon']}\nPackages: {found['packages']}")
+        print(f"{report['freecad']}\nAdd-on:   {report['addon']}\nPackages: {report['packages']}")
         print("Start FreeCAD again, and choose the workbench Silo.")
     return Exit.DONE
 

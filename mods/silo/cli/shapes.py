@@ -34,7 +34,7 @@ def schema_of(name: str) -> dict[str, Any]:
     return {**head, **{key: value for key, value in made.items() if key != "title"}}
 
 
-class Shape(BaseModel):
+class JsonForm(BaseModel):
     """An object with these keys and no others."""
 
     model_config = ConfigDict(extra="forbid")
@@ -44,7 +44,7 @@ class _Open(BaseModel):
     model_config = ConfigDict(extra="allow", json_schema_extra={"additionalProperties": {"type": "string"}})
 
 
-def _shape(title: str, /, base: type[BaseModel] = Shape, doc: str = "", **keys: Any) -> Any:
+def _shape(title: str, /, base: type[BaseModel] = JsonForm, doc: str = "", **keys: Any) -> Any:
     """A shape; each key with its type, or with (type, default) where it may be left out."""
     fields: dict[str, Any] = {}
     for key, given in keys.items():
@@ -58,7 +58,7 @@ def _many(kind: Any) -> Any:
     return GenericAlias(list, (kind,))
 
 
-def _said(kind: Any, words: str) -> Any:
+def _described(kind: Any, words: str) -> Any:
     return Annotated[kind, Field(description=words)]
 
 
@@ -70,8 +70,8 @@ Finding = _shape(
     severity=Severity,
     message=str,
     where=_many(Place),
-    file=(_said(str, "the file that a broken link records"), ""),
-    did_you_mean=(_said(str, "the file that was probably meant"), ""),
+    file=(_described(str, "the file that a broken link records"), ""),
+    did_you_mean=(_described(str, "the file that was probably meant"), ""),
 )
 Head = _shape(
     "Head",
@@ -87,21 +87,21 @@ Entry = _shape(
     "Entry",
     base=Head,
     doc="A component; ``quantity`` is per one parent.",
-    standard=_said(str | None, "the designation of a standard part"),
+    standard=_described(str | None, "the designation of a standard part"),
     quantity=int,
     missing=bool,
     level=int,
     consolidation_warning=bool,
     children="list[Entry]",
-    own=(_said("list[Entry]", "what an assembly shows of its own file and is no item yet"), []),
+    own=(_described("list[Entry]", "what an assembly shows of its own file and is no item yet"), []),
 )
 Bom = _shape(
     "Bom",
     assembly=Head,
     entries=_many(Entry),
-    own=(_said(_many(Entry), "what the assembly shows of its own file and is no item yet"), []),
+    own=(_described(_many(Entry), "what the assembly shows of its own file and is no item yet"), []),
     findings=_many(Finding),
-    silo=(_said(ProductSummary | None, "with --resolve: what the server keeps of the product"), None),
+    silo=(_described(ProductSummary | None, "with --resolve: what the server keeps of the product"), None),
 )
 FlatLine = _shape(
     "FlatLine",
@@ -146,7 +146,7 @@ Compared = _shape(
     object=str,
     part_number=str | None,
     name=str | None,
-    diff=(_said(Diff | None, "not there where there was nothing to compare"), None),
+    diff=(_described(Diff | None, "not there where there was nothing to compare"), None),
 )
 Files = _shape("Files", message=str, files=list[str])
 Comparison = _shape(
@@ -155,7 +155,7 @@ Comparison = _shape(
     assemblies=_many(Compared),
     findings=_many(Finding),
     errors=(
-        _said(_many(Files), "of a folder: what kept files from being compared"),
+        _described(_many(Files), "of a folder: what kept files from being compared"),
         [],
     ),
 )
@@ -167,7 +167,7 @@ Outcome = _shape(
     part_number=str | None,
     status=Status,
     diff=(Diff | None, None),
-    result=(_said(MergeResult | None, "what the server answered"), None),
+    result=(_described(MergeResult | None, "what the server answered"), None),
     error=(Error | None, None),
     blocked_by=(_many(Finding), []),
 )
@@ -182,7 +182,7 @@ TopResult = _shape(
     unregistered=(_many(Entry), []),
     findings=(_many(Finding), []),
 )
-Caused = _shape("Caused", base=Files, cause=_said(str, "what several have in common"))
+Caused = _shape("Caused", base=Files, cause=_described(str, "what several have in common"))
 Unregistered = _shape("Unregistered", doc_path=str, object=str, label=str)
 Moved = _shape("Moved", name=str, from_=str, to=str)
 Summary = _shape(
@@ -191,9 +191,9 @@ Summary = _shape(
     in_order=int,
     parts=int,
     assemblies=dict[Status, int],
-    not_sent=_said(int, "assemblies that the server, or the way to it, kept from being sent"),
+    not_sent=_described(int, "assemblies that the server, or the way to it, kept from being sent"),
     lines_changed=int,
-    new=_said(list[str] | None, "what the run before did not have; null if it is not known"),
+    new=_described(list[str] | None, "what the run before did not have; null if it is not known"),
     errors=_many(Caused),
     warnings=_many(Caused),
     unregistered=_many(Unregistered),
@@ -241,11 +241,11 @@ Proposed = _shape(
     name=str,
     item_type=str,
     category=str,
-    guess=_said(bool, "the category was found by little"),
+    guess=_described(bool, "the category was found by little"),
     note=str,
     part_number=(str | None, None),
     silo_uuid=(str | None, None),
-    found=(_said(bool, "the item was there already"), False),
+    found=(_described(bool, "the item was there already"), False),
     error=(Error | None, None),
 )
 Modelled = _shape("Modelled", doc_path=str, objects=list[str], label=str, quantity=int, alike=str, source=str)
@@ -257,7 +257,9 @@ Registered = _shape(
     modelled=_many(Modelled),
 )
 Undeclared = _shape("Undeclared", undeclared=list[str])
-Orphan = _shape("Orphan", part_number=str, name=str, component=_said(str, "file#object that it was made for"))
+Orphan = _shape(
+    "Orphan", part_number=str, name=str, component=_described(str, "file#object that it was made for")
+)
 Orphans = _shape("Orphans", orphans=_many(Orphan))
 Archived = _shape("Archived", archived=_many(Orphan))
 PulledFile = _shape(
@@ -266,7 +268,7 @@ PulledFile = _shape(
     part_number=str,
     revision=int,
     state=Literal["new", "same", "updated", "edited", "overwritten", "open"],
-    kept=_said(str | None, "the copy of the user's file"),
+    kept=_described(str | None, "the copy of the user's file"),
 )
 Lost = _shape("Lost", file=str, link=str, reason=str)
 Pulled = _shape("Pulled", top=str, complete=bool, files=_many(PulledFile), missing=_many(Lost))
@@ -277,7 +279,7 @@ Standing = _shape(
     document=str | None,
     items=int,
     moved_from=str | None,
-    newest=_said(int | None, "the newest revision in Silo"),
+    newest=_described(int | None, "the newest revision in Silo"),
 )
 _ProjectLink = _shape("ProjectLink", file=str, link=str)
 ProjectStatus = _shape(
@@ -296,6 +298,8 @@ Committed = _shape(
     base=ProjectStatus,
     sent=_many(SentFile),
     waiting=_many(_shape("InQueue", path=str, reason=str)),
+    models=_described(int, "how many files Silo can show in 3D since"),
+    undrawn=_described(list[str], "why it cannot show others"),
 )
 Revision = _shape(
     "Revision",
@@ -306,7 +310,7 @@ Revision = _shape(
     file_name=str | None,
     file_size=int | None,
     base_revision=(int | None, None),
-    bom=(_said(str | None, "with --bom: what the revision changed, in words"), None),
+    bom=(_described(str | None, "with --bom: what the revision changed, in words"), None),
 )
 _Waiting = _shape(
     "Waiting",
@@ -318,7 +322,7 @@ _Waiting = _shape(
     reason=str,
     server=str,
     number=int,
-    since=_said(float, "seconds since 1970"),
+    since=_described(float, "seconds since 1970"),
     needs_a_person=bool,
 )
 Queue = _shape("Queue", pause=str | None, commits=_many(_Waiting))
@@ -326,9 +330,29 @@ Queue = _shape("Queue", pause=str | None, commits=_many(_Waiting))
 Log = _shape(
     "Log",
     part_number=str,
-    file_is=_said(int | None, "the revision that the file is, or was made from"),
+    file_is=_described(int | None, "the revision that the file is, or was made from"),
     edited=bool,
     revisions=_many(Revision),
+)
+Changed = _shape(
+    "Changed",
+    doc="Of ``log --since``.",
+    part_number=str,
+    since=str,
+    to=str,
+    changes=_many(
+        _shape(
+            "Happened",
+            what=Literal["added", "removed", "quantity", "line", "data", "file"],
+            within=_described(str, "the part number of the BOM; empty for an item's data and file"),
+            part_number=str,
+            name=str,
+            before=str,
+            after=str,
+            at=_described(str | None, "null between two frozen revisions"),
+            username=str,
+        )
+    ),
 )
 Greeting = _shape("Greeting", url=str, token=str | None, login_url=str | None, database=str, public=bool)
 Backup = _shape(
@@ -376,7 +400,7 @@ SHAPES: dict[str, Any] = {
     "commit": Committed,
     "status": ProjectStatus,
     "pull": Pulled,
-    "log": Log,
+    "log": Log | Changed,
     "queue": Queue,
     "search": _many(Found),
     "show": Shown,

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What the commands print for people."""
+"""What the commands print for people; ``silo-mod search``, ``show``, ``whoami``, ``logout``."""
 
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TextIO
@@ -15,6 +16,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 from silo.bom.document import relative
+from silo.bom.errors import ConfigError, Exit, NotFoundError
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.report import MOST_LINES, base_of, check_tree_size, diff_rows, shorten
@@ -22,12 +24,11 @@ from silo.bom.resolve import display_name
 from silo.cli import common
 
 if TYPE_CHECKING:
-    from silo.activity import ActivityText
     from silo.api.wire import ProductSummary
     from silo.bom.resolve import Proposal
-    from silo.bom_sync import Outcome
+    from silo.bom_sync import ActivityText, Outcome
     from silo.registering.items import Registration
-    from silo.registering.modelled import Modelled
+    from silo.registering.offer import Modelled
 
 
 _MARK = {
@@ -146,15 +147,13 @@ def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
 
 def summary_text(summary: ProductSummary) -> Text:
     """Return what the server says of a product over all levels: what is open, mass and cost."""
-    told = (*summary.open.items(), *((one, f"incomplete: {why}") for one, why in summary.incomplete.items()))
-    lines = [f"⚠ {plain(number)}: {plain(words)}" for number, words in told]
+    from silo.bom_sync import summary_texts
+
+    texts, values = summary_texts(summary)
+    lines = [f"⚠ {plain(text)}" for text in texts]
     rest = len(lines) - MOST_LINES
     shown = [*lines[:MOST_LINES], f"… and {rest} more"] if rest > 0 else lines or ["✓ nothing is open"]
-    values = [(f"{summary.total_mass_kg:g} kg" if summary.total_mass_kg else "", summary.mass_missing)]
-    costs = ", ".join(f"{one.total_cost:.2f} {plain(one.currency)}" for one in summary.totals)
-    for value, lacking in (*values, (costs, summary.cost_missing)):
-        known = f" for {summary.parts - lacking.count} of {summary.parts} parts" if lacking.count else ""
-        shown += [f"{value}{known}"] if value else []
+    shown += map(plain, values)
     return Text("\n").join(Text(line) for line in (f"In Silo, {plain(summary.part_number)}:", *shown))
 
 
@@ -200,9 +199,9 @@ _STATUS = {
 
 def outcome_text(outcome: Outcome, base: str) -> Text:
     """Return one line: which assembly, what became of it, and its file relative to ``base``."""
-    from silo.activity import draft_text
     from silo.api.boms import unusual
     from silo.batch import STATUS_WORDS
+    from silo.bom_sync import draft_text
 
     mark, style = _STATUS[outcome.status]
     head = outcome.assembly
@@ -250,11 +249,11 @@ def articles_text(articles: Sequence[Modelled], base: str) -> list[str]:
     """The section of what is modelled in the file, line by line."""
     lines = ["Modelled in this file, not counted:"]
     most = _MOST_MODELLED if sys.stdout.isatty() else len(articles)
-    for one in articles[:most]:
-        copies = f", {len(one.objects)} copies of one {one.alike}" if len(one.objects) > 1 else ""
-        source = f", imported from {plain(relative(one.source, base))}" if one.source else ""
-        label = plain(one.entry.label)
-        lines.append(f"  {one.entry.quantity} × {label} ({one.entry.object_name}{copies}{source})")
+    for article in articles[:most]:
+        copies = f", {len(article.objects)} copies of one {article.alike}" if len(article.objects) > 1 else ""
+        source = f", imported from {plain(relative(article.source, base))}" if article.source else ""
+        label = plain(article.entry.label)
+        lines.append(f"  {article.entry.quantity} × {label} ({article.entry.object_name}{copies}{source})")
     if len(articles) > most:
         lines.append(f"  and {len(articles) - most} more; --json has them all")
     lines.append("Declare what is a part: silo-mod register TOP.FCStd --yes --declare OBJECT")
@@ -295,7 +294,7 @@ def registrations(
                 "registered": [proposal_json(r.proposal, base, r) for r in done if r.error is None],
                 "failed": [proposal_json(r.proposal, base, r) for r in done if r.error is not None],
                 "unregistered": [proposal_json(proposal, base, note=why) for proposal, why in left],
-                "modelled": [article_json(one, base) for one in articles],
+                "modelled": [article_json(article, base) for article in articles],
             }
         )
         return
@@ -306,8 +305,8 @@ def registrations(
         name = plain(result.proposal.name)
         if result.error is None:
             guess = " (the category is a guess)" if result.proposal.is_guess else ""
-            found = " (the item was there already)" if result.found else ""
-            out.print(f"✓ {result.part_number}  {name}{guess}{found}", markup=False)
+            note = " (the item was there already)" if result.found else ""
+            out.print(f"✓ {result.part_number}  {name}{guess}{note}", markup=False)
         else:
             out.print(f"✗ {name}: {plain(str(result.error))}", style="red", markup=False)
     for proposal, why in left:
@@ -324,3 +323,134 @@ def registrations(
         )
     for line in articles_text(articles, base) if articles else ():
         out.print(line, markup=False, highlight=False)
+
+
+def add_search(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("words", metavar="WORD", nargs="+")
+    parser.set_defaults(run=run_search)
+
+
+def add_show(parser: argparse.ArgumentParser) -> None:
+    common.add_each(parser, "part_number", metavar="PART_NUMBER", help="the item")
+    parser.set_defaults(run=run_show)
+
+
+def add_whoami(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=run_whoami)
+
+
+def add_logout(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=run_logout)
+
+
+def add_completion(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("shell", choices=("bash", "zsh", "tcsh"))
+    parser.set_defaults(run=run_completion)
+
+
+def run_search(args: argparse.Namespace) -> int:
+    """Print the items; 1 if there is none."""
+    with common.client_of(args) as client:
+        items = client.search_items(" ".join(args.words), limit=args.limit)
+    rows = [{name: getattr(item, name) for name in ("part_number", "name", "item_type")} for item in items]
+    if args.json:
+        common.print_json(rows)
+    else:
+        _print(rows or [{"part_number": "No item has these words."}])
+    return Exit.DONE if rows else Exit.UNDONE
+
+
+def run_show(args: argparse.Namespace) -> int:
+    """Print the item and its lines."""
+    with common.client_of(args) as client:
+        item = common.named_item(client, args.part_number)
+        lines = client.get_bom(item.part_number)
+        page = client.web_url(f"/items/{item.part_number}")
+    head = {name: getattr(item, name) for name in ("part_number", "name", "item_type", "current_revision")}
+    rows: list[dict[str, Any]] = [
+        {
+            "part_number": line.child_part_number,
+            "name": line.child_name or line.child_description,
+            "quantity": line.quantity,
+            "source": line.source,
+        }
+        for line in lines
+    ]
+    if args.json:
+        common.print_json({**head, "page": page, "bom": rows})
+        return Exit.DONE
+    _print([{**head, "current_revision": f"revision {item.current_revision}"}])
+    _print(rows)
+    print(page)
+    return Exit.DONE
+
+
+def run_whoami(args: argparse.Namespace) -> int:
+    """Print the address, where it comes from, and the user."""
+    from silo.api.config import resolve_server
+
+    where = resolve_server(args.server, args.token)
+    with common.client_of(args) as client:
+        account: dict[str, Any] = {
+            "url": client.base_url,
+            "from": where.url_from,
+            "username": None,
+            "role": None,
+        }
+        try:
+            user = client.whoami()
+            account |= {"username": user.username, "role": user.role or None}
+        except NotFoundError:
+            client.search_items(limit=1)
+    if args.json:
+        common.print_json(account)
+    else:
+        who = ", ".join(filter(None, (account["username"], account["role"])))
+        print(
+            plain(
+                f"{account['url']} (from {account['from']}): {who or 'this server does not say who you are'}"
+            )
+        )
+    return Exit.DONE
+
+
+def run_logout(args: argparse.Namespace) -> int:
+    """Remove the configuration that ``login`` wrote; a token in the environment stays."""
+    from silo.api.config import checked_config, config_path
+    from silo.platform import remove_patiently
+
+    path = config_path()
+    there = path.exists()
+    if there:
+        checked_config(path)  # what is not ours stays
+        remove_patiently(path)
+    if args.json:
+        common.print_json({"configuration": str(path), "removed": there})
+    else:
+        print(f"{path} is removed." if there else f"There was no {path}; nothing is remembered.")
+        if os.environ.get("SILO_API_TOKEN"):
+            print("SILO_API_TOKEN still has a token.")
+    return Exit.DONE
+
+
+def run_completion(args: argparse.Namespace) -> int:
+    """Print the script of a shell. ConfigError if shtab is not installed."""
+    try:
+        import shtab
+    except ImportError:
+        raise ConfigError("completion needs the package shtab: pip install 'silo-mod[completion]'") from None
+    from silo.cli.main import build_parser
+
+    print(shtab.complete(build_parser(), args.shell))
+    return Exit.DONE
+
+
+def _print(rows: list[dict[str, Any]]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, show_header=False)
+    for row in rows:
+        table.add_row(*(Text(plain("" if value is None else str(value))) for value in row.values()))
+    if rows:
+        console().print(table)

@@ -19,8 +19,8 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.batch import Options, TopResult
-from silo.bom.errors import ConfigError, Exit, InputError, SiloError
+from silo.batch import SyncOptions, TopResult
+from silo.bom.errors import ConfigError, Exit, InputError, SiloError, counted, exit_of
 from silo.cli import common
 from silo.files import check_writable, documents_in
 from silo.outbox.store import KEPT_ASIDE_DAYS
@@ -28,7 +28,7 @@ from silo.outbox.store import KEPT_ASIDE_DAYS
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.config import Pause
-    from silo.api.wire import Revision
+    from silo.api.wire import Item, ProductChanges, Revision
     from silo.batch import Summary
     from silo.outbox.entry import Entry
     from silo.outbox.store import Store
@@ -44,18 +44,13 @@ def add_sync(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "tops", metavar="TOP", nargs="+", help="assembly files, or folders: all assemblies below them"
     )
-    parser.add_argument(
-        "--allow-missing",
-        action="store_true",
-        help="sync although files are missing; their known lines stay as they are",
-    )
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Sync each file; one failure does not stop the rest. 1 or 3 where anything was left undone."""
-    from silo.batch import Report, Summary
-    from silo.vault.job import only_job
+    from silo.batch import ReportFile, Summary
+    from silo.vault.plan import only_job
 
     common.refuse_assembly_of(args.tops, args.assembly)
     tops = documents_in(args.tops)
@@ -64,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     check_writable(*args.report)
     folders = [top for top in args.tops if Path(top).is_dir()]
     base = os.path.realpath(folders[0]) if len(folders) == len(args.tops) == 1 else ""
-    options = Options(
+    options = SyncOptions(
         recursive=args.recursive or bool(folders),
         allow_missing=args.allow_missing,
         dry_run=args.dry_run,
@@ -78,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
         client = stack.enter_context(
             common.client_of(args, busy_tries=_BUSY_TRIES, longest=_LONGEST_S, stop=stop)
         )
-        reports = [Report(path) for path in args.report]
+        reports = [ReportFile(path) for path in args.report]
         shown = _Shown(args, many=len(tops) > 1)
         ended = None
         try:
@@ -100,16 +95,14 @@ def run(args: argparse.Namespace) -> int:
 def _results(
     args: argparse.Namespace,
     tops: Sequence[str],
-    options: Options,
+    options: SyncOptions,
     client: SiloClient,
     summary: Summary,
     stop: threading.Event,
 ) -> Iterator[TopResult]:
-    from silo.vault.job import Job
-    from silo.vault.plan import make_plan
+    from silo.vault.plan import SyncJob, make_plan
 
     begin = time.monotonic()
-    told = common.Progress(len(tops))
     with common.reading_of(args) as reading:
         if summary.base:
             reading.index.expect(summary.base)
@@ -121,7 +114,7 @@ def _results(
             hardware=not args.no_hardware,
             recursive=options.recursive,
             skip_parts=options.skip_parts,
-            progress=told.begin,
+            progress=common.count_steps(len(tops)),
         )
         summary.parts, summary.files, summary.fine = plan.parts, plan.parts, plan.parts
         reading.index.save()
@@ -129,7 +122,11 @@ def _results(
         if not plan.uuids and plan.nodes:
             common.reach(client)
         begin = time.monotonic()
-        yield from Job(plan, reading, client, options, summary.base, stop).results()
+        common.at("asking the server")
+        progress = common.count_steps(len({node.top for node in plan.nodes.values()}))
+        for result in SyncJob(plan, reading, client, options, summary.base, stop).results():
+            progress(result.top)
+            yield result
         summary.seconds["server"] = time.monotonic() - begin
         summary.add_findings(plan.shared)
         summary.notes += filter(None, [reading.index.trouble])
@@ -199,8 +196,8 @@ def _show_summary(summary: Summary) -> None:
             out.print(f"\n{title}", style=_STYLES.get(title, ""))
         for line, more in lines:
             out.print(f"  {show.plain(line)}", markup=False)
-            for one in more:
-                out.print(f"    {show.plain(one)}", markup=False)
+            for text in more:
+                out.print(f"    {show.plain(text)}", markup=False)
 
 
 _STYLES = {"New since the last run": "bold", "Moved": "cyan", "Warnings": "yellow", "Errors": "bold red"}
@@ -214,7 +211,7 @@ def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> 
     for uuid, path in now:
         here.setdefault(uuid, set()).add(path)
     taken = {path for _, path in now}
-    found = []
+    result = []
     for uuid, paths in sorted(before.items()):
         left = paths - here.get(uuid, set())
         gone = {path for path in left if path in taken or not os.path.lexists(path)}
@@ -222,8 +219,8 @@ def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> 
         if len(gone) == len(new) == 1:
             (old_path,), (new_path,) = gone, new
             name = os.path.splitext(os.path.basename(new_path))[0]
-            found.append((name, relative(old_path, base), relative(new_path, base)))
-    return found
+            result.append((name, relative(old_path, base), relative(new_path, base)))
+    return result
 
 
 def _revision(text: str) -> int | str:
@@ -237,7 +234,7 @@ def _revision(text: str) -> int | str:
 
 
 def add_pull(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("part_number", metavar="PART_NUMBER")
+    common.add_each(parser, "part_number", "--revision", metavar="PART_NUMBER", help="the item")
     parser.add_argument(
         "--revision",
         metavar="N|LABEL",
@@ -245,28 +242,27 @@ def add_pull(parser: argparse.ArgumentParser) -> None:
         help="revision N of the file, with the linked files as they were then; or the released revision "
         "LABEL, such as B, with all files as they were frozen; else the newest of all",
     )
-    parser.add_argument(
-        "--to",
-        "--into",
-        dest="into",
-        metavar="FOLDER",
-        default=".",
-        help="the project's folder (else this one)",
-    )
-    parser.add_argument(
-        "--replace",
-        action="store_true",
-        help="replace files with edits that are not in Silo; a copy of each is kept",
+    common.options(
+        parser, {"--replace": "replace files with edits that are not in Silo; a copy of each is kept"}
     )
     parser.set_defaults(run=run_pull)
 
 
 def add_log(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="a FreeCAD file that is registered")
-    parser.add_argument(
-        "--limit", metavar="N", type=common.above_zero, default=20, help="the newest N revisions (20)"
+    common.add_each(
+        parser,
+        "file",
+        metavar="FILE",
+        help="a FreeCAD file that is registered; with --since a part number as well",
     )
-    parser.add_argument("--bom", action="store_true", help="what each revision changed in the BOM")
+    points = {
+        "--since POINT": "what changed in the product on all levels since then: a day such as 2026-02-08, "
+        "a revision of the item such as r3, or a frozen revision such as A",
+        "--until POINT": "up to then (now)",
+    }
+    common.options(parser, points)
+    common.only_with(parser, "--since", "--until")
+    common.options(parser, {"--changes": "what each revision changed in the BOM"})
     parser.set_defaults(run=run_log)
 
 
@@ -282,13 +278,12 @@ def add_queue(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "numbers", metavar="NUMBER", nargs="*", type=common.above_zero, help="commits, as list shows them"
     )
-    parser.add_argument("--here", action="store_true", help="retry: send them to the server in use instead")
-    parser.add_argument("--into", metavar="FOLDER", default=".", help="save: the folder (else this one)")
+    common.options(parser, {"--here": "retry: send them to the server in use instead"})
     parser.set_defaults(run=run_queue)
 
 
 def run_queue(args: argparse.Namespace) -> int:
-    """1 where something waits or is held after all."""
+    """1 where something waits or is held after all; 2 or 3 where the server stops a retry."""
     from silo.api.config import canonical, resolve_server
     from silo.outbox.store import Store
 
@@ -297,10 +292,9 @@ def run_queue(args: argparse.Namespace) -> int:
         here = canonical(resolve_server(args.server, args.token).url)
     if args.do in ("discard", "save") and not args.numbers:
         raise InputError(f"queue {args.do}: which commit? Give the number that `silo-mod queue` shows")
-    if args.do == "retry":
-        _retry(args, store, here)
+    stopped = _retry(args, store, here) if args.do == "retry" else None
     for number in args.numbers:
-        entry = next((one for one in store.entries() if one.id == number), None)
+        entry = next((each_entry for each_entry in store.entries() if each_entry.id == number), None)
         if entry is None:
             if args.do != "retry":
                 raise InputError(f"there is no commit {number} in the queue; `silo-mod queue` lists them")
@@ -318,20 +312,24 @@ def run_queue(args: argparse.Namespace) -> int:
     if store.closed:
         print(f"silo-mod: {store.closed}", file=sys.stderr)
     _show_queue(args, left, here, pause, store.clock())
+    if stopped is not None:
+        return exit_of(stopped)
     return Exit.UNDONE if left else Exit.DONE
 
 
-def _retry(args: argparse.Namespace, store: Store, here: str) -> None:
+def _retry(args: argparse.Namespace, store: Store, here: str) -> SiloError | None:
+    """Send what waits; return what the server refused to all of it."""
     from silo.outbox.send import send_all
 
     for number in args.numbers:
         store.retry(number, here if args.here else None)
     with common.client_of(args) as client:
-        report = send_all(store, client, force=True)
+        report = send_all(store, client, force=True, on_progress=common.sending)
     for sent in report.sent:
         print(f"{sent.part_number} {sent.entry.label or sent.entry.file_name} is in Silo", file=sys.stderr)
     if report.busy:
         print("silo-mod: another program sends just now", file=sys.stderr)
+    return report.stopped_by
 
 
 def _show_queue(
@@ -343,23 +341,23 @@ def _show_queue(
     from silo.cli import show
     from silo.outbox.entry import parts, pause_text, words
 
-    told = [(one, words(one, here, is_paused=pause is not None)) for one in left]
+    queue_rows = [(each_entry, words(each_entry, here, is_paused=pause is not None)) for each_entry in left]
     notice = pause_text(pause, here, now) if pause is not None else ""
     if args.json:
         rows = [
             {
-                "number": one.id,
-                "part_number": one.part_number,
-                "label": one.label,
-                "path": one.path,
-                "what": parts(one),
+                "number": each_entry.id,
+                "part_number": each_entry.part_number,
+                "label": each_entry.label,
+                "path": each_entry.path,
+                "what": parts(each_entry),
                 "state": said.state,
                 "reason": said.reason,
-                "since": one.taken_at,
-                "server": one.server,
+                "since": each_entry.taken_at,
+                "server": each_entry.server,
                 "needs_a_person": said.urgent,
             }
-            for one, said in told
+            for each_entry, said in queue_rows
         ]
         common.print_json({"pause": notice or None, "commits": rows})
         return
@@ -370,10 +368,10 @@ def _show_queue(
         out.print("Nothing waits: every commit of this computer is in Silo.", markup=False)
         return
     table = Table("", "Commit", "What", "Since", "State", "Why", box=None, pad_edge=False)
-    for one, said in told:
-        name = " ".join(filter(None, (one.part_number, one.label or one.file_name)))
-        since = time.strftime("%Y-%m-%d %H:%M", time.localtime(one.taken_at))
-        cells = (str(one.id), show.plain(name), parts(one), since, said.state, show.plain(said.reason))
+    for entry, said in queue_rows:
+        name = " ".join(filter(None, (entry.part_number, entry.label or entry.file_name)))
+        since = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.taken_at))
+        cells = (str(entry.id), show.plain(name), parts(entry), since, said.state, show.plain(said.reason))
         table.add_row(*map(Text, cells), style="bold" if said.urgent else "")
     out.print(table)
 
@@ -394,7 +392,8 @@ def run_pull(args: argparse.Namespace) -> int:
             learn=lambda sha256, item, number: store.learn(client.base_url, sha256, item, number),
         )
         number = common.named_item(client, args.part_number).part_number
-        with fetched(client, number, args.revision) as tree:
+        progress = lambda name, count: common.at(f"fetching {name}, {counted(count, 'file')} so far")  # noqa: E731
+        with fetched(client, number, args.revision, progress=progress) as tree:
             into.mkdir(parents=True, exist_ok=True)
             pulled = place(tree, into, rules)
     if args.json:
@@ -420,12 +419,12 @@ def _show_pulled(pulled: Pulled, into: Path) -> None:
     from silo.cli import show
 
     out = show.console()
-    for one in pulled.files:
-        mark, style, words = _MARKS[one.state.value]
-        text = Text(f"{mark} ", style).append(show.plain(os.path.relpath(one.path, os.path.realpath(into))))
-        text.append(f"  {one.part_number}, revision {one.revision}", "dim")
+    for file in pulled.files:
+        mark, style, words = _MARKS[file.state.value]
+        text = Text(f"{mark} ", style).append(show.plain(os.path.relpath(file.path, os.path.realpath(into))))
+        text.append(f"  {file.part_number}, revision {file.revision}", "dim")
         if words:
-            text.append(f"  {words}{f' {one.kept}' if one.kept else ''}", style)
+            text.append(f"  {words}{f' {file.kept}' if file.kept else ''}", style)
         out.print(text)
     for lost in pulled.lost:
         line = f"{lost.position}: {lost.path} was not fetched: {lost.reason}"
@@ -434,56 +433,112 @@ def _show_pulled(pulled: Pulled, into: Path) -> None:
 
 
 def run_log(args: argparse.Namespace) -> int:
-    """Print the revisions, newest first."""
-    from silo.fcstd import Library
-    from silo.fcstd.linked import identity_in
+    """Print the revisions, newest first; or what changed in the product."""
     from silo.files import sha256_of
     from silo.outbox.store import Store
     from silo.vault.pull import RevisionBoms, file_revisions, words
 
     path = os.path.realpath(args.file)
+    if args.since:
+        with common.client_of(args) as client:
+            number = args.file
+            if os.path.isfile(path):
+                number = _item_of(client, args.file, _identity(args.file, path)).part_number
+            _show_changes(args, client.get_changes(number, args.since, args.until or ""))
+        return Exit.DONE
     if not os.path.isfile(path):
         raise InputError(f"{args.file} is no file")
+    identity = _identity(args.file, path)
+    with common.client_of(args) as client:
+        item = _item_of(client, args.file, identity)
+        revisions = client.revisions(item.part_number)
+        shown = revisions[: args.limit]
+        here = _revision_on_disk(Store(), sha256_of(path), identity, client.base_url, revisions)
+        changes: dict[int, str] = {}
+        if args.changes:
+            files = file_revisions(revisions)
+            with RevisionBoms(client, item.part_number, path) as boms:
+                for number, revision in enumerate(files):
+                    common.at(f"revision {revision.revision_number}")
+                    if revision.revision_number < shown[-1].revision_number:
+                        break
+                    older = files[number + 1].revision_number if number + 1 < len(files) else None
+                    try:
+                        changes[revision.revision_number] = words(
+                            boms.change(older, revision.revision_number)
+                        )
+                    except SiloError as error:
+                        changes[revision.revision_number] = f"cannot be read: {error}"
+    if args.json:
+        common.print_json(_log_json(item.part_number, shown, here, changes, args.changes))
+    else:
+        _show_log(item.part_number, item.name, shown, here, changes, len(revisions))
+    return Exit.DONE
+
+
+def _identity(name: str, path: str) -> str:
+    from silo.fcstd import Library
+    from silo.fcstd.linked import identity_in
+
     with Library() as library:
         library.open(path)
         identity = identity_in(library, path)
     if not identity:
-        raise InputError(f"{args.file} belongs to no single item in Silo; register it (silo-mod register)")
-    with common.client_of(args) as client:
-        item = client.get_item_by_uuid(identity)
-        if item is None:
-            raise InputError(f"{args.file}: this server has no item {identity}; is it the right server?")
-        known = client.revisions(item.part_number)
-        shown = known[: args.limit]
-        here = _here(Store(), sha256_of(path), identity, client.base_url, known)
-        changes: dict[int, str] = {}
-        if args.bom:
-            files = file_revisions(known)
-            with RevisionBoms(client, item.part_number, path) as boms:
-                for number, one in enumerate(files):
-                    if one.revision_number < shown[-1].revision_number:
-                        break
-                    older = files[number + 1].revision_number if number + 1 < len(files) else None
-                    try:
-                        changes[one.revision_number] = words(boms.change(older, one.revision_number))
-                    except SiloError as error:
-                        changes[one.revision_number] = f"cannot be read: {error}"
+        raise InputError(f"{name} belongs to no single item in Silo; register it (silo-mod register)")
+    return identity
+
+
+def _item_of(client: SiloClient, name: str, identity: str) -> Item:
+    item = client.get_item_by_uuid(identity)
+    if item is None:
+        raise InputError(f"{name}: this server has no item {identity}; is it the right server?")
+    return item
+
+
+def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
     if args.json:
-        common.print_json(_log_json(item.part_number, shown, here, changes, args.bom))
-    else:
-        _show_log(item.part_number, item.name, shown, here, changes, len(known))
-    return Exit.DONE
+        common.print_json(changes.model_dump(mode="json"))
+        return
+    from rich.table import Table
+    from rich.text import Text
+
+    from silo.cli import show
+
+    out = show.console()
+    first, last = (when.strftime("%Y-%m-%d %H:%M") if when else "" for when in (changes.since, changes.to))
+    head = f"{changes.part_number}: what changed from {first} to {last} (UTC)"
+    if not changes.changes:
+        out.print(Text(f"{show.plain(head)}: nothing on any level"))
+        return
+    out.print(Text(show.plain(head), "bold"))
+    table = Table(box=None, pad_edge=False)
+    for title in ("", "Part number", "Name", "In", "Before", "After", "By"):
+        table.add_column(title, overflow="fold")
+    styles = {"added": "green", "removed": "red"}
+    for change in changes.changes:
+        when = f", {change.at:%Y-%m-%d %H:%M}" if change.at else ""
+        cells = (
+            change.part_number,
+            change.name,
+            change.within,
+            change.before,
+            change.after,
+            change.username + when,
+        )
+        what = Text(change.what, styles.get(change.what, "yellow"))
+        table.add_row(what, *(Text(show.plain(cell)) for cell in cells))
+    out.print(table)
 
 
-def _here(
-    store: Store, sha256: str, identity: str, server: str, known: list[Revision]
+def _revision_on_disk(
+    store: Store, sha256: str, identity: str, server: str, revisions: list[Revision]
 ) -> tuple[int | None, bool]:
     """The revision that the file is, or was made from, and whether it has edits since."""
     from silo.api.files import standing
 
     for content, edited in ((sha256, False), (store.origin_of(sha256), True)):
         number = store.known_revision(server, content, identity)
-        if (base := standing(known, content, number).base) is not None:
+        if (base := standing(revisions, content, number).base) is not None:
             return base.revision_number, edited
     return None, True
 
@@ -505,9 +560,9 @@ def _log_json(
         "base_revision",
     }
     rows = []
-    for one in shown:
-        row = one.model_dump(mode="json", include=keys)
-        rows.append({**row, "bom": changes.get(one.revision_number)} if with_bom else row)
+    for revision in shown:
+        row = revision.model_dump(mode="json", include=keys)
+        rows.append({**row, "bom": changes.get(revision.revision_number)} if with_bom else row)
     return {"part_number": number, "file_is": here[0], "edited": here[1], "revisions": rows}
 
 
@@ -527,17 +582,17 @@ def _show_log(
     out.print(Text(show.plain(f"{number}  {name}"), "bold"))
     if here[0] is None:
         out.print(Text("This file is no revision in Silo, and it is not known which one it was made from."))
-    for one in shown:
-        stamp = one.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if one.created_at else ""
-        text = Text(f"{one.revision_number:>4}  ", "cyan")
-        text.append(f"{stamp}  {show.plain(one.created_by or '')}  ", "dim")
-        text.append(show.plain(one.comment) or "(no comment)")
-        if not (one.file_name or one.file_checksum):
+    for revision in shown:
+        stamp = revision.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if revision.created_at else ""
+        text = Text(f"{revision.revision_number:>4}  ", "cyan")
+        text.append(f"{stamp}  {show.plain(revision.created_by or '')}  ", "dim")
+        text.append(show.plain(revision.comment) or "(no comment)")
+        if not (revision.file_name or revision.file_checksum):
             text.append("  properties only", "dim")
-        if one.revision_number == here[0]:
+        if revision.revision_number == here[0]:
             text.append("  ← this file, edited since" if here[1] else "  ← this file", "green")
         out.print(text)
-        if said := changes.get(one.revision_number):
+        if said := changes.get(revision.revision_number):
             out.print(Text(f"      {show.plain(said)}", "yellow"))
     if total > len(shown):
         out.print(Text(f"… and {total - len(shown)} older; --limit shows more", "dim"))

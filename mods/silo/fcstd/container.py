@@ -139,7 +139,7 @@ class FileState(NamedTuple):
             return None
 
 
-class Entry(NamedTuple):
+class ZipEntry(NamedTuple):
     """One file in the container, as the central directory has it. ``offset`` counts from the file's begin."""
 
     name: bytes
@@ -161,7 +161,7 @@ class Directory(NamedTuple):
     shift: int  # bytes before the zip's own begin, which its offsets do not count
     tail: bytes  # end record, comment, and whatever follows
 
-    def entries(self, wanted: bytes | None = None) -> Iterator[Entry]:
+    def entries(self, wanted: bytes | None = None) -> Iterator[ZipEntry]:
         """The entries in directory order, or only those of one name. Raises ValueError where it is
         damaged."""
         raw, position = self.raw, 0
@@ -177,12 +177,12 @@ class Directory(NamedTuple):
         if position > len(raw):
             raise ValueError("its directory is damaged")
 
-    def _entry(self, name: bytes, position: int) -> Entry:
+    def _entry(self, name: bytes, position: int) -> ZipEntry:
         fields = CENTRAL.unpack_from(self.raw, position)
         flags, method, crc, packed, size, offset = fields[3], fields[4], *fields[7:10], fields[16]
         if 0xFFFFFFFF in (packed, size, offset):
             raise ValueError("it is in the ZIP64 format, which FreeCAD does not write")
-        return Entry(name, flags, method, crc, packed, size, offset + self.shift, position)
+        return ZipEntry(name, flags, method, crc, packed, size, offset + self.shift, position)
 
 
 class ContainerFile:
@@ -211,17 +211,17 @@ class ContainerFile:
         """True where somebody wrote into this very file since it was opened."""
         return FileState.of(os.fstat(self._descriptor)) != self.state
 
-    def entry(self, name: bytes) -> Entry | None:
+    def entry(self, name: bytes) -> ZipEntry | None:
         """The entry of this name, None where there is none; two of one name are refused."""
         try:
-            found = list(self.directory.entries(name))
+            entries = list(self.directory.entries(name))
         except ValueError as error:
             raise self._error(str(error)) from error
-        if len(found) > 1:
-            raise self._error(f"it holds {len(found)} entries named {name.decode('ascii', 'replace')}")
-        return found[0] if found else None
+        if len(entries) > 1:
+            raise self._error(f"it holds {len(entries)} entries named {name.decode('ascii', 'replace')}")
+        return entries[0] if entries else None
 
-    def packed(self, entry: Entry, most: int) -> bytes:
+    def packed(self, entry: ZipEntry, most: int) -> bytes:
         """The packed bytes of an entry, at most ``most``."""
         self._check(entry, most)
         # With the local header in one go: its extra field is seldom longer than the directory's.
@@ -231,11 +231,11 @@ class ContainerFile:
         data = whole[begin : begin + entry.packed]
         return data if len(data) == entry.packed else self._read(entry.offset + begin, entry.packed)
 
-    def data_offset(self, entry: Entry) -> int:
+    def data_offset(self, entry: ZipEntry) -> int:
         """Where an entry's packed bytes begin in the file."""
         return entry.offset + self._data_at(entry, self._read(entry.offset, LOCAL.size + len(entry.name)))
 
-    def _data_at(self, entry: Entry, local: bytes) -> int:
+    def _data_at(self, entry: ZipEntry, local: bytes) -> int:
         """Where the data begins, from the local header; which must be that of the same entry."""
         if len(local) < LOCAL.size or not local.startswith(_LOCAL_MARK):
             raise self._error("it is damaged: an entry lies outside its place")
@@ -251,7 +251,7 @@ class ContainerFile:
         """Bytes of the file as it stands."""
         return self._read(offset, length)
 
-    def _check(self, entry: Entry, most: int) -> None:
+    def _check(self, entry: ZipEntry, most: int) -> None:
         name = entry.name.decode("utf-8", "replace")
         if entry.flags & _ENCRYPTED:
             raise self._error(f"its {name} is encrypted")
@@ -275,8 +275,8 @@ class ContainerFile:
         for most in (_SMALL,) if size <= _SMALL else (_USUAL_TAIL, _TAIL):
             begin = max(0, size - most)
             self._window, self._window_at = self._read(begin, size - begin), begin
-            if (found := self._end_record()) is not None:
-                return self._directory_at(*found)
+            if (end := self._end_record()) is not None:
+                return self._directory_at(*end)
         raise self._no_container()
 
     def _end_record(self) -> tuple[int, tuple[int, ...]] | None:
@@ -356,7 +356,7 @@ class Inflater:
     The last step checks length and checksum; a reader that stops earlier has what it read, unchecked.
     """
 
-    def __init__(self, path: str, entry: Entry, packed: bytes, most: int, limits: Limits) -> None:
+    def __init__(self, path: str, entry: ZipEntry, packed: bytes, most: int, limits: Limits) -> None:
         self._path, self._entry, self._packed = path, entry, packed
         self._most, self._limits = most, limits
         self._engine: Any = None

@@ -14,17 +14,16 @@ import os
 import re
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Set
+from contextlib import suppress
 from functools import cache, cached_property, lru_cache
 from struct import Struct
 from typing import TYPE_CHECKING, Any, cast
 
-from silo.bom.document import LinkProblem
 from silo.bom.document import LinkProblem as Problem
 from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
-from silo.bom.walk.kinds import Kind, Survey, kind_by_type, kind_of
-from silo.fcstd.container import ContainerFile, Entry, FcstdError, Inflater
-from silo.fcstd.locate import Found
+from silo.bom.objects import Kind, Survey, kind_by_type, kind_of
+from silo.fcstd.container import ContainerFile, FcstdError, Inflater, ZipEntry
 from silo.fcstd.properties import (
     ABSENT,
     LocalList,
@@ -38,6 +37,7 @@ from silo.fcstd.properties import (
     table_of,
 )
 from silo.fcstd.xmltext import XmlText
+from silo.files import FoundFile
 
 if TYPE_CHECKING:
     from silo.fcstd.library import Content, Library, Remembered
@@ -58,6 +58,8 @@ _KINDS: dict[str, type] = {
     "ScaleVector": Vector,
     "VisibilityList": tuple,
 }
+
+_ALIKE = frozenset({"ElementCount", "LinkCopyOnChange", "Scale", "ScaleVector"})
 
 _ROOT = "App::DocumentObject"
 
@@ -175,15 +177,15 @@ def is_listed(type_name: str) -> bool:
 @lru_cache(maxsize=4096)
 def ancestors(type_name: str) -> frozenset[str]:
     """The type itself and all that it is derived from; unknown types are plain document objects."""
-    found = {type_name, _ROOT}
+    types = {type_name, _ROOT}
     parents = PARENTS.get(type_name)
     if parents is None:
         base = type_name.removesuffix("Python")
         later = _LATER.get(type_name.partition("::")[0])
         parents = [base] if base in PARENTS else [later] if later else []
     for parent in parents:
-        found |= ancestors(parent)
-    return frozenset(found)
+        types |= ancestors(parent)
+    return frozenset(types)
 
 
 @cache
@@ -228,7 +230,7 @@ class FcstdObject:
         """A type that a later FreeCAD added, with the properties of a link array."""
         try:
             self._load()
-        except DocumentError:  # whoever asks for a property of it gets the error
+        except DocumentError:  # a caller that asks for a property of it gets the error
             return False
         numbers = self.properties.numbers
         return "LinkedObject" in numbers and "ElementCount" in numbers
@@ -281,9 +283,9 @@ class FcstdObject:
         mine = self.__dict__
         if "properties" not in mine:
             self._load()
-        if name not in mine["properties"].numbers:
-            return default
-        return mine[name] if name in mine else getattr(self, name, default)
+        if name in mine:
+            return mine[name]
+        return getattr(self, name, default) if name in mine["properties"].numbers else default
 
     def unload(self) -> None:
         """Give back what was read of the object; it is read again when somebody asks."""
@@ -299,28 +301,28 @@ class FcstdObject:
         properties = mine["properties"] = self.Document.properties_of(self)
         mine["PropertiesList"] = properties.names
         mine.update(properties.texts)
-        known = self.Document.values
+        values = self.Document.values
         for name, piece in properties.kept.items():
-            if piece in known:
-                mine[name] = known[piece]
+            if piece in values:
+                mine[name] = values[piece]
+            elif name in _ALIKE:  # most links have the same, and find it here
+                with suppress(DocumentError):
+                    getattr(self, name, None)
         self.Document.was_read(self, properties.size)
 
     def __repr__(self) -> str:
         return f"<{self.TypeId} {self.Name} of {self.Document.FileName}>"
 
     def _value(self, name: str, piece: bytes) -> Any:
-        # A plain link has no elements, so no scales of elements; its entry need not be looked up.
-        if name == "ScaleList" and getattr(self, "ElementCount", None) == 0:
-            return ()
-        known = self.Document.values
-        if (value := known.get(piece, ABSENT)) is not ABSENT:
+        values = self.Document.values
+        if (value := values.get(piece, ABSENT)) is not ABSENT:
             return value
         raw = self.properties.value(name)
         if raw is ABSENT or not isinstance(raw, _KINDS.get(name, object)):
             raise AttributeError(f"{name}: {self.TypeId} {self.Name} has no such property with a plain value")
         value = self._resolved(raw)
         if len(piece) <= _REMEMBER_AT_MOST:
-            known[piece] = value
+            values[piece] = value
         return value
 
     def _resolved(self, value: Any) -> Any:
@@ -373,10 +375,10 @@ class FileSurvey(Survey):
         self._document, self._xml = document, xml
         types = xml.head.types
         self._types = set(types.values())
-        known = {kind: kind_by_type(ancestors(kind)) if is_listed(kind) else None for kind in self._types}
+        kinds = {kind: kind_by_type(ancestors(kind)) if is_listed(kind) else None for kind in self._types}
         self._kinds = {
             name: kind or kind_of(document.object_of(name, types[name]))
-            for name, kind in zip(types, map(known.__getitem__, types.values()), strict=True)
+            for name, kind in zip(types, map(kinds.__getitem__, types.values()), strict=True)
         }
         self._there = set(self._kinds.values())
         self._groups: list[tuple[Kind, tuple[str, ...]]] | None = None
@@ -394,12 +396,12 @@ class FileSurvey(Survey):
     def grouped(self, kinds: Set[Kind]) -> set[str]:
         if self._groups is None:
             types, make = self._xml.head.types, self._document.object_of
-            found = [
+            groups = [
                 (kind, make(name, types[name]).properties.value("Group"))
                 for name in self._xml.mentioning("Group")
                 if (kind := self._kinds.get(name)) is not None
             ]
-            self._groups = [(kind, group.names) for kind, group in found if isinstance(group, LocalList)]
+            self._groups = [(kind, group.names) for kind, group in groups if isinstance(group, LocalList)]
         return {name for kind, names in self._groups if kind in kinds for name in names}
 
     def only(self, kinds: Set[Kind]) -> bool:
@@ -419,7 +421,7 @@ class FcstdDocument:
 
     FileName: str
 
-    def __init__(self, library: Library, found: Found, content: Content | Remembered) -> None:
+    def __init__(self, library: Library, found: FoundFile, content: Content | Remembered) -> None:
         self.FileName = found.real
         self._library, self._found = library, found
         self.content, self.state = content, content.state
@@ -428,7 +430,7 @@ class FcstdDocument:
         self._table: Properties | None = None
         self._objects: dict[str, FcstdObject] = {}
         self._read: deque[FcstdObject] = deque()
-        self._targets: dict[tuple[str, str], FcstdObject | LinkProblem] = {}
+        self._targets: dict[tuple[str, str], FcstdObject | Problem] = {}
         self.values: dict[bytes, Any] = {}
 
     @cached_property
@@ -484,14 +486,14 @@ class FcstdDocument:
 
     def getObject(self, name: str) -> FcstdObject | None:
         """The object of this ``Name`` (never a label), None where there is none."""
-        known = self._objects.get(name)
-        if known is None and (kind := self._type_of(name)) is not None:
-            known = self.object_of(name, kind)
-        return known
+        fcstd_object = self._objects.get(name)
+        if fcstd_object is None and (kind := self._type_of(name)) is not None:
+            fcstd_object = self.object_of(name, kind)
+        return fcstd_object
 
     def _type_of(self, name: str) -> str | None:
-        known = self.content.known
-        kind = known.type_of(name) if known is not None else None
+        remembered = self.content.known
+        kind = remembered.type_of(name) if remembered is not None else None
         return kind or self._xml.head.types.get(name)
 
     def getPropertyByName(self, name: str) -> Any:
@@ -540,40 +542,40 @@ class FcstdDocument:
     def folders(self) -> tuple[str, ...]:
         """Where the paths of links begin: the folder as the file was opened, then the one without
         symlinks."""
-        found = self._found
-        return tuple(dict.fromkeys((os.path.dirname(found.opened), os.path.dirname(found.real))))
+        location = self._found
+        return tuple(dict.fromkeys((os.path.dirname(location.opened), os.path.dirname(location.real))))
 
     def check(self, target: FcstdObject) -> None:
         """Make sure that what a walker asks of a link's target can be read. Raises DocumentError."""
-        known = self.content.known
-        if known is not None and target.Name in known.sound:
+        remembered = self.content.known
+        if remembered is not None and target.Name in remembered.sound:
             return
         # Facts are those of a file that was read to its end.
-        if known is None and not _CONTAINERS.isdisjoint(ancestors(target.TypeId)):
+        if remembered is None and not _CONTAINERS.isdisjoint(ancestors(target.TypeId)):
             self._xml.complete()
         numbers = target.properties.numbers
         for name in _SAID_OF_ITSELF:
             if name in numbers:
                 getattr(target, name, None)
         _ = target.Label, self.Meta, self._value("SiloUUID")
-        if known is not None:
-            known.sound.add(target.Name)
+        if remembered is not None:
+            remembered.sound.add(target.Name)
 
     @property
     def properties(self) -> Properties:
         """The property table of the document itself."""
         if self._table is None:
-            known = self.content.known
-            if known is None:
+            remembered = self.content.known
+            if remembered is None:
                 self._table = Properties(self._xml, self._xml.head.properties, "")
             else:
-                self._table = known.document
+                self._table = remembered.document
         return self._table
 
     def properties_of(self, obj: FcstdObject) -> Properties:
         """The property table of an object of this document."""
-        known = self.content.known
-        table = known.table(obj.Name) if known is not None else None
+        remembered = self.content.known
+        table = remembered.table(obj.Name) if remembered is not None else None
         return table or table_of(self._xml, obj.Name, obj.TypeId)
 
     def members(self, names: Collection[str]) -> tuple[FcstdObject, ...]:
@@ -588,13 +590,13 @@ class FcstdDocument:
         """The object that a link means, None where it is unset or broken."""
         if not ref.file and (local := self._objects.get(ref.name)) is not None:
             return local
-        found = self._target(ref)
-        return found if isinstance(found, FcstdObject) else None
+        fcstd_object = self._target(ref)
+        return fcstd_object if isinstance(fcstd_object, FcstdObject) else None
 
-    def problem_of(self, ref: Ref) -> LinkProblem | None:
+    def problem_of(self, ref: Ref) -> Problem | None:
         """Why ``resolve`` gives None."""
-        found = self._target(ref)
-        return found if isinstance(found, LinkProblem) else None
+        problem = self._target(ref)
+        return problem if isinstance(problem, Problem) else None
 
     def imported(self, file: str) -> Any:
         """The part that A2plus imported from a file, or why there is none (a LinkProblem)."""
@@ -632,7 +634,7 @@ class FcstdDocument:
         return hashlib.sha256(body).hexdigest()
 
     @cached_property
-    def _entries(self) -> dict[bytes, Entry]:
+    def _entries(self) -> dict[bytes, ZipEntry]:
         try:
             return {entry.name: entry for entry in self.content.directory.entries()}
         except ValueError as error:
@@ -648,28 +650,28 @@ class FcstdDocument:
 
     def object_of(self, name: str, kind: str) -> FcstdObject:
         """The object of this name and type."""
-        known = self._objects.get(name)
-        if known is None:
-            known = self._objects[name] = FcstdObject(self, name, kind)
-        return known
+        fcstd_object = self._objects.get(name)
+        if fcstd_object is None:
+            fcstd_object = self._objects[name] = FcstdObject(self, name, kind)
+        return fcstd_object
 
-    def _target(self, ref: Ref) -> FcstdObject | LinkProblem:
+    def _target(self, ref: Ref) -> FcstdObject | Problem:
         key = (ref.file, ref.name)
-        known = self._targets.get(key)
-        if known is None:
-            known = self._targets[key] = self._find_target(ref)
-        return known
+        target = self._targets.get(key)
+        if target is None:
+            target = self._targets[key] = self._find_target(ref)
+        return target
 
-    def _find_target(self, ref: Ref) -> FcstdObject | LinkProblem:
+    def _find_target(self, ref: Ref) -> FcstdObject | Problem:
         if not ref.name:
             code = FindingCode.MISSING_OBJECT if ref.file else FindingCode.UNSET_LINK
-            return LinkProblem(code, ref.file)
+            return Problem(code, ref.file)
         if ref.file:
             return self._library.follow(self, ref)
-        found = self.getObject(ref.name)
-        return found or LinkProblem(FindingCode.MISSING_OBJECT, "", ref.name)
+        fcstd_object = self.getObject(ref.name)
+        return fcstd_object or Problem(FindingCode.MISSING_OBJECT, "", ref.name)
 
-    def _side_entry(self, entry: Entry) -> bytes:
+    def _side_entry(self, entry: ZipEntry) -> bytes:
         limits = self._xml.limits
         with ContainerFile(self.FileName, limits) as container:
             if container.state != self.state:

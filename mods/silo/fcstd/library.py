@@ -21,12 +21,12 @@ from typing import Any, ClassVar, NamedTuple
 from silo.bom.document import LinkProblem
 from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode
-from silo.bom.walk.kinds import Kind
+from silo.bom.objects import Kind
 from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FcstdError, FileState, Limits
 from silo.fcstd.document import FcstdDocument, FcstdObject
-from silo.fcstd.locate import Found, Locator, NotFound
 from silo.fcstd.properties import ABSENT, Properties, Ref, Text, table_of
-from silo.fcstd.xmltext import Shared, XmlText
+from silo.fcstd.xmltext import SharedTexts, XmlText
+from silo.files import FoundFile, Locator, NotFound
 
 # Which objects of a file its facts describe: what may be a component, but no features of a body.
 _TARGETS = frozenset(Kind) - {Kind.NOTHING, Kind.FOLDER, Kind.LINK, Kind.ASSEMBLY_LINK, Kind.ELEMENT}
@@ -38,7 +38,7 @@ _NOT_OF_TARGETS = frozenset({"ElementList", "Group"})
 _ENCODER = json.JSONEncoder(separators=(",", ":"))
 
 
-class Facts(NamedTuple):
+class FileFacts(NamedTuple):
     """The facts of a file. Goes through JSON.
 
     document
@@ -65,7 +65,7 @@ def facts_of(document: FcstdDocument) -> str:
         targets = survey.of(_TARGETS, survey.grouped({Kind.LOCAL}))[:_TARGETS_AT_MOST]
         objects = {obj.Name: (obj.TypeId, *_to_keep(obj.properties)) for obj, _ in targets}
         own = _to_keep(document.properties)
-        facts = Facts(content.digest, content.state, content.changed_ns, content.read_ns, own, objects)
+        facts = FileFacts(content.digest, content.state, content.changed_ns, content.read_ns, own, objects)
     except (FcstdError, UnicodeDecodeError):  # who asks for it gets the error
         return ""
     return _ENCODER.encode(facts)
@@ -100,14 +100,18 @@ class Remembered:
         *("sound", "state"),
     )
 
-    def __init__(self, path: str, facts: str, contents: Contents) -> None:
+    def __init__(self, path: str, facts: str, contents: FileContents) -> None:
         self._path, self._contents = path, contents
-        known = Facts(*json.loads(facts))
-        self.digest, self.changed_ns, self.read_ns = known.digest, known.changed_ns, known.read_ns
-        self.state = FileState(*known.state)
-        self._objects = dict(known.objects)
+        file_facts = FileFacts(*json.loads(facts))
+        self.digest, self.changed_ns, self.read_ns = (
+            file_facts.digest,
+            file_facts.changed_ns,
+            file_facts.read_ns,
+        )
+        self.state = FileState(*file_facts.state)
+        self._objects = dict(file_facts.objects)
         self._tables: dict[str, _Kept] = {}
-        self.document: Properties = _Kept(self, "", "", *known.document)
+        self.document: Properties = _Kept(self, "", "", *file_facts.document)
         self.sound: set[str] = set()
 
     @property
@@ -123,15 +127,15 @@ class Remembered:
     def table(self, name: str) -> _Kept | None:
         """The table of an object, made once; None where nothing is known of it."""
         table = self._tables.get(name)
-        if table is None and (known := self._objects.pop(name, None)) is not None:
-            table = self._tables[name] = _Kept(self, name, *known)
+        if table is None and (rows_of_object := self._objects.pop(name, None)) is not None:
+            table = self._tables[name] = _Kept(self, name, *rows_of_object)
         return table
 
     def _content(self) -> Content:
-        found = self._contents.read(self._path)
-        if found.digest != self.digest:
+        content = self._contents.read(self._path)
+        if content.digest != self.digest:
             raise FcstdError(self._path, "it is being written just now; try again", state=self.state)
-        return found
+        return content
 
     @property
     def xml(self) -> XmlText:
@@ -238,7 +242,7 @@ class Content:
         return self.xml.packed_size + 2 * len(self.directory.raw) + 300 * self.directory.entry_count
 
 
-class Contents:
+class FileContents:
     """The contents of files for several sessions, one after the other: a file that many assemblies use is
     read once. Those that were not asked for longest are forgotten first.
 
@@ -258,7 +262,7 @@ class Contents:
         self.limits = limits or Limits()
         self._instead = dict(instead or {})
         self._clock = clock
-        self.shared = Shared(self.limits.resident)
+        self.shared = SharedTexts(self.limits.resident)
         self.reads = 0
         self._known: OrderedDict[str, Content] = OrderedDict()
         self._remembered: OrderedDict[tuple[str, str], Remembered] = OrderedDict()
@@ -266,13 +270,13 @@ class Contents:
 
     def read(self, path: str) -> Content:
         """The content of a file. Raises FcstdError."""
-        if (known := self._known.get(path)) is not None:
+        if (result := self._known.get(path)) is not None:
             self._known.move_to_end(path)
-            return known
-        found = self._read(path)
+            return result
+        content = self._read(path)
         self.reads += 1
-        self._keep(path, found)
-        return found
+        self._keep(path, content)
+        return content
 
     def _keep(self, path: str, content: Content) -> None:
         if (before := self._known.pop(path, None)) is not None:
@@ -285,12 +289,12 @@ class Contents:
 
     def remembered(self, path: str, facts: str) -> Remembered:
         """The content of a file of which facts are known."""
-        found = self._remembered.get((path, facts))
-        if found is None:
-            found = self._remembered[path, facts] = Remembered(path, facts, self)
+        result = self._remembered.get((path, facts))
+        if result is None:
+            result = self._remembered[path, facts] = Remembered(path, facts, self)
             if len(self._remembered) > _REMEMBERED_AT_MOST:
                 self._remembered.popitem(last=False)
-        return found
+        return result
 
     def add(self, path: str, content: Content) -> None:
         """Take what another process has read."""
@@ -325,7 +329,7 @@ class Library:
         what was taken in another way than recorded (a file name in other case), in plain words.
     documents, lookups
         all that this session has read, and each path of a link that it followed with where that led: what was
-        found out in it depends on these and on nothing else.
+        known from it depends on these and on nothing else.
 
     No file stays open; closing (or leaving the ``with`` block) only gives memory back.
     """
@@ -334,16 +338,16 @@ class Library:
         self,
         root: Path | str | None = None,
         limits: Limits | None = None,
-        contents: Contents | None = None,
+        contents: FileContents | None = None,
         locator: Locator | None = None,
         facts: Callable[[str], str] = lambda _path: "",
     ) -> None:
         self.limits = limits or Limits()
         self.notes: list[str] = []
         self.documents: dict[str, FcstdDocument | FcstdError] = {}
-        self.lookups: dict[tuple[tuple[str, ...], str], Found | NotFound] = {}
+        self.lookups: dict[tuple[tuple[str, ...], str], FoundFile | NotFound] = {}
         self._locator = locator or Locator(None if root is None else os.fspath(root))
-        self._contents = contents or Contents(self.limits)
+        self._contents = contents or FileContents(self.limits)
         self._facts = facts
 
     def __enter__(self) -> Library:
@@ -355,13 +359,13 @@ class Library:
     def close(self) -> None:
         """Forget all documents."""
         self.documents.clear()
-        self._contents = Contents(self.limits)
+        self._contents = FileContents(self.limits)
 
     def dissolve(self) -> None:
         """Forget all documents and take them apart: no object of them can be used any more.
 
-        Documents and their objects refer to each other. Whoever has thousands of sessions need not wait until
-        Python finds such rings.
+        Documents and their objects refer to each other. A program with thousands of sessions need not wait
+        until Python finds such rings.
         """
         for document in self.documents.values():
             if isinstance(document, FcstdDocument):
@@ -373,38 +377,38 @@ class Library:
         opened = os.path.abspath(path)
         real = self._locator.real(opened)
         if opened != real:  # a symlink may lead elsewhere tomorrow
-            self.lookups[(os.path.dirname(opened),), os.path.basename(opened)] = Found(opened, real)
+            self.lookups[(os.path.dirname(opened),), os.path.basename(opened)] = FoundFile(opened, real)
         if not self._locator.inside(real):
             raise FcstdError(
                 real,
                 f"it lies outside {self._locator.root}, the folder that may be read",
                 FindingCode.OUTSIDE_ROOT,
             )
-        document = self._document(Found(opened, real))
+        document = self._document(FoundFile(opened, real))
         document.complete()
         return document
 
     def glance(self, path: Path | str) -> FcstdDocument:
         """The document in a file, of which only as much is read as is asked for. Raises DocumentError."""
         opened = os.path.abspath(path)
-        return self._document(Found(opened, self._locator.real(opened)))
+        return self._document(FoundFile(opened, self._locator.real(opened)))
 
     def follow(self, owner: FcstdDocument, ref: Ref) -> FcstdObject | LinkProblem:
         """The object that a link in ``owner`` means, or why there is none. Never raises for a broken link."""
-        found = self._locator.find(ref.file, owner.folders)
-        self.lookups[owner.folders, ref.file] = found
-        if isinstance(found, NotFound):
-            return LinkProblem(found.code, ref.file, ref.name, found.detail)
+        location = self._locator.find(ref.file, owner.folders)
+        self.lookups[owner.folders, ref.file] = location
+        if isinstance(location, NotFound):
+            return LinkProblem(location.code, ref.file, ref.name, location.detail)
         try:
-            document = self._document(found)
+            document = self._document(location)
             target = document.getObject(ref.name)
             if target is None:
                 return LinkProblem(FindingCode.MISSING_OBJECT, ref.file, ref.name)
             document.check(target)
         except FcstdError as error:
             return LinkProblem(error.finding, ref.file, ref.name, error.reason)
-        if found.respelt:
-            self._note_respelt(owner, ref, found)
+        if location.respelt:
+            self._note_respelt(owner, ref, location)
         return target
 
     def imported(self, owner: FcstdDocument, file: str) -> object:
@@ -415,13 +419,13 @@ class Library:
         from silo.bom.roots import choose_assembly
 
         for recorded in dict.fromkeys((file, os.path.basename(file))):
-            found = self.lookups[owner.folders, recorded] = self._locator.find(recorded, owner.folders)
-            if isinstance(found, Found):
+            location = self.lookups[owner.folders, recorded] = self._locator.find(recorded, owner.folders)
+            if isinstance(location, FoundFile):
                 break
-        if isinstance(found, NotFound):
-            return LinkProblem(found.code, file, "", found.detail)
+        if isinstance(location, NotFound):
+            return LinkProblem(location.code, file, "", location.detail)
         try:
-            document = self._document(found)
+            document = self._document(location)
             document.complete()
             return choose_assembly(document)
         except FcstdError as error:
@@ -429,32 +433,34 @@ class Library:
         except InputError as error:
             return LinkProblem(FindingCode.BROKEN_LINK, file, "", str(error))
 
-    def _document(self, found: Found) -> FcstdDocument:
-        known = self.documents.get(found.real)
-        if known is None:
-            known = self.documents[found.real] = self._load(found)
-        if isinstance(known, FcstdError):
-            raise FcstdError(known.path, known.reason, known.finding, known.state)
-        return known
+    def _document(self, location: FoundFile) -> FcstdDocument:
+        document = self.documents.get(location.real)
+        if document is None:
+            document = self.documents[location.real] = self._load(location)
+        if isinstance(document, FcstdError):
+            raise FcstdError(document.path, document.reason, document.finding, document.state)
+        return document
 
-    def _load(self, found: Found) -> FcstdDocument | FcstdError:
+    def _load(self, location: FoundFile) -> FcstdDocument | FcstdError:
         if len(self.documents) >= self.limits.documents:
-            return FcstdError(found.real, f"more than {self.limits.documents} files are not read in one go")
-        if facts := self._facts(found.real):
-            return FcstdDocument(self, found, self._contents.remembered(found.real, facts))
+            return FcstdError(
+                location.real, f"more than {self.limits.documents} files are not read in one go"
+            )
+        if facts := self._facts(location.real):
+            return FcstdDocument(self, location, self._contents.remembered(location.real, facts))
         try:
             try:
-                return FcstdDocument(self, found, self._contents.read(found.real))
+                return FcstdDocument(self, location, self._contents.read(location.real))
             except FcstdError as error:
                 # FreeCAD may just be writing it; if nobody is, a second look is the same as the first.
-                if error.state is None or error.state == FileState.now(found.real):
+                if error.state is None or error.state == FileState.now(location.real):
                     raise
-                return FcstdDocument(self, found, self._contents.read(found.real))
+                return FcstdDocument(self, location, self._contents.read(location.real))
         except FcstdError as error:
             return error
 
-    def _note_respelt(self, owner: FcstdDocument, ref: Ref, found: Found) -> None:
-        name = os.path.basename(found.real)
+    def _note_respelt(self, owner: FcstdDocument, ref: Ref, location: FoundFile) -> None:
+        name = os.path.basename(location.real)
         differs = "which differs in case or Unicode form only"
         note = f"{owner.FileName} records {ref.file}; taken was {name}, {differs}"
         if note not in self.notes:

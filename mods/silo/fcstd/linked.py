@@ -4,7 +4,7 @@
 A file that is sent to Silo takes this along, so that the whole tree can be fetched again with every file in
 its place. All links count, also those of components that are not in the BOM.
 
-FreeCAD has no way to mend a link whose target has moved but to make it anew, which loses placements and
+FreeCAD has no way to mend a link whose target has moved but to make it again, which loses placements and
 joints. Here only the recorded path changes: object, sub-names and the rest of the file stay as they are.
 
 Which file was meant, where one is missing: files move, and are renamed.
@@ -33,7 +33,6 @@ from silo.bom.model import Extraction, identity_of, walk_entries
 from silo.fcstd.container import ContainerFile, Limits
 from silo.fcstd.document import FcstdDocument
 from silo.fcstd.library import Library
-from silo.fcstd.locate import Found, Locator
 from silo.fcstd.stamp import (
     check_writable,
     document_xml,
@@ -43,7 +42,7 @@ from silo.fcstd.stamp import (
     replaced_entry,
 )
 from silo.fcstd.xmltext import Malformed, as_utf8, start_tags
-from silo.files import Project, content_hash
+from silo.files import FoundFile, Locator, Project, content_hash
 from silo.platform import folded
 
 TAGS = frozenset({"XLink", "XLinkSub"})
@@ -62,7 +61,7 @@ class Linked:
 
 
 @dataclass(frozen=True)
-class Place:
+class ProjectPlace:
     """Where a file is, relative to its project or to the folder that holds it and all that it links to; and
     those links."""
 
@@ -82,13 +81,13 @@ def recorded_paths(path: Path | str) -> tuple[str, ...]:
         _, text = document_xml(container, limits)
     try:
         tags = start_tags(as_utf8(text), limits.depth, TAGS)
-        found = {attributes.get("file", "").replace("\\", "/"): None for _, attributes in tags}
+        paths = {attributes.get("file", "").replace("\\", "/"): None for _, attributes in tags}
     except Malformed as error:
         raise DocumentError(name, f"its Document.xml {error}") from error
-    return tuple(path for path in found if path)
+    return tuple(path for path in paths if path)
 
 
-def place_of(content: Path | str, path: str) -> Place:
+def place_of(content: Path | str, path: str) -> ProjectPlace:
     """What is to be known of a file for fetching its tree again. Raises DocumentError.
 
     content
@@ -96,7 +95,7 @@ def place_of(content: Path | str, path: str) -> Place:
     """
     folder = os.path.dirname(path)
     locator = Locator()
-    found: list[Linked] = []
+    places: list[Linked] = []
     project = Project.of(path)
     files = project.files() if project is not None else {}
 
@@ -104,20 +103,20 @@ def place_of(content: Path | str, path: str) -> Place:
         return (project.place(of) if project is not None else None) or ""
 
     def kept(of: str) -> str:
-        known = files.get(place(of))
-        return known.document if known is not None else ""
+        file = files.get(place(of))
+        return file.document if file is not None else ""
 
     reached = [os.path.abspath(path)]
     with Library() as library:
         for recorded in recorded_paths(content):
             target = locator.find(recorded, (folder,))
-            if not isinstance(target, Found):
-                found.append(Linked(recorded))
+            if not isinstance(target, FoundFile):
+                places.append(Linked(recorded))
                 continue
             reached.append(os.path.normpath(os.path.join(folder, recorded)))
             item = identity_in(library, target.real)
-            found.append(Linked(recorded, item, _hash(target.real), "" if item else kept(target.real)))
-    return Place(place(path) or _below(reached), tuple(found))
+            places.append(Linked(recorded, item, _hash(target.real), "" if item else kept(target.real)))
+    return ProjectPlace(place(path) or _below(reached), tuple(places))
 
 
 def identity_in(library: Library, path: str) -> str:
@@ -179,16 +178,18 @@ def relink(
     """
     old, target = os.path.abspath(old), os.path.realpath(new)
     limits = Limits()
-    found = [one for path in dict.fromkeys(map(os.path.realpath, paths)) if (one := _look(path, old, limits))]
-    _check_target(found, old, target, limits)
-    for one in found:
-        check_writable(one.path)
+    result = [
+        link for path in dict.fromkeys(map(os.path.realpath, paths)) if (link := _look(path, old, limits))
+    ]
+    _check_target(result, old, target, limits)
+    for link in result:
+        check_writable(link.path)
         if not dry_run:
-            check(one.path)
+            check(link.path)
     if not dry_run:
-        for one in found:
-            _mend(one, old, target, limits)
-    return found
+        for link in result:
+            _mend(link, old, target, limits)
+    return result
 
 
 def _look(path: str, old: str, limits: Limits) -> Relinked | None:
@@ -210,34 +211,34 @@ def _records(text: bytes, path: str, file: str, limits: Limits) -> Iterator[_Rec
     folder, wanted = os.path.dirname(path), {file, os.path.realpath(file)}
     for at, attributes in start_tags(text, limits.depth, TAGS):
         recorded = attributes.get("file", "")
-        if recorded and not wanted.isdisjoint(_meant(recorded, folder)):
+        if recorded and not wanted.isdisjoint(_spellings(recorded, folder)):
             yield _Record(at, attributes.get("name", ""))
 
 
-def _meant(recorded: str, folder: str) -> Iterator[str]:
+def _spellings(recorded: str, folder: str) -> Iterator[str]:
     for spelling in {recorded, recorded.replace("\\", "/")}:
         yield os.path.normpath(os.path.join(folder, spelling))
 
 
-def _check_target(found: list[Relinked], old: str, target: str, limits: Limits) -> None:
+def _check_target(relinked_files: list[Relinked], old: str, target: str, limits: Limits) -> None:
     with Library(limits=limits) as library:
         document = library.open(target)
-        wanted = sorted({name for one in found for name in one.objects})
+        wanted = sorted({name for file in relinked_files for name in file.objects})
         lacking = [name for name in wanted if document.getObject(name) is None]
     if lacking:
         raise InputError(
             f"{target} does not hold what the links to {old} want: {listed(lacking)}; nothing was changed"
         )
-    if any(one.path == target for one in found):
+    if any(file.path == target for file in relinked_files):
         raise InputError(f"{target} would link to itself; nothing was changed")
 
 
-def _mend(one: Relinked, old: str, target: str, limits: Limits) -> None:
-    recorded = os.path.relpath(target, os.path.dirname(one.path)).replace(os.sep, "/")
+def _mend(relinked: Relinked, old: str, target: str, limits: Limits) -> None:
+    recorded = os.path.relpath(target, os.path.dirname(relinked.path)).replace(os.sep, "/")
 
     def edit(text: bytes) -> bytes:
         parts, begin = [], 0
-        for record in _records(text, one.path, old, limits):
+        for record in _records(text, relinked.path, old, limits):
             attribute = _FILE.search(text, record.at)
             if attribute is None:
                 raise Malformed("has a link that cannot be edited")
@@ -245,16 +246,16 @@ def _mend(one: Relinked, old: str, target: str, limits: Limits) -> None:
             begin = attribute.end()
         return b"".join((*parts, text[begin:]))
 
-    with ContainerFile(one.path, limits) as container:
+    with ContainerFile(relinked.path, limits) as container:
         state = container.state
         content = replaced_entry(container, *edited_xml(container, edit, limits))
         _, text = document_xml(container, limits)
-    before = sum(1 for _ in _records(text, one.path, target, limits))
+    before = sum(1 for _ in _records(text, relinked.path, target, limits))
 
-    replace_file(one.path, state, content, lambda copy: read_back(one, copy, old, target, before))
+    replace_file(relinked.path, state, content, lambda copy: read_back(relinked, copy, old, target, before))
 
 
-def read_back(one: Relinked, copy: str, old: str, target: str, before: int) -> None:
+def read_back(relinked: Relinked, copy: str, old: str, target: str, before: int) -> None:
     """Raise DocumentError unless the mended copy can be read and holds the links as they are to be.
 
     before
@@ -267,8 +268,8 @@ def read_back(one: Relinked, copy: str, old: str, target: str, before: int) -> N
         _, text = document_xml(container, limits)
     left = sum(1 for _ in _records(text, copy, old, limits))
     now = sum(1 for _ in _records(text, copy, target, limits))
-    if left or now != before + one.links:
-        raise DocumentError(one.path, "the mended copy does not hold the new links; nothing was written")
+    if left or now != before + relinked.links:
+        raise DocumentError(relinked.path, "the mended copy does not hold the new links; nothing was written")
 
 
 # A project has some hundreds of files; a home folder taken for one would have many more.
@@ -300,12 +301,14 @@ def with_suggestions(
     with Library() as library:
         files = _project_files(extraction) if files is None else files
         project = _Project(library, list(files), identities or {})
-        meant = {file: found for file, one in lost.items() if (found := project.meant(one))}
-    findings = tuple(_told(finding, meant, extraction) for finding in extraction.findings)
+        meant = {file: path for file, lost_link in lost.items() if (path := project.meant(lost_link))}
+    findings = tuple(_with_suggestion(finding, meant, extraction) for finding in extraction.findings)
     return replace(extraction, findings=findings)
 
 
-def _told(finding: Finding, meant: Mapping[str, tuple[str, str]], extraction: Extraction) -> Finding:
+def _with_suggestion(
+    finding: Finding, meant: Mapping[str, tuple[str, str]], extraction: Extraction
+) -> Finding:
     if finding.code not in _CODES or finding.file not in meant:
         return finding
     file, why = meant[finding.file]
@@ -319,10 +322,10 @@ def _told(finding: Finding, meant: Mapping[str, tuple[str, str]], extraction: Ex
 
 
 def _lost(extraction: Extraction) -> dict[str, _Lost]:
-    told = {finding.file for finding in extraction.findings if finding.code in _CODES and finding.file}
+    files = {finding.file for finding in extraction.findings if finding.code in _CODES and finding.file}
     lost: dict[str, _Lost] = {}
     for entry in walk_entries(extraction.entries):
-        if entry.missing and entry.doc_path in told:
+        if entry.missing and entry.doc_path in files:
             lost.setdefault(entry.doc_path, _Lost(entry.doc_path)).objects.add(entry.object_name)
     return lost
 
@@ -395,5 +398,5 @@ class _Project:
         )
 
 
-def _same_name(one: str, other: str) -> bool:
-    return folded(os.path.basename(one)) == folded(os.path.basename(other.replace("\\", "/")))
+def _same_name(name: str, other: str) -> bool:
+    return folded(os.path.basename(name)) == folded(os.path.basename(other.replace("\\", "/")))

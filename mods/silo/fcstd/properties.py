@@ -22,7 +22,7 @@ from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from silo.fcstd import xmltext
-from silo.fcstd.xmltext import Malformed, Node, Span, XmlText
+from silo.fcstd.xmltext import Malformed, Span, XmlElement, XmlText
 
 
 class _Absent:
@@ -97,8 +97,8 @@ class SideEntry(NamedTuple):
 
 
 def _integer(text: str) -> Any:
-    found = _INTEGER.match(text)
-    return int(found[1]) if found else ABSENT
+    match = _INTEGER.match(text)
+    return int(match[1]) if match else ABSENT
 
 
 def _float(text: str) -> Any:
@@ -108,63 +108,63 @@ def _float(text: str) -> Any:
         return ABSENT
 
 
-def _text(node: Node, _: str) -> Any:
+def _text(node: XmlElement, _: str) -> Any:
     return node.attributes.get("value", ABSENT)
 
 
-def _vector(node: Node, _: str) -> Any:
+def _vector(node: XmlElement, _: str) -> Any:
     parts = [_float(node.attributes.get(f"value{axis}", "")) for axis in "XYZ"]
     return ABSENT if ABSENT in parts else Vector(*parts)
 
 
-def _bools(node: Node, _: str) -> Any:
+def _bools(node: XmlElement, _: str) -> Any:
     # boost::dynamic_bitset writes its last element first.
     bits = node.attributes.get("value", "")
     return tuple(bit == "1" for bit in reversed(bits)) if set(bits) <= {"0", "1"} else ABSENT
 
 
-def _texts(node: Node) -> tuple[str, ...]:
+def _texts(node: XmlElement) -> tuple[str, ...]:
     return tuple(child.attributes.get("value", "") for child in node.children)
 
 
-def _integers(node: Node, _: str) -> Any:
-    found = tuple(_integer(child.attributes.get("v", "")) for child in node.children)
-    return ABSENT if ABSENT in found else found
+def _integers(node: XmlElement, _: str) -> Any:
+    numbers = tuple(_integer(child.attributes.get("v", "")) for child in node.children)
+    return ABSENT if ABSENT in numbers else numbers
 
 
-def _map(node: Node, _: str) -> dict[str, str]:
+def _map(node: XmlElement, _: str) -> dict[str, str]:
     items = (child.attributes for child in node.children if child.tag == "Item")
     return {a["key"]: a.get("value", "") for a in items if "key" in a}
 
 
-def _class(node: Node) -> Any:
+def _class(node: XmlElement) -> Any:
     """The class of a Python object, which is not made here: (module, name)."""
     module = node.attributes.get("module", "")
     return (module, node.attributes.get("class", "")) if module else ABSENT
 
 
-def _subs(node: Node) -> tuple[str, ...]:
+def _subs(node: XmlElement) -> tuple[str, ...]:
     if "sub" in node.attributes:
         return (node.attributes["sub"],)
     return tuple(child.attributes.get("value", "") for child in node.children if child.tag == "Sub")
 
 
-def _xlink(node: Node, kind: str) -> Ref:
+def _xlink(node: XmlElement, kind: str) -> Ref:
     style = Style.PAIR if kind.startswith("App::PropertyXLinkSub") else Style.LOOSE
     return Ref(node.attributes.get("file", ""), node.attributes.get("name", ""), _subs(node), style)
 
 
-def _link_sub(node: Node, _: str) -> Ref:
+def _link_sub(node: XmlElement, _: str) -> Ref:
     return Ref("", node.attributes.get("value", ""), _subs(node), Style.PAIR)
 
 
-def _xlinks(node: Node, kind: str) -> RefList:
+def _xlinks(node: XmlElement, kind: str) -> RefList:
     style = Style.PLAIN if kind.startswith("App::PropertyXLinkList") else Style.MEMBER
-    found = (_xlink(child, "") for child in node.children if child.tag == "XLink")
-    return RefList(tuple(Ref(ref.file, ref.name, ref.subs, style) for ref in found))
+    refs = (_xlink(child, "") for child in node.children if child.tag == "XLink")
+    return RefList(tuple(Ref(ref.file, ref.name, ref.subs, style) for ref in refs))
 
 
-def _link_subs(node: Node, _: str) -> RefList:
+def _link_subs(node: XmlElement, _: str) -> RefList:
     return RefList(tuple(_grouped(child.attributes for child in node.children if child.tag == "Link")))
 
 
@@ -181,7 +181,7 @@ def _grouped(links: Iterable[dict[str, str]]) -> Iterable[Ref]:
         yield Ref("", name, tuple(subs), Style.MEMBER)
 
 
-_READERS: dict[str, Callable[[Node, str], Any]] = {
+_READERS: dict[str, Callable[[XmlElement, str], Any]] = {
     "String": _text,
     "Uuid": _text,
     "Path": _text,
@@ -205,7 +205,7 @@ _READERS: dict[str, Callable[[Node, str], Any]] = {
 }
 
 
-def value_of(prop: Node) -> Any:
+def value_of(prop: XmlElement) -> Any:
     """The plain value of a ``<Property>`` element; ABSENT where it has none."""
     if not prop.children:
         return ABSENT
@@ -218,7 +218,7 @@ def value_of(prop: Node) -> Any:
     return value
 
 
-def _enumeration(prop: Node, index: int) -> Any:
+def _enumeration(prop: XmlElement, index: int) -> Any:
     names: tuple[str, ...] = _ENUMERATIONS.get(prop.attributes.get("name", ""), ())
     for child in prop.children[1:]:
         if child.tag == "CustomEnumList":
@@ -309,13 +309,13 @@ class Properties:
             shape, pieces = self._careful_cut()
         else:
             pieces = xml.text[span[0] : span[1]].split(_CUT)
-            known = xml.shared.shapes.get((kind, len(pieces)))
+            known_shape = xml.shared.shapes.get((kind, len(pieces)))
             if (
-                known is not None
-                and pieces[0].endswith(known.opening)
-                and all(map(bytes.startswith, pieces, known.prefixes))
+                known_shape is not None
+                and pieces[0].endswith(known_shape.opening)
+                and all(map(bytes.startswith, pieces, known_shape.prefixes))
             ):
-                shape = known
+                shape = known_shape
             else:
                 shape, pieces = self._other_shape(pieces, kind)
         self.names, self.numbers = shape.names, shape.numbers
@@ -347,12 +347,12 @@ class Properties:
             return {} if plain[1] is None else self._decode(plain[1])
         if (members := _MEMBERS.match(piece)) is not None:
             return LocalList(tuple(_MEMBER.findall(self._decode(members[1]))))
-        if (found := _CANONICAL.match(piece)) is None:
+        if (match := _CANONICAL.match(piece)) is None:
             return None
-        name, kind, tag, attributes, inner = (self._decode(part or b"") for part in found.groups())
-        children = [Node(child, dict(_ATTRIBUTE.findall(own))) for child, own in _CHILD.findall(inner)]
-        value = Node(tag, dict(_ATTRIBUTE.findall(attributes)), children)
-        return value_of(Node("Property", {"name": name, "type": kind}, [value]))
+        name, kind, tag, attributes, inner = (self._decode(part or b"") for part in match.groups())
+        children = [XmlElement(child, dict(_ATTRIBUTE.findall(own))) for child, own in _CHILD.findall(inner)]
+        value = XmlElement(tag, dict(_ATTRIBUTE.findall(attributes)), children)
+        return value_of(XmlElement("Property", {"name": name, "type": kind}, [value]))
 
     @property
     def texts(self) -> Mapping[str, Text]:
@@ -386,7 +386,7 @@ class Properties:
             raise self._xml.malformed(error) from error
         return Shape.of(spans, b""), [b"", *(element[first:last] for first, last in spans.values())]
 
-    def _careful_node(self, piece: bytes) -> Node:
+    def _careful_node(self, piece: bytes) -> XmlElement:
         if not self._careful:
             end = piece.find(_CLOSING)
             piece = _CUT + (piece[: end + len(_CLOSING)] if end >= 0 else piece)

@@ -2,7 +2,7 @@
 """Write a Silo identity into an FCStd file, and nothing else.
 
 The identity goes into the document's ``Meta`` map, which every FreeCAD keeps, also in partial loads (FreeCAD
-0.20 has no document properties of its own). Only ``Document.xml`` is packed anew; all other entries keep
+0.20 has no document properties of its own). Only ``Document.xml`` is packed again; all other entries keep
 their bytes, order and times. The file is replaced in one step, so a reader sees the old one or the new one.
 
 Where things are in the XML is asked of expat, so comments, other quotes and another order of attributes do no
@@ -13,7 +13,7 @@ Change the Document.xml of an FCStd file, and nothing else of it.
 All other entries keep their bytes, order and times. The file is replaced in one step, so a reader sees the
 old one or the new one; what was written is read back first.
 
-The container with one entry packed anew: APPNOTE.TXT 4.3.7, 4.3.12, 4.3.16.
+The container with one entry packed again: APPNOTE.TXT 4.3.7, 4.3.12, 4.3.16.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ from silo.fcstd.container import (
     LOCAL,
     ContainerFile,
     Directory,
-    Entry,
     FcstdError,
     FileState,
     Inflater,
     Limits,
+    ZipEntry,
 )
 from silo.fcstd.library import Library
-from silo.fcstd.xmltext import Malformed, Node, Span
+from silo.fcstd.xmltext import Malformed, Span, XmlElement
 from silo.platform import copy_rights, one_path, patiently, remove_patiently, swap, sync_folder
 
 _HAS_DESCRIPTOR = 0x8
@@ -73,7 +73,7 @@ def in_attribute(text: str) -> str:
     return escape(text, _REFERENCES)
 
 
-def replaced_entry(container: ContainerFile, entry: Entry, content: bytes) -> tuple[Piece, ...]:
+def replaced_entry(container: ContainerFile, entry: ZipEntry, content: bytes) -> tuple[Piece, ...]:
     """The container with ``content`` in ``entry``, in pieces: a big file is never held in memory.
 
     Raises FcstdError where entries overlap, or the result were too large for a plain zip.
@@ -95,14 +95,14 @@ def replaced_entry(container: ContainerFile, entry: Entry, content: bytes) -> tu
     return before, local, after, directory, tail
 
 
-def _entries(container: ContainerFile) -> list[Entry]:
+def _entries(container: ContainerFile) -> list[ZipEntry]:
     try:
         return list(container.directory.entries())
     except ValueError as error:
         raise FcstdError(container.path, str(error)) from error
 
 
-def _local(container: ContainerFile, entry: Entry, content: bytes) -> tuple[bytes, int]:
+def _local(container: ContainerFile, entry: ZipEntry, content: bytes) -> tuple[bytes, int]:
     """Local header and data, and the packed length; times, name and extra field as they were."""
     engine = zlib.compressobj(wbits=-zlib.MAX_WBITS)
     data = engine.compress(content) + engine.flush()
@@ -115,7 +115,7 @@ def _local(container: ContainerFile, entry: Entry, content: bytes) -> tuple[byte
 
 
 def _directory(
-    directory: Directory, entries: list[Entry], changed: Entry, content: bytes, packed: int, growth: int
+    directory: Directory, entries: list[ZipEntry], changed: ZipEntry, content: bytes, packed: int, growth: int
 ) -> bytes:
     raw = bytearray(directory.raw)
     for entry in entries:
@@ -164,7 +164,7 @@ def check_writable(path: str) -> None:
         )
 
 
-def document_xml(container: ContainerFile, limits: Limits) -> tuple[Entry, bytes]:
+def document_xml(container: ContainerFile, limits: Limits) -> tuple[ZipEntry, bytes]:
     """The entry Document.xml and its text. Raises DocumentError."""
     entry = container.entry(DOCUMENT_XML)
     if entry is None:
@@ -173,7 +173,7 @@ def document_xml(container: ContainerFile, limits: Limits) -> tuple[Entry, bytes
     return entry, Inflater(container.path, entry, packed, limits.document_xml, limits).whole()
 
 
-def edited_xml(container: ContainerFile, edit: Edit, limits: Limits) -> tuple[Entry, bytes]:
+def edited_xml(container: ContainerFile, edit: Edit, limits: Limits) -> tuple[ZipEntry, bytes]:
     """The entry Document.xml, and its text as it is to become. Raises DocumentError."""
     entry, text = document_xml(container, limits)
     try:
@@ -383,7 +383,7 @@ def _text_of(owner: object, name: str) -> str:
 
 def _stamped_xml(
     container: ContainerFile, key: str, identity: str, limits: Limits, item_object: str | None, replace: bool
-) -> tuple[Entry, bytes]:
+) -> tuple[ZipEntry, bytes]:
     """The entry Document.xml, and its content as it is to become."""
 
     def edit(text: bytes) -> bytes:
@@ -446,7 +446,7 @@ def _edited(
         if object_name not in data:
             raise Malformed(f"has no data of the object {object_name!r}")
         edits.append((data[object_name], lambda element: _with_all(element, properties, depth_limit)))
-    for (begin, end), edit in sorted(edits, key=lambda one: one[0], reverse=True):
+    for (begin, end), edit in sorted(edits, key=lambda each_edit: each_edit[0], reverse=True):
         text = text[:begin] + edit(text[begin:end]) + text[end:]
     return text
 
@@ -454,9 +454,9 @@ def _edited(
 def _with_meta(element: bytes, changes: Mapping[str, str | None], depth_limit: int) -> bytes:
     span = xmltext.index_properties(element, depth_limit).get("Meta")
     old = element[slice(*span)] if span else b""
-    known = _items(xmltext.parse_value(old, depth_limit)) if span else {}
-    items = {key: value for key, value in {**known, **changes}.items() if value is not None}
-    if items == known:
+    meta = _items(xmltext.parse_value(old, depth_limit)) if span else {}
+    items = {key: value for key, value in {**meta, **changes}.items() if value is not None}
+    if items == meta:
         return element
     start = _start_tag(old).rstrip(b"/> \t\r\n") + b">" if span else _META
     prop = start + _map(items) + b"\n        </Property>"
@@ -483,7 +483,7 @@ def _with_property(element: bytes, name: str, prop: bytes | None, indent: bytes,
         raise Malformed("has an object without properties")
     tag = _start_tag(element[start:])
     step = 1 if here is None else -1
-    counted = _COUNT.sub(lambda found: found[1] + b"%d" % (int(found[2]) + step) + found[3], tag, count=1)
+    counted = _COUNT.sub(lambda match: match[1] + b"%d" % (int(match[2]) + step) + match[3], tag, count=1)
     begin = start + len(tag)
     if here is not None:
         rest = element[begin : here[0]].rstrip() + element[here[1] :]
@@ -496,7 +496,7 @@ def _with_property(element: bytes, name: str, prop: bytes | None, indent: bytes,
     return element[:start] + counted + rest
 
 
-def _items(prop: Node) -> dict[str, str]:
+def _items(prop: XmlElement) -> dict[str, str]:
     maps = [child for child in prop.children if child.tag == "Map"]
     items = (child.attributes for child in (maps[0].children if maps else ()) if child.tag == "Item")
     return {item["key"]: item.get("value", "") for item in items if "key" in item}
@@ -504,10 +504,10 @@ def _items(prop: Node) -> dict[str, str]:
 
 def _start_tag(element: bytes) -> bytes:
     """The first tag; a ``>`` may stand inside its quotes."""
-    found = re.match(rb"""<(?:[^<>"']|"[^"]*"|'[^']*')*>""", element)
-    if found is None:
+    match = re.match(rb"""<(?:[^<>"']|"[^"]*"|'[^']*')*>""", element)
+    if match is None:
         raise Malformed("has a property that cannot be edited")
-    return found[0]
+    return match[0]
 
 
 def _map(items: dict[str, str]) -> bytes:

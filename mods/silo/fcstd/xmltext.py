@@ -27,7 +27,7 @@ from operator import lshift, not_, or_
 from typing import TYPE_CHECKING, Any
 from xml.parsers import expat
 
-from silo.fcstd.container import Entry, FcstdError, Inflater, Limits
+from silo.fcstd.container import FcstdError, Inflater, Limits, ZipEntry
 
 if TYPE_CHECKING:
     from silo.fcstd.properties import Shape
@@ -188,32 +188,32 @@ def index_properties(text: bytes, depth_limit: int) -> dict[str, Span]:
 
 def start_tags(text: bytes, depth_limit: int, tags: Collection[str]) -> list[tuple[int, dict[str, str]]]:
     """Where each element of these tags begins, and its attributes, in document order. Raises Malformed."""
-    found: list[tuple[int, dict[str, str]]] = []
+    result: list[tuple[int, dict[str, str]]] = []
 
     def open_at(depth: int, tag: str, attributes: dict[str, str], at: int) -> None:
         if tag in tags:
-            found.append((at, dict(attributes)))
+            result.append((at, dict(attributes)))
 
     _Walk(text, depth_limit, open_at, lambda depth, tag, end: None).run()
-    return found
+    return result
 
 
 @dataclass(slots=True)
-class Node:
+class XmlElement:
     """One XML element of a property's value."""
 
     tag: str
     attributes: dict[str, str]
-    children: list[Node] = field(default_factory=list)
+    children: list[XmlElement] = field(default_factory=list)
 
 
-def parse_value(snippet: bytes, depth_limit: int) -> Node:
+def parse_value(snippet: bytes, depth_limit: int) -> XmlElement:
     """One ``<Property>`` element as a tree. Raises Malformed."""
-    root = Node("", {})
+    root = XmlElement("", {})
     stack = [root]
 
     def open_at(depth: int, tag: str, attributes: dict[str, str], at: int) -> None:
-        node = Node(tag, dict(attributes))
+        node = XmlElement(tag, dict(attributes))
         stack[-1].children.append(node)
         stack.append(node)
 
@@ -253,7 +253,7 @@ class _Unexpected(Exception):
     """The quick way met something that FreeCAD does not write."""
 
 
-class Shared:
+class SharedTexts:
     """What the texts of one session share: lists of property names, and a bound on memory."""
 
     def __init__(self, resident_limit: int) -> None:
@@ -287,9 +287,9 @@ class XmlText:
     """The text of one Document.xml. All its methods may raise FcstdError."""
 
     def __init__(
-        self, path: str, entry: Entry, packed: bytes, limits: Limits, shared: Shared | None = None
+        self, path: str, entry: ZipEntry, packed: bytes, limits: Limits, shared: SharedTexts | None = None
     ) -> None:
-        self.path, self.limits, self.shared = path, limits, shared or Shared(limits.resident)
+        self.path, self.limits, self.shared = path, limits, shared or SharedTexts(limits.resident)
         self._entry, self._packed = entry, packed
         self._inflater: Inflater
         self._text: bytes | None = b""
@@ -338,19 +338,19 @@ class XmlText:
         """An attribute of the ``<Document>`` element."""
         head = self.head
         if isinstance(head.attributes, bytes):
-            found = _ATTRIBUTE.findall(head.attributes)
-            head.attributes = {self.decode(key): self.decode(value) for key, value in found}
+            matches = _ATTRIBUTE.findall(head.attributes)
+            head.attributes = {self.decode(key): self.decode(value) for key, value in matches}
         return head.attributes.get(name, default)
 
     def span(self, name: str) -> Span | None:
         """Where the data of an object of ``head.types`` stands."""
-        if (found := self._data.get(name)) is None:
+        if (span_here := self._data.get(name)) is None:
             if name not in self.head.types:
                 return None
             self._settle(lambda: self._index_objects(name))
-            if (found := self._data.get(name)) is None:
+            if (span_here := self._data.get(name)) is None:
                 return None
-        return found >> _HALF, found & _LOW
+        return span_here >> _HALF, span_here & _LOW
 
     def complete(self) -> None:
         """Read to the end, and check all that can be checked there."""
@@ -408,10 +408,10 @@ class XmlText:
         if self._inflater.finished:
             raise _Unexpected
         more = self._inflater.step(max(_FIRST_STEP, len(text) * (_GROWTH - 1)))
-        known = len(text)
+        length = len(text)
         text = self._hold(text + more)
         if self._head is not None:
-            _refuse_markup(text, max(0, known - 1))
+            _refuse_markup(text, max(0, length - 1))
         return text
 
     def _hold(self, text: bytes) -> bytes:
@@ -437,16 +437,16 @@ class XmlText:
 
     def _quick_types(self, text: bytes, begin: int, end: int) -> dict[str, str]:
         opening = _OBJECTS.match(text, begin, end)
-        found = _OBJECT_TYPE.findall(text, begin, end)
-        if opening is None or not int(opening[1]) == len(found) == text.count(b"<Object ", begin, end):
+        matches = _OBJECT_TYPE.findall(text, begin, end)
+        if opening is None or not int(opening[1]) == len(matches) == text.count(b"<Object ", begin, end):
             raise _Unexpected
-        self._limit_objects(len(found))
-        listed, self._names = map(list, zip(*found, strict=True)) if found else ([], [])
+        self._limit_objects(len(matches))
+        listed, self._names = map(list, zip(*matches, strict=True)) if matches else ([], [])
         kinds = {kind: self.decode(kind) for kind in set(listed)}
         # No name holds a quotation mark.
-        names = self.decode(b'"'.join(self._names)).split('"') if found else ()
+        names = self.decode(b'"'.join(self._names)).split('"') if matches else ()
         types = dict(zip(names, map(kinds.__getitem__, listed), strict=True))
-        if len(types) != len(found):
+        if len(types) != len(matches):
             raise _Unexpected
         return types
 
@@ -508,8 +508,8 @@ class XmlText:
         if len(opening) != len(pieces):
             return False
         for number in compress(count(), map(not_, map(bytes.startswith, pieces, opening))):
-            found = _OBJECT.match(pieces[number])
-            if found is None or found[1] != self._names[number]:
+            match = _OBJECT.match(pieces[number])
+            if match is None or match[1] != self._names[number]:
                 return False
         lengths = map(len(_CLOSING).__add__, map(len, pieces))
         ends = list(accumulate(lengths, initial=self._position))
@@ -525,7 +525,7 @@ class XmlText:
         text, wanted = self.text, re.compile(re.escape(word.encode()))
         if b"&" in text and b"&#" in text:  # which may be a letter
             return self.head.types
-        found, names = list[str](), list(self._data)
+        result, names = list[str](), list(self._data)
         ends = list(map(_LOW.__and__, self._data.values()))
         if ends != sorted(ends):
             return self.head.types
@@ -534,18 +534,18 @@ class XmlText:
             number = bisect_right(ends, at.start())
             if number == len(names):
                 break
-            found.append(names[number])
+            result.append(names[number])
             at = wanted.search(text, ends[number])
-        return found
+        return result
 
     def linked(self) -> set[str]:
         """The recorded paths of linked files, about; of a text that was read to its end."""
-        found = {self.decode(path) for path in _LINKED.findall(self.text)}
-        if any("&" in path for path in found):
+        matches = {self.decode(path) for path in _LINKED.findall(self.text)}
+        if any("&" in path for path in matches):
             from xml.sax.saxutils import unescape  # it imports HTTP and TLS
 
-            found = {unescape(path) for path in found}
-        return found
+            matches = {unescape(path) for path in matches}
+        return matches
 
     def _read_carefully(self) -> None:
         text = self.text + self._inflater.rest()

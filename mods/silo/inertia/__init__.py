@@ -10,10 +10,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from silo.inertia.bom import BOMEntry, BOMParser
+    from silo.inertia.bom import BOMEntry
+    from silo.inertia.bom.parser import BOMParser
     from silo.inertia.calculator import EnhancedInertiaCalculator, InertiaCalculator, compute_link_inertials
-    from silo.inertia.core import InertialProperties, MassProps
     from silo.inertia.materials import MATERIAL_DENSITIES
+    from silo.inertia.model import InertialProperties, MassProps
     from silo.inertia.report import InertiaReport, PartWarning
 
 __all__ = [
@@ -31,13 +32,13 @@ __all__ = [
 
 _HOME = {
     "BOMEntry": "bom",
-    "BOMParser": "bom",
+    "BOMParser": "bom.parser",
     "EnhancedInertiaCalculator": "calculator",
     "InertiaCalculator": "calculator",
     "InertiaReport": "report",
-    "InertialProperties": "core",
+    "InertialProperties": "model",
     "MATERIAL_DENSITIES": "materials",
-    "MassProps": "core",
+    "MassProps": "model",
     "PartWarning": "report",
     "compute_link_inertials": "calculator",
 }

@@ -17,17 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from silo.bom.errors import InputError
-from silo.inertia.bom import BOMEntry, BOMParser, BomTable, as_table
-from silo.inertia.bom.table import parse_mass
-from silo.inertia.core import (
-    Floats,
-    InertialProperties,
-    MassProps,
-    TensorProblem,
-    combine_arrays,
-    is_rigid,
-    tensor_words,
-)
+from silo.inertia.bom import BOMEntry, BomTable, as_table, parse_mass
+from silo.inertia.bom.parser import BOMParser
 from silo.inertia.links import (
     ASSEMBLY_FRAME,
     ROOT_LINK,
@@ -41,10 +32,23 @@ from silo.inertia.links import (
     components,
     word_of,
 )
-from silo.inertia.masses import MassRule, Occurrence, Options, Placed, place_all, weighed
+from silo.inertia.masses import MassRule, Options, Placed, PlacedAssembly, place_all, weighed
 from silo.inertia.matching import Matching, Suggester, match, plain
 from silo.inertia.materials import MaterialHit, MaterialTable, load_materials
-from silo.inertia.model import Assembly, Product, Prototype, leaf_products, sub_assemblies
+from silo.inertia.model import (
+    Assembly,
+    Floats,
+    InertialProperties,
+    MassProps,
+    Product,
+    Prototype,
+    TensorProblem,
+    combine_arrays,
+    is_rigid,
+    leaf_products,
+    sub_assemblies,
+    tensor_words,
+)
 from silo.inertia.report import (
     InertiaReport,
     LinkResult,
@@ -56,7 +60,7 @@ from silo.inertia.report import (
 
 if TYPE_CHECKING:
     from silo.inertia.geometry import ReadOptions
-    from silo.inertia.output.urdf import Urdf
+    from silo.inertia.urdf import Urdf
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +197,8 @@ def _run(
     rule = MassRule(task.materials, task.options, suggester, table is not None)
 
     def density(row: BOMEntry, product: object) -> float | None:
-        found = rule.density_of(row.material)
-        return found if found is not None else getattr(product, "density", None)
+        stated_density = rule.density_of(row.material)
+        return stated_density if stated_density is not None else getattr(product, "density", None)
 
     leaves, groups = leaf_products(assembly), sub_assemblies(assembly)
     matching = match(leaves, groups, rows, density)
@@ -314,12 +318,12 @@ class InertiaCalculator:
         """
         assembly = read_geometry(step_path, self.read_options)
         claims = _everything(assembly, link_name)
-        one = _run(assembly, as_table(bom_entries), self.task, claims, InertiaReport())
-        report.links.update(one.links)
-        report.link_properties.update(one.link_properties)
-        for w in one.warnings:
+        inertia_report = _run(assembly, as_table(bom_entries), self.task, claims, InertiaReport())
+        report.links.update(inertia_report.links)
+        report.link_properties.update(inertia_report.link_properties)
+        for w in inertia_report.warnings:
             report.add_warning(w.link_name or link_name, w.part_name, w.message, w.code)
-        return one.link_properties[link_name]
+        return inertia_report.link_properties[link_name]
 
 
 EnhancedInertiaCalculator = InertiaCalculator
@@ -399,7 +403,7 @@ def fill_links(
 
 def _sub_assemblies(assembly: Assembly, placed: Placed) -> Iterator[SubAssemblyResult]:
     """Yield one mass per BOM row, in the order of the rows."""
-    by_row: dict[int, list[Occurrence]] = {}
+    by_row: dict[int, list[PlacedAssembly]] = {}
     for occurrence in placed.groups:
         by_row.setdefault(id(occurrence.match.row), []).append(occurrence)
     for occurrences in sorted(by_row.values(), key=lambda of_row: of_row[0].match.row.line):
@@ -424,7 +428,7 @@ def _sub_assemblies(assembly: Assembly, placed: Placed) -> Iterator[SubAssemblyR
         )
 
 
-def _shape(assembly: Assembly, placed: Placed, occurrence: Occurrence) -> tuple[float, Floats | None]:
+def _shape(assembly: Assembly, placed: Placed, occurrence: PlacedAssembly) -> tuple[float, Floats | None]:
     """Return the volume [m^3] and centre of mass (3,) [m] of a placed sub-assembly.
 
     The centre in its own axes.
@@ -581,21 +585,21 @@ def tell_rows(
         *((product, matching.parts.get(product.key)) for product in leaves),
         *((product, matching.groups.get(product.key)) for product in groups),
     ]
-    for product, found in products:
-        if found is not None:
-            counted[id(found.row)] = counted.get(id(found.row), 0) + product.count
-    told: set[int] = set()
-    for product, found in products:
-        if found is None or id(found.row) in told:
+    for product, rows in products:
+        if rows is not None:
+            counted[id(rows.row)] = counted.get(id(rows.row), 0) + product.count
+    shown_rows: set[int] = set()
+    for product, rows in products:
+        if rows is None or id(rows.row) in shown_rows:
             continue
-        told.add(id(found.row))
-        count, wanted = counted[id(found.row)], found.bundle.quantities
+        shown_rows.add(id(rows.row))
+        count, wanted = counted[id(rows.row)], rows.bundle.quantities
         if wanted and count not in wanted:
             said = " or ".join(f"{quantity:g}" for quantity in sorted(wanted))
             report.add_warning(
                 "",
                 product.name,
-                f"the BOM has {said} of it (line {found.row.line}), the geometry {count}; "
+                f"the BOM has {said} of it (line {rows.row.line}), the geometry {count}; "
                 "the geometry's pieces were counted",
                 MassCode.COUNT_DIFFERS,
             )

@@ -35,9 +35,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.bom.errors import ConfigError, counted, listed
-from silo.inertia.core import Floats
 from silo.inertia.matching import bare
-from silo.inertia.model import Assembly, Instance, placed_below
+from silo.inertia.model import Assembly, Floats, Instance, placed_below
 
 
 class FrameChoice(StrEnum):
@@ -321,11 +320,11 @@ def _map_frames(assembly: Assembly, links: LinkMap) -> dict[str, LinkFrame]:
         if link.origin is not None:
             frames[link.name] = LinkFrame(link.origin, "origin in the link map", chosen=True)
         elif link.frame_of is not None:
-            found = _frame_of(assembly, link.frame_of)
-            if found is None:
+            floats = _frame_of(assembly, link.frame_of)
+            if floats is None:
                 problems.append(f"{link.name}: there is no placed sub-assembly or part “{link.frame_of}”")
             else:
-                frames[link.name] = LinkFrame(found, f"frame of “{link.frame_of}”", chosen=True)
+                frames[link.name] = LinkFrame(floats, f"frame of “{link.frame_of}”", chosen=True)
     if problems:
         raise ConfigError(f"{links.source}: " + "; ".join(problems))
     return frames
@@ -358,14 +357,17 @@ def matches(pattern: str, instance: Instance) -> bool:
 
 def components(pattern: str, instances: Sequence[Instance]) -> list[list[int]]:
     """Return the instances of each placed part or sub-assembly that a pattern means, highest level first."""
-    found: dict[tuple[str, ...], list[int]] = {}
-    for index, one in enumerate(instances):
-        levels = (replace(one, path=one.path[:n], product_path=one.product_path[:n]) for n in count(1))
-        for level in islice(levels, len(one.path)):
+    rows_by_path: dict[tuple[str, ...], list[int]] = {}
+    for index, instance in enumerate(instances):
+        levels = (
+            replace(instance, path=instance.path[:n], product_path=instance.product_path[:n])
+            for n in count(1)
+        )
+        for level in islice(levels, len(instance.path)):
             if matches(pattern, level):
-                found.setdefault(level.path, []).append(index)
+                rows_by_path.setdefault(level.path, []).append(index)
                 break
-    return list(found.values())
+    return list(rows_by_path.values())
 
 
 @lru_cache(maxsize=1024)
@@ -492,7 +494,8 @@ def _by_position(assembly: Assembly, clusters: int | None) -> StartingMap:
     )
     names = {number: f"link_{place}" for place, number in enumerate(order, start=1)}
     members = {names[n]: tuple(np.flatnonzero(labels == n).tolist()) for n in order}
-    how = "the file has no sub-assemblies, so parts that lie together are together; a guess by position alone"
+    why = f"--clusters {clusters}" if clusters else "the file has no sub-assemblies"
+    how = f"{why}, so parts that lie together are together; a guess by position alone"
     if len(members) < 2:
         members = {assembly.name or ROOT_LINK: tuple(range(len(points)))} if len(points) else {}
         how = "the file has no sub-assemblies, and its parts lie together; --clusters N makes N links"
@@ -559,13 +562,14 @@ def _silhouette(points: Floats, labels: Labels) -> float:
 def as_yaml(start: StartingMap, assembly: Assembly) -> str:
     """Return the map as YAML, commented; :func:`silo.inertia.links.read_link_map` reads it."""
     lines = [
+        "---",  # several maps in one stream are several documents
         f"# Link map for {_comment(assembly.source or assembly.name)}, made by `silo-mod links`.",
         f"# {_comment(start.how[:1].upper() + start.how[1:])}.",
         "# Each line is a part, or a sub-assembly with all below it. Move lines between links, rename links",
         "# as your robot calls them, then: silo-mod inertia FILE --links THIS_FILE",
         "# * is anything within one level, ** any number of levels, product:NAME all uses of a product.",
         "# `silo-mod links FILE --clusters N` makes N links of parts that lie together; on the page of",
-        "# `silo-mod inertia FILE --html PAGE` clicks give parts to links, and it saves the map.",
+        "# `silo-mod inertia FILE --report PAGE.html` clicks give parts to links, and it saves the map.",
         "links:",
     ]
     for name, ids in start.members.items():
@@ -586,7 +590,9 @@ def _lines_of(
 ) -> list[tuple[tuple[str, ...], list[int]]]:
     """Return (path, instances below it), each as high up as everything below belongs to this one link."""
     owner = {index: name for name, indices in members.items() for index in indices}
-    below = placed_below(assembly) | {one.path: [index] for index, one in enumerate(assembly.instances)}
+    below = placed_below(assembly) | {
+        instance.path: [index] for index, instance in enumerate(assembly.instances)
+    }
     whole = {path for path, inside in below.items() if len({owner[index] for index in inside}) == 1}
     paths = (assembly.instances[index].path for index in ids)
     highest = (next(path[:n] for n in range(1, len(path) + 1) if path[:n] in whole) for path in paths)

@@ -21,11 +21,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from silo.inertia.bom.table import BomCode, BOMEntry
-from silo.inertia.core import Floats, place, rigid_mask
+from silo.inertia.bom import BomCode, BOMEntry
 from silo.inertia.matching import Match, Matching, Suggester
 from silo.inertia.materials import DENSEST, LIGHTEST, Material, MaterialHit, MaterialTable, checked_density
-from silo.inertia.model import Assembly, GeometryCode, Note, Prototype, companions, placed_below
+from silo.inertia.model import (
+    Assembly,
+    Floats,
+    GeometryCode,
+    Note,
+    Prototype,
+    companions,
+    place,
+    placed_below,
+    rigid_mask,
+)
 from silo.inertia.report import Decided, MassCode, Rule, Source
 
 
@@ -141,17 +150,17 @@ class MassRule:
         row = match.row
         mass = row.mass_kg or 0.0
         material = self.materials.find(row.material) if row.material is not None else None
-        known = material.material if isinstance(material, MaterialHit) else None
-        if mass == 0 and known and prototype.volume_m3 > 0 and not row.overridden and row.material:
+        bom_material = material.material if isinstance(material, MaterialHit) else None
+        if mass == 0 and bom_material and prototype.volume_m3 > 0 and not row.overridden and row.material:
             return self._zero_of_known_material(base, prototype, row)
         given = GivenMass(mass, row.quantum_kg, match.bundle.quantities)
-        expected = expectation(prototype, row.material, known)
+        expected = expectation(prototype, row.material, bom_material)
         return replace(
             base,
             source=Source.BOM_MASS,
             mass_kg=mass,
             quantum_kg=row.quantum_kg,
-            material_name=known.name if known else None,
+            material_name=bom_material.name if bom_material else None,
             pieces=given.pieces,
             compared=expected is not None,
             notes=(*base.notes, *two_ways(row), *mass_doubts(given, prototype, expected)),
@@ -169,10 +178,10 @@ class MassRule:
         notes = list(base.notes)
         name, spread = None, 0.0
         if isinstance(answer, MaterialHit):
-            found = answer.material
-            kind, density, where = Source.MATERIAL, found.density, found.source
-            name, spread = found.name, found.spread
-            notes += density_doubts(prototype, found)
+            material = answer.material
+            kind, density, where = Source.MATERIAL, material.density, material.source
+            name, spread = material.name, material.spread
+            notes += density_doubts(prototype, material)
             if answer.doubt:
                 words = f"'{text}' was taken for {name} ({density:g} kg/m³): {answer.doubt}"
                 notes.append(Note(MassCode.GUESSED_MATERIAL, words))
@@ -439,7 +448,7 @@ def _is_multiple(mass: float, expected: float, quantity: float) -> bool:
 
 
 @dataclass(frozen=True)
-class Occurrence:
+class PlacedAssembly:
     """A placed sub-assembly whose row gives a mass.
 
     path, below
@@ -472,32 +481,32 @@ class Groups:
     rule: MassRule
     _made: dict[tuple[Match, Decision, str], Decision] = field(default_factory=dict)
 
-    def apply(self, matches: Mapping[str, Match]) -> Iterator[Occurrence]:
+    def apply(self, matches: Mapping[str, Match]) -> Iterator[PlacedAssembly]:
         """Use or compare every matched row, once per placed sub-assembly. ``matches``: by product name."""
         for match, path, below in self._occurrences(matches):
             row = match.row
-            known = [i for i in below if _has_data(self.decisions[i])]
+            with_data = [i for i in below if _has_data(self.decisions[i])]
             gaps = [i for i in below if not _has_data(self.decisions[i])]
             if row.mass_kg is None:
                 if not row.has_children:
                     self._cover(match, gaps)
                 continue
-            left = row.mass_kg - float(self.mass[known].sum())
+            left = row.mass_kg - float(self.mass[with_data].sum())
             stands_for_all = not row.has_children and left > row.quantum_kg
             agrees = True
-            if gaps and (not known or stands_for_all):
-                self._share(match, gaps, left, partly=bool(known))
-            elif known:
-                agrees = self._compare(match, below, known[0])
+            if gaps and (not with_data or stands_for_all):
+                self._share(match, gaps, left, partly=bool(with_data))
+            elif with_data:
+                agrees = self._compare(match, below, with_data[0])
             volume = float(self.volume[below].sum())
             odd = any(implausible(GivenMass(row.mass_kg, row.quantum_kg), volume))
-            yield Occurrence(match, path, tuple(below), agrees, odd)
+            yield PlacedAssembly(match, path, tuple(below), agrees, odd)
 
     def _occurrences(
         self, matches: Mapping[str, Match]
     ) -> Iterator[tuple[Match, tuple[str, ...], list[int]]]:
         """Yield each placed sub-assembly that has a row, deepest first, with its instances."""
-        for path, indices in sorted(placed_below(self.assembly).items(), key=lambda one: -len(one[0])):
+        for path, indices in sorted(placed_below(self.assembly).items(), key=lambda pair: -len(pair[0])):
             names = {index: self.assembly.instances[index].product_path for index in indices}
             match = matches.get(names[indices[0]][len(path) - 1])
             below = [index for index in indices if self.counted[index] and len(names[index]) > len(path)]
@@ -595,7 +604,7 @@ class Placed:
     mass: Floats
     decisions: Sequence[Decision]
     counted: NDArray[np.bool_]
-    groups: Sequence[Occurrence] = ()
+    groups: Sequence[PlacedAssembly] = ()
 
     def inertia(self, index: NDArray[np.intp]) -> Floats:
         """Return (n, 3, 3) [kg m^2] of some instances, about their own centres of mass."""
@@ -687,8 +696,8 @@ def _note_scaling(assembly: Assembly, decisions: dict[str, Decision]) -> None:
     placements = np.array([i.transform for i in assembly.instances], float).reshape(-1, 4, 4)
     scaled = {assembly.instances[i].prototype for i in np.flatnonzero(~rigid_mask(placements))}
     for key in sorted(scaled):
-        known = {problem.code for problem in assembly.prototypes[key].problems}
-        if GeometryCode.SCALED in known:
+        codes = {problem.code for problem in assembly.prototypes[key].problems}
+        if GeometryCode.SCALED in codes:
             continue
         note = Note(
             GeometryCode.SCALED,

@@ -27,7 +27,7 @@ from functools import lru_cache
 from itertools import count
 
 from silo.bom.errors import counted, listed
-from silo.inertia.bom.table import BOMEntry, BomTable
+from silo.inertia.bom import BOMEntry, BomTable
 from silo.inertia.model import Product
 from silo.inertia.report import Decided, Rule
 
@@ -123,12 +123,12 @@ class Suggester:
             return ()
         wanted = plain(name)
         turned = " ".join(sorted(wanted.split()))
-        found = []
+        nearest = []
         for candidate in fitting:
             ratio = max(_alike(wanted, candidate), _alike(turned, " ".join(sorted(candidate.split()))))
             if ratio >= SUGGEST_FROM:
-                found.append((-ratio, candidate))
-        return tuple(fitting[candidate] for _, candidate in sorted(found)[:limit])
+                nearest.append((-ratio, candidate))
+        return tuple(fitting[candidate] for _, candidate in sorted(nearest)[:limit])
 
 
 def _alike(left: str, right: str) -> float:
@@ -255,9 +255,9 @@ class _Matcher:
         self, products: Sequence[Product], rows: Sequence[BOMEntry], density: DensityOf
     ) -> dict[str, Match]:
         """Return the matches by the products' keys."""
-        found: dict[str, Match] = {}
+        matches: dict[str, Match] = {}
         for rule, candidates in _finders(rows):
-            wanted = [product for product in products if product.key not in found]
+            wanted = [product for product in products if product.key not in matches]
             options = {p.key: [r for r in candidates(p) if self._is_open(r, p)] for p in wanted}
             for same, theirs in _components(wanted, options):
                 contest = _Contest(rule, density, list(same), self._bundled(theirs))
@@ -267,8 +267,8 @@ class _Matcher:
                         self.taken.update(
                             {id(r): product.count for r in contest.found[product.key].bundle.rows}
                         )
-                found |= contest.found
-        return _with_doubtful_shapes(products, found)
+                matches |= contest.found
+        return _with_doubtful_shapes(products, matches)
 
     def _is_open(self, row: BOMEntry, product: Product) -> bool:
         """Let a used row take a product if its quantity leaves room for all of its instances."""
@@ -376,12 +376,12 @@ def _may_count(product: Product, bundle: Bundle) -> bool:
     return not bundle.quantities or product.count in bundle.quantities
 
 
-def _with_doubtful_shapes(products: Sequence[Product], found: dict[str, Match]) -> dict[str, Match]:
+def _with_doubtful_shapes(products: Sequence[Product], matches: dict[str, Match]) -> dict[str, Match]:
     """Warn of different shapes that got one row: one of them at most can weigh its mass."""
     by_row: dict[int, list[Product]] = defaultdict(list)
     for product in products:
-        if product.key in found and found[product.key].row.has_mass and product.volume_m3 > 0:
-            by_row[id(found[product.key].row)].append(product)
+        if product.key in matches and matches[product.key].row.has_mass and product.volume_m3 > 0:
+            by_row[id(matches[product.key].row)].append(product)
     for same in by_row.values():
         volumes = [product.volume_m3 for product in same]
         if max(volumes) - min(volumes) > 0.01 * max(volumes):
@@ -390,9 +390,9 @@ def _with_doubtful_shapes(products: Sequence[Product], found: dict[str, Match]) 
                 f"{len(same)} different shapes are named {names} and the BOM has one mass for all of them; "
                 "each got it"
             )
-            for key, match in ((p.key, found[p.key]) for p in same):
-                found[key] = replace(match, doubt=match.doubt or words)
-    return found
+            for key, match in ((p.key, matches[p.key]) for p in same):
+                matches[key] = replace(match, doubt=match.doubt or words)
+    return matches
 
 
 Finder = Callable[[Product], Sequence[BOMEntry]]

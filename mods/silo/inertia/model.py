@@ -3,18 +3,24 @@
 
 SI throughout (m, m^3, m^5, kg/m^3). Arrays are numpy float64; the readers may pass lists. Volumes are
 positive: a reader that met an inside-out solid turns its sign, marks it ``reversed`` and adds a problem.
+
+Below them rigid bodies: kg, m, kg m^2. A tensor is about the body's own centre of mass, in the axes of the
+frame at hand. Off-diagonal elements are tensor elements (-∫xy dm), never "products of inertia" with the sign
+turned. What can be done for N bodies at once is done in one numpy expression.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from silo.bom.errors import InputError
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +44,8 @@ class GeometryCode(StrEnum):
     HIDDEN = "hidden"  # the file does not show a body, and it is counted
     NO_SOLID = "no_solid"  # surfaces or wires only
     NO_GEOMETRY = "no_geometry"  # nothing at all: an unresolved external file, an empty product
-    EXTERNAL_FILE = "external_file"  # a split assembly's file was found, or was not
+    NOT_READ = "not_read"  # a file or a shape that is missing or damaged: what it holds is in no mass
+    EXTERNAL_FILE = "external_file"  # a split assembly was completed from its other files
     NOT_WATERTIGHT = "not_watertight"
     WINDING = "winding"
     UNITS = "units"  # the unit was not stated, or is implausible
@@ -46,6 +53,24 @@ class GeometryCode(StrEnum):
     BAKED = "baked"  # geometry far away from its own origin
     NAME = "name"  # lost characters, an unnamed product named by climbing
     READER = "reader"  # what the kernel complained about while reading
+
+
+DOUBTFUL = (
+    GeometryCode.BODY_MISSING,
+    GeometryCode.INVALID_SHAPE,
+    GeometryCode.MESH_MISMATCH,
+    GeometryCode.OPEN_SHELL,
+    GeometryCode.OVERLAPPING_SOLIDS,
+    GeometryCode.NOT_WATERTIGHT,
+    GeometryCode.WINDING,
+)
+"""Under these a mass is no fact."""
+
+
+def rounded(value: float) -> float:
+    """Return a number as it is kept in Silo."""
+    # Twelve digits: a second run on another machine must not make a revision of the last bit.
+    return float(f"{value + 0.0:.12g}") if abs(value) > 1e-15 else 0.0
 
 
 @dataclass(frozen=True)
@@ -73,8 +98,7 @@ class SolidProps:
     reversed: bool = False
 
     def __post_init__(self) -> None:
-        _freeze(self, "com_m", (3,))
-        _freeze(self, "inertia_unit", (3, 3))
+        _freeze(self, com_m=(3,), inertia_unit=(3, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +135,7 @@ class Prototype:
     mesh: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        _freeze(self, "com_m", (3,))
-        _freeze(self, "inertia_unit", (3, 3))
+        _freeze(self, com_m=(3,), inertia_unit=(3, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +160,7 @@ class Instance:
     transform: Floats = field(default_factory=lambda: np.eye(4))
 
     def __post_init__(self) -> None:
-        _freeze(self, "transform", (4, 4))
+        _freeze(self, transform=(4, 4))
 
     @property
     def name(self) -> str:
@@ -166,10 +189,14 @@ class Assembly:
     frames: Mapping[tuple[str, ...], Floats] = field(default_factory=dict)
 
 
-def _freeze(owner: object, name: str, shape: tuple[int, ...]) -> None:
-    array = np.array(getattr(owner, name), dtype=np.float64).reshape(shape)
-    array.flags.writeable = False
-    object.__setattr__(owner, name, array)
+def _freeze(owner: object, **shapes: tuple[int, ...]) -> None:
+    """Make fields arrays of these shapes that nobody can write. InputError."""
+    for name, shape in shapes.items():
+        array = np.array(getattr(owner, name), dtype=np.float64)
+        if array.shape != shape:
+            raise InputError(f"{name}: wanted an array of shape {shape}, got {array.shape}")
+        array.flags.writeable = False
+        object.__setattr__(owner, name, array)
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,3 +294,304 @@ def sub_assemblies(assembly: Assembly) -> tuple[Product, ...]:
         Product(key=name, name=name, part_number="", count=count, parents=frozenset(parents[name]))
         for name, count in counts.items()
     )
+
+
+# --- rigid bodies: mass, centre of mass and inertia tensor, moved and summed ---
+
+RIGID_TOLERANCE = 1e-6
+"""How far the columns of a placement may be from orthonormal (STEP files print about nine digits)."""
+
+CHECK_TOLERANCE = 1e-9
+"""Relative to the largest principal moment: what counts as rounding when a tensor is checked."""
+
+_EYE3 = np.eye(3)
+
+
+@dataclass(frozen=True)
+class InertialProperties:
+    """Mass, centre of mass and inertia tensor of one rigid body, as URDF wants them (spec, Task 2).
+
+    mass
+        [kg]
+    com
+        (x, y, z) [m], in the link's frame.
+    ixx, iyy, izz, ixy, ixz, iyz
+        tensor elements [kg m^2] about the centre of mass, axes of the link's frame; the products are the
+        elements themselves (-∫xy dm), so that they go into a URDF unchanged.
+    """
+
+    mass: float
+    com: tuple[float, float, float]
+    ixx: float
+    iyy: float
+    izz: float
+    ixy: float = 0.0
+    ixz: float = 0.0
+    iyz: float = 0.0
+
+
+class TensorProblem(StrEnum):
+    """Why no rigid body can have these mass properties."""
+
+    NOT_FINITE = "not_finite"  # a value is NaN or infinite
+    NOT_SYMMETRIC = "not_symmetric"
+    ZERO_MASS = "zero_mass"  # physics engines refuse a moving link without mass
+    NEGATIVE_MASS = "negative_mass"
+    ZERO_INERTIA = "zero_inertia"  # a point mass: refused by MuJoCo on a moving link
+    NOT_POSITIVE_DEFINITE = "not_positive_definite"
+    TRIANGLE_INEQUALITY = "triangle_inequality"  # a principal moment exceeds the sum of the two others
+
+
+_TENSOR_WORDS = {
+    TensorProblem.NOT_FINITE: "has a value that is not finite",
+    TensorProblem.NOT_SYMMETRIC: "is not symmetric",
+    TensorProblem.ZERO_MASS: "has no mass",
+    TensorProblem.NEGATIVE_MASS: "has a negative mass",
+    TensorProblem.ZERO_INERTIA: "has no inertia (a point mass); MuJoCo refuses it on a moving link",
+    TensorProblem.NOT_POSITIVE_DEFINITE: "has a principal moment that is not above zero",
+    TensorProblem.TRIANGLE_INEQUALITY: "has a principal moment above the sum of the two others",
+}
+
+
+def tensor_words(problems: Iterable[TensorProblem]) -> str:
+    """Return why a tensor is no rigid body's, in words that end a sentence."""
+    return ", ".join(_TENSOR_WORDS[problem] for problem in problems)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MassProps:
+    """Mass properties of one rigid body in one frame; what a report has for each link.
+
+    mass : float [kg]
+    com : (3,) float [m], in the frame
+    inertia : (3, 3) float [kg m^2], about ``com``, axes of the frame
+    frame : which frame, in words; "" if nobody said. Bodies of two named frames cannot be added.
+
+    ``center_mass``, ``moment_inertia`` and the principal ones are the same under the names that trimesh has.
+    """
+
+    mass: float
+    com: Floats
+    inertia: Floats
+    frame: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", float(self.mass))
+        _freeze(self, com=(3,), inertia=(3, 3))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # By the constructor, so that copies are read-only as well.
+        return type(self), (self.mass, self.com, self.inertia, self.frame)
+
+    def _values(self) -> tuple[Any, ...]:
+        return self.mass, *self.com, *self.inertia.flat, self.frame
+
+    def __eq__(self, other: object) -> bool:
+        """Compare to the last bit, in one frame; ``np.allclose`` compares with a tolerance."""
+        return self._values() == other._values() if isinstance(other, MassProps) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
+    @classmethod
+    def nothing(cls) -> MassProps:
+        """Return no mass at all; the neutral element of :func:`combine`."""
+        return cls(0.0, np.zeros(3), np.zeros((3, 3)))
+
+    @property
+    def center_mass(self) -> Floats:
+        """Return (3,) centre of mass [m]."""
+        return self.com
+
+    @property
+    def moment_inertia(self) -> Floats:
+        """Return (3, 3) tensor [kg m^2] about the centre of mass.
+
+        Off-diagonals are tensor elements (-∫xy dm).
+        """
+        return self.inertia
+
+    @property
+    def principal_inertia_components(self) -> Floats:
+        """Return (3,) principal moments [kg m^2], ascending."""
+        return self.principal()[0]
+
+    @property
+    def principal_inertia_vectors(self) -> Floats:
+        """Return (3, 3): the unit axis of each principal moment, one a row, right-handed."""
+        return self.principal()[1].T
+
+    def __add__(self, other: object) -> MassProps:
+        """Return both as one rigid body. InputError if their frames are known to differ."""
+        if not isinstance(other, MassProps):
+            return NotImplemented
+        if self.frame and other.frame and self.frame != other.frame:
+            raise InputError(
+                f"these bodies are given in two frames ({self.frame}; {other.frame}) and cannot be added; "
+                "bring one into the other's frame with transformed(T), or ask for all in the assembly's frame"
+            )
+        return replace(combine((self, other)), frame=self.frame or other.frame)
+
+    def __radd__(self, other: object) -> MassProps:
+        # sum() begins with 0.
+        return self if other == 0 else NotImplemented
+
+    def __repr__(self) -> str:
+        centre = ", ".join(f"{v:.6g}" for v in self.com)
+        finite = np.isfinite(self.inertia).all()
+        moments = ", ".join(f"{v:.6g}" for v in self.principal()[0]) if finite else "not finite"
+        where = f", frame={self.frame!r}" if self.frame else ""
+        return f"MassProps(mass={self.mass:.6g} kg, com=[{centre}] m, principal=[{moments}] kg m²{where})"
+
+    def transformed(self, placement: ArrayLike, frame: str = "") -> MassProps:
+        """Return the same body after ``placement`` ((4, 4), rigid or mirrored); ``frame`` names the new
+        frame.
+
+        A placement that scales is refused (InputError): a mass says nothing about what scaling does to it.
+        Scaled *geometry* is handled exactly, by :func:`place`.
+        """
+        matrix = as_placement(placement)
+        if not is_rigid(matrix):
+            raise InputError(
+                "a body with a mass can be moved, turned and mirrored, but not scaled; "
+                f"the placement's axes have the lengths {np.linalg.norm(matrix[:3, :3], axis=0).tolist()}"
+            )
+        turn = matrix[:3, :3]
+        return MassProps(self.mass, turn @ self.com + matrix[:3, 3], turn @ self.inertia @ turn.T, frame)
+
+    def principal(self) -> tuple[Floats, Floats]:
+        """Return the principal moments ((3,) [kg m^2], ascending) and axes ((3, 3), columns,
+        right-handed).
+        """
+        moments, axes = np.linalg.eigh((self.inertia + self.inertia.T) / 2)
+        if np.linalg.det(axes) < 0:
+            axes = axes * np.array([1.0, 1.0, -1.0])
+        return moments, axes
+
+    def check(self, tolerance: float = CHECK_TOLERANCE) -> tuple[TensorProblem, ...]:
+        """Return everything that keeps this from being a rigid body; empty if all is well.
+
+        On eigenvalues, never on the diagonal: diag(.02, .02, .02) with ixy = .015 looks right and is not.
+        ``tolerance`` is relative to the largest principal moment; a flat plate (a + b = c) is fine.
+        """
+        if not (np.isfinite(self.mass) and np.isfinite(self.com).all() and np.isfinite(self.inertia).all()):
+            return (TensorProblem.NOT_FINITE,)
+        problems: list[TensorProblem] = []
+        scale = float(np.abs(self.inertia).max())
+        if np.abs(self.inertia - self.inertia.T).max() > tolerance * scale:
+            problems.append(TensorProblem.NOT_SYMMETRIC)
+        if self.mass <= 0:
+            problems.append(TensorProblem.ZERO_MASS if self.mass == 0 else TensorProblem.NEGATIVE_MASS)
+        if scale == 0:
+            return (*problems, TensorProblem.ZERO_INERTIA)
+        low, mid, high = self.principal()[0]
+        if low <= 0:
+            problems.append(TensorProblem.NOT_POSITIVE_DEFINITE)
+        if low + mid < high * (1 - tolerance):
+            problems.append(TensorProblem.TRIANGLE_INEQUALITY)
+        return tuple(problems)
+
+    def to_inertial(self) -> InertialProperties:
+        """Return the spec's plain type, the tensor made exactly symmetric."""
+        x, y, z = self.com.tolist()
+        (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = ((self.inertia + self.inertia.T) / 2).tolist()
+        return InertialProperties(self.mass, (x, y, z), ixx, iyy, izz, ixy, ixz, iyz)
+
+
+def parallel_axis(masses: Floats, offsets: Floats) -> Floats:
+    """Return (3, 3) tensor [kg m^2] of point masses ((N,) [kg]) at ``offsets`` ((N, 3) [m]) about the
+    origin.
+    """
+    second = np.einsum("n,ni,nj->ij", masses, offsets, offsets)
+    result: Floats = np.trace(second) * _EYE3 - second
+    return result
+
+
+def combine(bodies: Sequence[MassProps]) -> MassProps:
+    """Return all bodies as one rigid body, in their common frame."""
+    if not bodies:
+        return MassProps.nothing()
+    return combine_arrays(
+        np.array([b.mass for b in bodies]),
+        np.array([b.com for b in bodies]),
+        np.array([b.inertia for b in bodies]),
+    )
+
+
+def combine_arrays(masses: ArrayLike, coms: ArrayLike, inertias: ArrayLike) -> MassProps:
+    """Do as :func:`combine`, from (N,) [kg], (N, 3) [m], (N, 3, 3) [kg m^2].
+
+    Without any mass the centre is the origin, since there is none.
+    """
+    mass = np.asarray(masses, float)
+    com = np.asarray(coms, float)
+    total = float(mass.sum())
+    if total == 0:
+        return MassProps(total, np.zeros(3), np.asarray(inertias, float).sum(axis=0).reshape(3, 3))
+    centre = (mass[:, None] * com).sum(axis=0) / total
+    tensor = np.asarray(inertias, float).sum(axis=0) + parallel_axis(mass, com - centre)
+    return MassProps(total, centre, (tensor + tensor.T) / 2)
+
+
+def place(
+    volumes: ArrayLike, coms: ArrayLike, units: ArrayLike, placements: ArrayLike
+) -> tuple[Floats, Floats, Floats]:
+    """Return the geometry of N instances after their placements.
+
+    volumes : (N,) [m^3]; coms : (N, 3) [m]; units : (N, 3, 3) [m^5], tensors per unit density about the coms
+    placements : (N, 4, 4); rigid, mirrored, or any invertible affine map (then exact as well: the second
+    moments S = tr(I)/2 - I of a body mapped by A become |det A| A S Aᵀ)
+
+    Returns volumes, coms and units in the outer frame.
+    """
+    volume = np.asarray(volumes, float)
+    matrix = np.asarray(placements, float)
+    turn = matrix[:, :3, :3]
+    unit = np.asarray(units, float)
+    com = np.einsum("nij,nj->ni", turn, np.asarray(coms, float)) + matrix[:, :3, 3]
+    moved = turn @ unit @ turn.transpose(0, 2, 1)
+    scaled = ~rigid_mask(matrix)
+    if scaled.any():
+        stretch = np.abs(np.linalg.det(turn[scaled]))
+        volume = volume.copy()
+        volume[scaled] *= stretch
+        moved[scaled] = _stretched(unit[scaled], turn[scaled], stretch)
+    return volume, com, moved
+
+
+def _stretched(unit: Floats, turn: Floats, stretch: Floats) -> Floats:
+    trace = np.trace(unit, axis1=1, axis2=2)[:, None, None]
+    second = trace / 2 * _EYE3 - unit
+    second = stretch[:, None, None] * (turn @ second @ turn.transpose(0, 2, 1))
+    result: Floats = np.trace(second, axis1=1, axis2=2)[:, None, None] * _EYE3 - second
+    return result
+
+
+def rigid_mask(placements: Floats, tolerance: float = RIGID_TOLERANCE) -> NDArray[np.bool_]:
+    """Return (N,) bool: which of the (N, 4, 4) placements neither scale nor shear (a mirror is rigid)."""
+    turn = placements[:, :3, :3]
+    off = np.abs(turn.transpose(0, 2, 1) @ turn - _EYE3)
+    result: NDArray[np.bool_] = off.max(axis=(1, 2)) <= tolerance
+    return result
+
+
+def is_rigid(placement: Floats, tolerance: float = RIGID_TOLERANCE) -> bool:
+    """Report whether a (4, 4) placement neither scales nor shears; a mirror is rigid."""
+    return bool(rigid_mask(placement[None], tolerance)[0])
+
+
+def as_placement(value: ArrayLike) -> Floats:
+    """Return a (4, 4) placement, checked: finite, last row 0 0 0 1, invertible (InputError otherwise)."""
+    try:
+        matrix = np.asarray(value, float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"a placement is a 4 x 4 matrix of numbers ({error})") from error
+    if matrix.shape != (4, 4):
+        raise InputError(f"a placement is a 4 x 4 matrix, got the shape {matrix.shape}")
+    if not np.isfinite(matrix).all() or not np.allclose(matrix[3], (0, 0, 0, 1), atol=1e-12):
+        raise InputError(
+            f"a placement needs finite numbers and the last row 0 0 0 1, got {matrix[3].tolist()}"
+        )
+    if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
+        raise InputError("a placement must be invertible; this one flattens the part")
+    return matrix

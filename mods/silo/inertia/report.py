@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 from silo.bom.errors import counted
 
 if TYPE_CHECKING:
-    from silo.inertia.core import InertialProperties, MassProps, TensorProblem
     from silo.inertia.links import LinkFrame
+    from silo.inertia.model import InertialProperties, MassProps, TensorProblem
 
 
 logger = logging.getLogger(__name__)
@@ -179,8 +179,8 @@ class InertiaReport:
         for name, part in self.parts():
             masses[name, part.name] += part.total_mass
         groups: dict[str, list[PartWarning]] = defaultdict(list)
-        for one in sorted(self.warnings, key=lambda w: -masses.get((w.link_name, w.part_name), 0.0)):
-            groups[str(one.code)].append(one)
+        for warning in sorted(self.warnings, key=lambda w: -masses.get((w.link_name, w.part_name), 0.0)):
+            groups[str(warning.code)].append(warning)
         causes = []
         for code, warnings in groups.items():
             places = {(w.link_name, w.part_name) for w in warnings}

@@ -13,7 +13,7 @@
                     HELD ◀──────── refused, damaged, or a question ────── discard ───╯
 
 An entry is one row from its first moment to its last; file and BOM of one commit share it. It counts from the
-moment that ``stage`` returns. ``key`` names it for ever: it is the idempotency key of the file and the
+moment that ``stage`` returns. ``key`` names it forever: it is the idempotency key of the file and the
 ``sync_id`` of the BOM, so that sending twice does no harm. Standard library only.
 """
 
@@ -21,8 +21,9 @@ from __future__ import annotations
 
 import json
 import math
+import sqlite3
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,7 @@ from uuid import uuid4
 from silo.api.config import Pause
 from silo.bom.errors import Translate, duration, english
 from silo.bom.model import Extraction
+from silo.files import seen_as
 from silo.platform import Stamp
 
 
@@ -55,26 +57,18 @@ UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True)
-class Commit:
-    """What is to be sent.
+class Said:
+    """What stands in the row of a commit as the commit gives it.
 
     path, label
         the document, and how people call it.
-    identity, part_number
-        the item by its Silo UUID, or by its number where that is known; one of them is needed.
     taken_at
         seconds since 1970, UTC.
-    file
-        what to copy: the document, or a second name of it (:meth:`Store.hold`); None where only the BOM goes.
-    stamp
-        of the document at the commit, where it is copied itself: what is written into it later is no part of
-        the commit.
+    identity, part_number
+        the item by its Silo UUID, or by its number where that is known; one of them is needed.
     sha256
-        of a document whose file is committed already, so that only the BOM goes.
-    extraction
-        the BOM as it was at the commit; compared with the server's and merged when it is sent.
-    request
-        instead of that, a merge request as JSON, sent as it is.
+        of its file; "" while the copy is being made. Of the document, whose file is committed already, where
+        only the BOM goes.
     allow_missing
         sync the BOM although links are broken.
     remark
@@ -83,11 +77,12 @@ class Commit:
         SHA-256 of the committed file that this one was made from, :data:`UNKNOWN`, or "": nobody asks whether
         a colleague's newer revision is there (a file that has only just got its item).
     on_top_of
-        the newest revision that a person saw and sends this one on top of (:func:`silo.outbox.store.seen`).
+        the newest revision that a person saw and sends this one on top of (:func:`on_top`).
     document
         what is in a file that a project sends (:class:`InFile` as JSON); "" for the file of one item.
     renamed
-        :data:`SAME_PART` where a person saw that the file has a new name.
+        its file has another name than the item's: :data:`ASKED` whether it is the same part, or a person's
+        word that it is :data:`SAME_PART`.
     """
 
     path: str
@@ -97,17 +92,34 @@ class Commit:
     part_number: str = ""
     key: str = field(default_factory=new_key)
     comment: str = ""
-    file: Path | None = None
-    stamp: Stamp | None = None
     sha256: str = ""
-    extraction: Extraction | None = None
-    request: str = ""
     allow_missing: bool = False
     remark: str = ""
     origin: str = ""
     on_top_of: str = ""
     document: str = ""
     renamed: str = ""
+
+
+@dataclass(frozen=True)
+class Commit(Said):
+    """What is to be sent.
+
+    file
+        what to copy: the document, or a second name of it (:meth:`Store.hold`); None where only the BOM goes.
+    stamp
+        of the document at the commit, where it is copied itself: what is written into it later is no part of
+        the commit.
+    extraction
+        the BOM as it was at the commit; compared with the server's and merged when it is sent.
+    request
+        instead of that, a merge request as JSON, sent as it is.
+    """
+
+    file: Path | None = None
+    stamp: Stamp | None = None
+    extraction: Extraction | None = None
+    request: str = ""
 
 
 @dataclass(frozen=True)
@@ -129,7 +141,7 @@ class InFile:
 
     def to_json(self) -> str:
         """Return it as text, for :attr:`Commit.document`."""
-        return json.dumps([[list(one) for one in self.items], self.own, self.user])
+        return json.dumps([[list(item) for item in self.items], self.own, self.user])
 
     @classmethod
     def of(cls, text: str) -> InFile:
@@ -138,8 +150,8 @@ class InFile:
         return cls(tuple((str(identity), str(name)) for identity, name in items), bool(own), str(user))
 
 
-@dataclass(frozen=True)
-class Entry:
+@dataclass(frozen=True, kw_only=True)
+class Entry(Said):
     """A row of the outbox.
 
     server
@@ -147,61 +159,39 @@ class Entry:
         tried.
     file_left, bom_left
         what is still to be sent.
-    file_name, copy, sha256, size
-        of its file; ``sha256`` is "" while the copy is being made, and that of the document where only the
-        BOM goes.
+    file_name, copy, size
+        of its file.
     base_revision
         the server's latest revision before the first attempt; None before that.
     revision
         the revision that the file became.
-    origin, on_top_of
-        see :class:`Commit`.
     newer
         the colleague's revision that it would undo, for a person to look at: its fields; empty where there is
         none.
     place, links
         where the file is in its project, and JSON of what it links to; "" where nobody could look.
-    renamed
-        its file has another name than the item's: :data:`ASKED` whether it is the same part, or a person's
-        word that it is :data:`SAME_PART`.
     stamp
         of its file at the commit, as JSON; "" where it was not looked at.
-    document
-        see :class:`Commit`.
     superseded
         a newer file or BOM of the same item has arrived, so that this one would undo it.
     """
 
     id: int
-    key: str
     server: str
     state: State
-    path: str
-    label: str
-    identity: str
-    part_number: str
-    taken_at: float
-    comment: str
     file_left: bool
     file_name: str
     copy: str
-    sha256: str
     size: int
     bom_left: bool
-    allow_missing: bool
-    remark: str
-    reason: str = ""
-    base_revision: int | None = None
-    revision: int | None = None
-    origin: str = ""
-    on_top_of: str = ""
-    newer: Mapping[str, Any] = field(default_factory=dict)
-    place: str = ""
-    links: str = ""
-    renamed: str = ""
-    stamp: str = ""
-    document: str = ""
-    superseded: bool = False
+    reason: str
+    base_revision: int | None
+    revision: int | None
+    newer: Mapping[str, Any]
+    place: str
+    links: str
+    stamp: str
+    superseded: bool
 
     @property
     def item(self) -> str:
@@ -221,6 +211,99 @@ class Entry:
     def is_away(self, here: str) -> bool:
         """True where it is meant for another server than the one in use; ``here`` may be ""."""
         return bool(here) and self.server not in ("", here)
+
+
+VERSION = 8
+TABLES = """
+CREATE TABLE entry (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    key TEXT NOT NULL UNIQUE,
+    server TEXT NOT NULL DEFAULT '',
+    state TEXT NOT NULL CHECK (state IN ('keeping', 'waiting', 'held')),
+    path TEXT NOT NULL,
+    label TEXT NOT NULL DEFAULT '',
+    identity TEXT NOT NULL DEFAULT '',
+    part_number TEXT NOT NULL DEFAULT '',
+    taken_at REAL NOT NULL,
+    comment TEXT NOT NULL DEFAULT '',
+    file_left INTEGER NOT NULL DEFAULT 0,
+    file_name TEXT NOT NULL DEFAULT '',
+    copy TEXT NOT NULL DEFAULT '',
+    sha256 TEXT NOT NULL DEFAULT '',
+    size INTEGER NOT NULL DEFAULT 0,
+    stamp TEXT NOT NULL DEFAULT '',        -- JSON; of the file at the commit
+    bom_left INTEGER NOT NULL DEFAULT 0,
+    allow_missing INTEGER NOT NULL DEFAULT 0,
+    remark TEXT NOT NULL DEFAULT '',
+    reason TEXT NOT NULL DEFAULT '',
+    base_revision INTEGER,
+    revision INTEGER,
+    origin TEXT NOT NULL DEFAULT '',
+    on_top_of TEXT NOT NULL DEFAULT '',    -- number and SHA-256
+    newer TEXT NOT NULL DEFAULT '',        -- JSON; "" where there is none
+    place TEXT NOT NULL DEFAULT '',
+    links TEXT NOT NULL DEFAULT '',        -- JSON; "" where nobody looked
+    renamed TEXT NOT NULL DEFAULT '',      -- '', 'asked', 'same part'
+    document TEXT NOT NULL DEFAULT '',     -- JSON; "" for the file of one item
+    extraction TEXT NOT NULL DEFAULT '',   -- JSON; "" where there is none
+    request TEXT NOT NULL DEFAULT ''       -- JSON; written before it is sent, and then sent again unchanged
+);
+CREATE TABLE sent (
+    server TEXT NOT NULL,
+    item TEXT NOT NULL COLLATE NOCASE,     -- a part number or an identity
+    kind TEXT NOT NULL CHECK (kind IN ('file', 'bom')),
+    entry_id INTEGER NOT NULL,             -- the newest entry that arrived
+    PRIMARY KEY (server, item, kind)
+);
+CREATE TABLE pause (
+    server TEXT NOT NULL,
+    item TEXT NOT NULL DEFAULT '',         -- '': of the whole server
+    until REAL NOT NULL,
+    reason TEXT NOT NULL,
+    code TEXT NOT NULL,
+    failures INTEGER NOT NULL,
+    told INTEGER NOT NULL,
+    PRIMARY KEY (server, item)
+);
+CREATE TABLE derived (
+    sha256 TEXT PRIMARY KEY,               -- a file that was saved, and not committed
+    origin TEXT NOT NULL,                  -- the committed file that it was made from
+    at REAL NOT NULL
+);
+CREATE TABLE known (
+    server TEXT NOT NULL,
+    sha256 TEXT NOT NULL,
+    item TEXT NOT NULL COLLATE NOCASE,     -- its identity
+    revision INTEGER NOT NULL,
+    PRIMARY KEY (server, sha256, item)
+);
+"""
+
+# All but what may be large.
+_COLUMNS = ", ".join(each_field.name for each_field in fields(Entry) if each_field.name != "superseded")
+SELECT = f"""SELECT {_COLUMNS}, EXISTS (
+    SELECT 1 FROM sent s WHERE s.server = e.server AND s.item IN (e.identity, e.part_number) AND s.item <> ''
+    AND s.entry_id > e.id AND (s.kind = 'file' AND e.file_left OR s.kind = 'bom' AND e.bom_left)
+) AS superseded FROM entry e"""  # noqa: S608
+
+_FLAGS = ("file_left", "bom_left", "allow_missing", "superseded")
+
+
+def entry_of(row: sqlite3.Row) -> Entry:
+    """Return what a row of :data:`SELECT` says."""
+    values = dict(row)
+    values["state"] = State(values["state"])
+    values["newer"] = json.loads(values["newer"]) if values["newer"] else {}
+    return Entry(**values | {name: bool(values[name]) for name in _FLAGS})
+
+
+def on_top(comment: str, newer: Mapping[str, Any]) -> dict[str, Any]:
+    """What a commit says that a person sends on top of a revision that they saw: the fields of a commit."""
+    number = newer["revision_number"]
+    if not newer.get("set_back"):  # a server that was set back has nothing of a colleague
+        who = f" by {newer['created_by']}" if newer.get("created_by") else ""
+        comment = f"{comment} (on top of revision {number}{who}, which is not in it)".strip()
+    return {"on_top_of": seen_as(number, newer.get("file_checksum")), "comment": comment}
 
 
 @dataclass(frozen=True)

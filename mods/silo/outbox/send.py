@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,15 @@ from silo.api.files import (
 )
 from silo.api.policy import Backoff, Scope, Then, is_certain, judge, pause_after
 from silo.api.transport import Cancel, stop_if
-from silo.api.wire import HeldItem, LinkedFile, MergeRequest, MergeResult, Revision, SourceDocument
+from silo.api.wire import (
+    HeldItem,
+    LinkedFile,
+    MergeRequest,
+    MergeResult,
+    ProductSummary,
+    Revision,
+    SourceDocument,
+)
 from silo.bom.compare import MergePlan
 from silo.bom.errors import (
     CancelledError,
@@ -52,10 +61,9 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.report import from_plain, project_folder
-from silo.bom_sync import Resolved, Status, decide, merge_request, merged, resolve, server_lines
+from silo.bom_sync import Resolved, Status, decide, merge_request, merged, resolve, server_lines, server_of
 from silo.outbox.entry import ASKED, SAME_PART, Entry, InFile, State, new_key
 from silo.outbox.store import OutboxError, Store
-from silo.standard_items import server_of
 
 
 @dataclass(frozen=True)
@@ -70,6 +78,10 @@ class Sent:
         the file's new revision; None where it had none, or the server had this very file already.
     sync_id
         names the BOM's merge; "" where there was none to sync.
+    uploaded
+        the revision that the file became, as the server answered.
+    summary
+        what the server keeps of the product then; None where it does not say.
     """
 
     entry: Entry
@@ -80,6 +92,8 @@ class Sent:
     result: MergeResult | None = None
     revision: int | None = None
     sync_id: str = ""
+    uploaded: Revision | None = None
+    summary: ProductSummary | None = None
 
     @property
     def number(self) -> str:
@@ -151,8 +165,10 @@ def send_all(
         if force:
             store.resume(client.base_url)
             for entry in store.entries():
-                if entry.newer.get("set_back") and entry.server == canonical(client.base_url):
-                    store.retry(entry.id)
+                is_set_back = entry.newer.get("set_back") and not entry.superseded
+                if is_set_back and entry.server == canonical(client.base_url):
+                    with suppress(InputError):  # discarded in this moment
+                        store.retry(entry.id)
         run = _Run(store, client, cancelled, on_progress, on_sent, backoff, chance)
         run.all()
         run.report.pause = store.pause(client.base_url)
@@ -179,18 +195,21 @@ class _Run:
     report: Report = field(default_factory=Report)
     behind: set[str] = field(default_factory=set)  # items whose older entry has to go first
     _documents: bool | None = None  # whether the server knows documents; None: not asked yet
+    _sums_up: bool = True  # until it answers that it keeps no summaries
 
     def all(self) -> None:
         if self._is_paused():
             return
         last = 0
-        # Read anew each time: what is added or discarded meanwhile counts.
-        while self.report.stopped_by is None and (found := self.store.next_due(self.client.base_url, last)):
-            last = found.id
-            if found.state is State.KEEPING and not self.store.is_coming(found.key):
+        # Read again each time: what is added or discarded meanwhile counts.
+        while self.report.stopped_by is None and (
+            due_entry := self.store.next_due(self.client.base_url, last)
+        ):
+            last = due_entry.id
+            if due_entry.state is State.KEEPING and not self.store.is_coming(due_entry.key):
                 # The copy that an earlier run of the program could not make any more.
-                self.store.finish(found.key)
-            if (entry := self.store.entry(found.id)) is None:
+                self.store.finish(due_entry.key)
+            if (entry := self.store.entry(due_entry.id)) is None:
                 continue
             is_ready = entry.state is State.WAITING and not entry.keys & self.behind
             if not is_ready or self._is_paused(entry.item):
@@ -205,13 +224,12 @@ class _Run:
     def _pause(self, error: SiloError, item: str = "") -> None:
         server = self.client.base_url
         before, now = self.store.pause(server, item), self.store.clock()
-        failures = (before.failures if before is not None else 0) + 1
-        self.store.set_pause(server, pause_after(error, failures, now, self.backoff, self.chance()), item)
+        self.store.set_pause(server, pause_after(error, before, now, self.backoff, self.chance()), item)
 
     def _go_well(self, item: str) -> None:
-        for one in ("", item):
-            if self.store.pause(self.client.base_url, one) is not None:
-                self.store.set_pause(self.client.base_url, None, one)
+        for name in ("", item):
+            if self.store.pause(self.client.base_url, name) is not None:
+                self.store.set_pause(self.client.base_url, None, name)
 
     def _try(self, entry: Entry) -> None:
         refused: list[SiloError] = []
@@ -219,7 +237,7 @@ class _Run:
             stop_if(self.cancelled)
             server = entry.server or canonical(self.client.base_url)
             if server != entry.server:
-                # On disk before a byte is sent: whoever comes after a crash knows that it may have arrived.
+                # On disk before a byte is sent: the next run after a crash knows that it may have arrived.
                 self.store.update(entry.id, server=server)
             sent = self._send(replace(entry, server=server), refused)
         except SiloError as error:
@@ -232,6 +250,7 @@ class _Run:
             self._later(entry, refused[0], self._reasons(entry, refused))
         elif sent is not None:
             self._go_well(entry.item)
+            sent = replace(sent, summary=self._summary(sent))
             self.report.sent.append(sent)
             if self.on_sent is not None:
                 self.on_sent(sent)
@@ -281,12 +300,11 @@ class _Run:
         resolved = self._resolved(entry, extraction) if extraction and entry.bom_left else None
         number = (resolved and resolved.assembly.part_number) or self._number(entry)
         if number.casefold() in self.behind:
-            self.behind.add(entry.item)
             return None
-        known, entry = entry.part_number, replace(entry, part_number=number)
+        item, entry = entry.part_number, replace(entry, part_number=number)
         if not number:
             return self._attach(entry)
-        if number != known and not isinstance(number, DocumentId):
+        if number != item and not isinstance(number, DocumentId):
             self.store.update(entry.id, part_number=number)
         if entry.has_file and not entry.file_left and not self._is_there(entry):
             entry = self._again(entry)
@@ -306,27 +324,38 @@ class _Run:
                     self.store.update(entry.id, newer=json.dumps(dict(error.revision)))
                 if isinstance(error, NewerRevisionError | _OtherNameError):
                     return sent
-        if entry.bom_left:
+        if entry.bom_left and self.store.entry(entry.id) is not None:  # discarded meanwhile
             try:
                 return self._send_bom(replace(sent, entry=entry), request)
             except SiloError as error:
                 _refuse(error, refused, alone=not _waits(error) and is_certain(error))
         return sent
 
+    def _summary(self, sent: Sent) -> ProductSummary | None:
+        if not self._sums_up or sent.status not in (Status.MERGED, Status.UNCHANGED):
+            return None
+        try:
+            summary = self.client.get_summary(sent.number)
+        except SiloError:  # the commit has arrived; a very large product is being summed up
+            return None
+        self._sums_up = summary is not None
+        return summary
+
     def _is_there(self, entry: Entry) -> bool:
         """False where a file that was sent is gone, and its BOM would go alone: the server was restored."""
         try:
-            known = self.client.revisions(entry.part_number)
+            revisions = self.client.revisions(entry.part_number)
         except RouteMissingError:
             return True
         except NotFoundError:
             return False
-        return is_there(known, entry.file_name, entry.sha256, entry.revision)
+        return is_there(revisions, entry.file_name, entry.sha256, entry.revision)
 
     def _again(self, entry: Entry) -> Entry:
         """The file has to go once more; what was seen of the server says nothing of it as it is now."""
-        self.store.update(entry.id, file_left=True, base_revision=None, revision=None)
-        return replace(entry, file_left=True, base_revision=None, revision=None)
+        again: dict[str, Any] = {"file_left": True, "base_revision": None, "revision": None}
+        self.store.update(entry.id, **again)
+        return replace(entry, **again)
 
     def _resolved(self, entry: Entry, extraction: str) -> Resolved:
         try:
@@ -376,8 +405,8 @@ class _Run:
         number = str(user["part_number"])
         self.client.attach_file(number, self._copy(entry), entry.file_name, cancelled=self.cancelled)
         self.store.arrived(entry, "file")
-        told = f"This Silo keeps it as an attachment of {number}, without revisions"
-        return Sent(replace(entry, remark=told), number)
+        text = f"This Silo keeps it as an attachment of {number}, without revisions"
+        return Sent(replace(entry, remark=text), number)
 
     def _send_file(self, sent: Sent) -> Sent:
         entry = sent.entry
@@ -390,25 +419,25 @@ class _Run:
             new = None if entry.base_revision is None else there.revision
             return replace(sent, entry=there, revision=new)
         if entry.base_revision is None:
-            known = self._revisions(sent.part_number)
-            self._check_name(entry, known)
-            base = self._base(entry, known)
+            revisions = self._revisions(sent.part_number)
+            self._check_name(entry, revisions)
+            base = self._base(entry, revisions)
             # What the server had before us. Without this note, a file that equals an older revision could
             # not be distinguished from our own that had already arrived.
-            self.store.update(entry.id, base_revision=newest_number(known))
+            self.store.update(entry.id, base_revision=newest_number(revisions))
         else:
-            known = self._revisions(sent.part_number, after=entry.base_revision)
+            revisions = self._revisions(sent.part_number, after=entry.base_revision)
             mine = find_arrived(
                 self.client,
                 sent.part_number,
                 SentFile(entry.file_name, entry.sha256, entry.size, entry.base_revision),
-                known,
+                revisions,
                 cancelled=self.cancelled,
             )
             base = self._base(entry, self._revisions(sent.part_number)) if mine is None else None
         revision = mine or self._upload(entry, base)
         there = self._arrived(entry, revision, revision.base_revision)
-        return replace(sent, entry=there, revision=there.revision)
+        return replace(sent, entry=there, revision=there.revision, uploaded=revision)
 
     def _arrived(self, entry: Entry, revision: Revision, base: int | None = None) -> Entry:
         number = revision.revision_number
@@ -416,12 +445,12 @@ class _Run:
         self.store.arrived(entry, "file", number, base=base)
         return replace(entry, revision=number)
 
-    def _base(self, entry: Entry, known: Sequence[Revision]) -> int | None:
+    def _base(self, entry: Entry, revisions: Sequence[Revision]) -> int | None:
         """The revision that the file was made from; None where nobody asks. NewerRevisionError where sending
         it would undo a colleague's; the server looks again, for somebody may commit before the upload."""
         if not entry.origin:
             return None
-        stands = self._standing(entry, known, entry.origin)
+        stands = self._standing(entry, revisions, entry.origin)
         self._check_set_back(entry, stands)
         stands.check(entry.part_number)
         return max(stands.base_number, 0)
@@ -436,7 +465,10 @@ class _Run:
             self.store.known_revision(entry.server, content, entry.identity)
             for content in (made_from, checksum_of(newest))
         )
-        before = any(one.newer.get("set_back") and one.item == entry.item for one in self.store.entries())
+        before = any(
+            each_entry.newer.get("set_back") and each_entry.item == entry.item
+            for each_entry in self.store.entries()
+        )
         if older == newest.revision_number and (before or (base is not None and base > older)):
             raise NewerRevisionError(
                 f"The server was set back: it has revision {older} of {entry.part_number}, and this is newer "
@@ -444,13 +476,13 @@ class _Run:
                 {**newest.model_dump(mode="json", exclude={"properties", "links"}), "set_back": True},
             )
 
-    def _standing(self, entry: Entry, known: Sequence[Revision], content: str) -> Standing:
+    def _standing(self, entry: Entry, revisions: Sequence[Revision], content: str) -> Standing:
         number = self.store.known_revision(entry.server, content, entry.identity)
-        return standing(known, content, number, entry.on_top_of)
+        return standing(revisions, content, number, entry.on_top_of)
 
     def _upload(self, entry: Entry, base: int | None) -> Revision:
         progress = self.on_progress
-        links = [LinkedFile.model_validate(one) for one in json.loads(entry.links)] if entry.links else None
+        links = [LinkedFile.model_validate(load) for load in json.loads(entry.links)] if entry.links else None
         held = [HeldItem(item=item, object=name) for item, name in InFile.of(entry.document).items]
         try:
             return self.client.upload_file(
@@ -478,8 +510,8 @@ class _Run:
 
     def _unreadable(self, entry: Entry, reason: str) -> _PassingError:
         # This is the disk, and not damage: the hash of a damaged copy differs.
-        told = f"the copy kept for sending cannot be read ({reason})"
-        return _PassingError(f"{entry.path or entry.file_name}: {told}")
+        text = f"the copy kept for sending cannot be read ({reason})"
+        return _PassingError(f"{entry.path or entry.file_name}: {text}")
 
     def _revisions(
         self, part_number: str, *, newest: int | None = None, after: int = 0
@@ -487,18 +519,21 @@ class _Run:
         try:
             return self.client.revisions(part_number, newest=newest, after=after)
         except RouteMissingError:
-            return ()
+            # Their number is all that such a server shows; the files say whether an upload has arrived.
+            is_document = isinstance(part_number, DocumentId)
+            last = 0 if is_document else self.client.get_item(part_number).current_revision
+            return [Revision(revision_number=number) for number in range(last, after, -1)]
         except NotFoundError:
             if not isinstance(part_number, DocumentId):
                 raise
             return ()  # its first upload makes it
 
-    def _check_name(self, entry: Entry, known: Sequence[Revision]) -> None:
+    def _check_name(self, entry: Entry, revisions: Sequence[Revision]) -> None:
         """Refuse a file that has another name than the item's: "Save As" copies the identity along.
 
         Sent unasked, the copy would become the newest revision of the part that it was made from.
         """
-        before = other_name(entry.file_name, known) if entry.identity else ""
+        before = other_name(entry.file_name, revisions) if entry.identity else ""
         if before and entry.renamed != SAME_PART:
             self.store.update(entry.id, renamed=ASKED)
             raise _OtherNameError(
@@ -550,8 +585,8 @@ class _Run:
         """An entry without a file, with the revision that its document is or was made from."""
         if entry.has_file or not entry.origin or entry.revision is not None:
             return entry
-        known = self._revisions(entry.part_number)
-        both = [self._standing(entry, known, content) for content in (entry.sha256, entry.origin)]
+        revisions = self._revisions(entry.part_number)
+        both = [self._standing(entry, revisions, content) for content in (entry.sha256, entry.origin)]
         stands = max(both, key=lambda one: one.base_number)
         stands.check(entry.part_number)
         base = stands.base

@@ -5,7 +5,7 @@ The rules of this module:
 
 * ``KEY.json`` beside the copy describes a commit whole: item, document, hash, base revision, comment, server,
   time. It is written before its row is committed, and a commit ends when it is renamed to ``KEY.gone``;
-* the SQLite file is an index. Where it is missing, damaged, foreign or of another format it is made anew from
+* the SQLite file is an index. If it is missing, damaged, foreign or of another format it is made again from
   the descriptions, and the old file is kept aside. Nothing that was not sent is deleted here;
 * a copy has its name only when it is whole and on disk, and its row the copy's hash;
 * several processes may share the folder; who sends, and who still has to copy a file, holds a lock, which
@@ -34,8 +34,20 @@ from typing import Any, BinaryIO
 from silo.api.config import Pause, canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError, counted
 from silo.bom.report import to_plain
-from silo.files import content_hash, folder_lock, seen_as
-from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
+from silo.files import content_hash, folder_lock
+from silo.outbox.entry import (
+    ASKED,
+    SAME_PART,
+    SELECT,
+    TABLES,
+    VERSION,
+    Commit,
+    Entry,
+    Said,
+    State,
+    entry_of,
+    on_top,
+)
 from silo.platform import (
     data_folder,
     hold_lock,
@@ -49,78 +61,11 @@ from silo.platform import (
     sync_folder,
 )
 
-VERSION = 8
 # What a saved file was made from is forgotten after two years.
 _REMEMBERED = 2 * 366 * 86400.0
 # A copy of a file that was replaced is kept for so long, or until a person deletes it.
 KEPT_ASIDE_DAYS = 90
 _NEWEST_DAYS = 3
-
-_TABLES = """
-CREATE TABLE entry (
-    id INTEGER PRIMARY KEY AUTOINCREMENT,
-    key TEXT NOT NULL UNIQUE,
-    server TEXT NOT NULL DEFAULT '',
-    state TEXT NOT NULL CHECK (state IN ('keeping', 'waiting', 'held')),
-    path TEXT NOT NULL,
-    label TEXT NOT NULL DEFAULT '',
-    identity TEXT NOT NULL DEFAULT '',
-    part_number TEXT NOT NULL DEFAULT '',
-    taken_at REAL NOT NULL,
-    comment TEXT NOT NULL DEFAULT '',
-    file_left INTEGER NOT NULL DEFAULT 0,
-    file_name TEXT NOT NULL DEFAULT '',
-    copy TEXT NOT NULL DEFAULT '',
-    sha256 TEXT NOT NULL DEFAULT '',
-    size INTEGER NOT NULL DEFAULT 0,
-    stamp TEXT NOT NULL DEFAULT '',        -- JSON; of the file at the commit
-    bom_left INTEGER NOT NULL DEFAULT 0,
-    allow_missing INTEGER NOT NULL DEFAULT 0,
-    remark TEXT NOT NULL DEFAULT '',
-    reason TEXT NOT NULL DEFAULT '',
-    base_revision INTEGER,
-    revision INTEGER,
-    origin TEXT NOT NULL DEFAULT '',
-    on_top_of TEXT NOT NULL DEFAULT '',    -- number and SHA-256
-    newer TEXT NOT NULL DEFAULT '',        -- JSON; "" where there is none
-    place TEXT NOT NULL DEFAULT '',
-    links TEXT NOT NULL DEFAULT '',        -- JSON; "" where nobody looked
-    renamed TEXT NOT NULL DEFAULT '',      -- '', 'asked', 'same part'
-    document TEXT NOT NULL DEFAULT '',     -- JSON; "" for the file of one item
-    extraction TEXT NOT NULL DEFAULT '',   -- JSON; "" where there is none
-    request TEXT NOT NULL DEFAULT ''       -- JSON; written before it is sent, and then sent again unchanged
-);
-CREATE TABLE sent (
-    server TEXT NOT NULL,
-    item TEXT NOT NULL COLLATE NOCASE,     -- a part number or an identity
-    kind TEXT NOT NULL CHECK (kind IN ('file', 'bom')),
-    entry_id INTEGER NOT NULL,             -- the newest entry that arrived
-    PRIMARY KEY (server, item, kind)
-);
-CREATE TABLE pause (
-    server TEXT NOT NULL,
-    item TEXT NOT NULL DEFAULT '',         -- '': of the whole server
-    until REAL NOT NULL,
-    reason TEXT NOT NULL,
-    code TEXT NOT NULL,
-    failures INTEGER NOT NULL,
-    told INTEGER NOT NULL,
-    PRIMARY KEY (server, item)
-);
-CREATE TABLE derived (
-    sha256 TEXT PRIMARY KEY,               -- a file that was saved, and not committed
-    origin TEXT NOT NULL,                  -- the committed file that it was made from
-    at REAL NOT NULL
-);
-CREATE TABLE known (
-    server TEXT NOT NULL,
-    sha256 TEXT NOT NULL,
-    item TEXT NOT NULL COLLATE NOCASE,     -- its identity
-    revision INTEGER NOT NULL,
-    PRIMARY KEY (server, sha256, item)
-);
-"""
-
 
 _TABLE_NAMES = ("entry", "sent", "pause", "derived", "known")
 # Another process may be making the database; it takes no longer.
@@ -137,13 +82,14 @@ class _ClosedError(OutboxError):
     """Nobody may write there; what is there can be read."""
 
 
-class Database:
+class QueueDatabase:
     """The file, and the folder of copies beside it; made where they are missing, for their owner only."""
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.time) -> None:
         self.path = path
         self.clock = clock
         self.copies = path.parent / f"{path.stem}-files"
+        self._kept_aside = path.parent / "kept-aside"
         self.closed = ""  # why nothing can be written there, where reading found that
         self._lock = threading.Lock()
         self._is_ready = False
@@ -200,7 +146,7 @@ class Database:
         try:
             yield
         except (sqlite3.Error, OSError) as error:
-            self._is_ready = False  # if it is damaged, the next call makes it anew
+            self._is_ready = False  # if it is damaged, the next call makes it again
             raise OutboxError(
                 f"{self.path}: the outbox cannot be used now ({error}). What waits in it is still there. "
                 "Make room on the disk or mend its permissions, then try again"
@@ -222,11 +168,11 @@ class Database:
             sync_folder(self.path.parent)
         except OSError as error:
             waiting = len([*self.copies.glob("*.json")])
-            told, again = "Nothing was kept for sending", "commit again"
+            text, again = "Nothing was kept for sending", "commit again"
             if waiting:
-                told, again = f"{counted(waiting, 'commit')} in {self.copies} cannot be sent", "try again"
+                text, again = f"{counted(waiting, 'commit')} in {self.copies} cannot be sent", "try again"
             raise _ClosedError(
-                f"{self.path}: the outbox cannot be written ({error.strerror or error}). {told}; make room "
+                f"{self.path}: the outbox cannot be written ({error.strerror or error}). {text}; make room "
                 f"or mend the permissions, then {again}"
             ) from error
         with self._translated():
@@ -254,7 +200,7 @@ class Database:
             try:
                 for name in _TABLE_NAMES:
                     db.execute(f"SELECT * FROM {name} LIMIT 0")  # noqa: S608
-                db.execute(f"{_SELECT} LIMIT 0")
+                db.execute(f"{SELECT} LIMIT 0")
                 return bool(db.execute("PRAGMA quick_check(1)").fetchone()[0] == "ok")
             except sqlite3.DatabaseError as error:
                 if isinstance(error, sqlite3.OperationalError) and "no such" not in str(error):
@@ -274,17 +220,17 @@ class Database:
                 db.execute("PRAGMA journal_mode = WAL")
             db.execute("PRAGMA synchronous = FULL")
             with _transaction(db):
-                for statement in filter(None, map(str.strip, _TABLES.split(";\n"))):
+                for statement in filter(None, map(str.strip, TABLES.split(";\n"))):
                     db.execute(statement)
                 self._reconcile(db, old)
                 db.execute(f"PRAGMA user_version = {VERSION}")
 
     def _readable(self, table: str) -> list[dict[str, Any]]:
-        found: list[dict[str, Any]] = []
+        result: list[dict[str, Any]] = []
         with suppress(sqlite3.DatabaseError), closing(self._connect()) as db:
             for row in db.execute(f"SELECT * FROM {table}"):  # noqa: S608
-                found.append(dict(row))  # what comes before the damage counts
-        return found
+                result.append(dict(row))  # what comes before the damage counts
+        return result
 
     def aside(self, path: str) -> Path:
         """A new place for a copy of a file; its folder is there. DocumentError where it cannot be made."""
@@ -295,10 +241,6 @@ class Database:
             raise DocumentError(str(folder), f"cannot be made ({error.strerror or error})") from error
         return folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
 
-    @property
-    def _kept_aside(self) -> Path:
-        return self.path.parent / "kept-aside"
-
     # -- descriptions -----------------------------------------------------------------------------------
 
     def _described(self, key: str) -> Path:
@@ -306,9 +248,9 @@ class Database:
 
     def _describe(self, db: sqlite3.Connection, key: str) -> None:
         """Write a row beside its copy; called before the transaction ends."""
-        row = db.execute("SELECT * FROM entry WHERE key = ?", (key,)).fetchone()
-        with replacing(self._described(key)) as file:
-            file.write(json.dumps(dict(row)).encode())
+        for row in db.execute("SELECT * FROM entry WHERE key = ?", (key,)):  # none: discarded meanwhile
+            with replacing(self._described(key)) as file:
+                file.write(json.dumps(dict(row)).encode())
 
     def _end(self, db: sqlite3.Connection, entry: Entry) -> None:
         """Forget a commit; its files go once the transaction is on disk."""
@@ -320,7 +262,7 @@ class Database:
     def _reconcile(
         self, db: sqlite3.Connection, old: Mapping[str, Iterable[Mapping[str, Any]]] | None = None
     ) -> None:
-        """Make rows and descriptions agree: whichever a crash or a lost database has left out is made.
+        """Make rows and descriptions agree: what a crash or a lost database has left out is made.
 
         old
             table → rows of a database that is given up; a description is newer than a row.
@@ -328,36 +270,33 @@ class Database:
         names = sorted(name for name in os.listdir(self.copies) if not name.startswith("."))
         gone = {_key_of(name) for name in names if name.endswith(".gone")}
         db.executemany("DELETE FROM entry WHERE key = ?", [(key,) for key in gone])
-        known = _keys(db)
+        keys = _keys(db)
         lost = {_key_of(name): name for name in names if not name.endswith((".json", ".gone"))}
-        found = []
+        described = []
         for name in names:
             key = _key_of(name)
-            if name == f"{key}.json" and key not in known | gone:
+            if name == f"{key}.json" and key not in keys | gone:
                 if (row := read_memory(self.copies / name)).get("key") == key:
-                    found.append(row)
+                    described.append(row)
                 elif not self._described(key).exists():
                     gone.add(key)  # it ended in this moment, by a program that still has the old database
                 else:
                     replace_patiently(self.copies / name, self.aside(name))
                     lost.setdefault(key, "")
-        for one in sorted(found, key=lambda one: int(one["id"])):
-            _insert(db, "entry", one)
+        for each_row in sorted(described, key=lambda one: int(one["id"])):
+            _insert(db, "entry", each_row)
         for table, rows in (old or {}).items():
             for before in rows:
                 if table != "entry" or before.get("key") not in {None, *gone}:
                     _insert(db, table, before)
-        for key in lost.keys() - _keys(db) - gone:
-            _insert(db, "entry", self._found(key, lost[key]))
+        for key in lost.keys() - _keys(db) - gone:  # so that a person sees it
+            copy = lost[key]
+            reason = _LOST.format("a copy of its file" if copy else "its name")
+            row = {"key": key, "state": State.HELD, "path": "", "taken_at": self.clock(), "reason": reason}
+            _insert(db, "entry", {**row, "file_name": copy, "copy": copy, "file_left": bool(copy)})
         for key in _keys(db):
             if not self._described(key).exists():
                 self._describe(db, key)
-
-    def _found(self, key: str, copy: str) -> dict[str, Any]:
-        """The row of a commit whose description is lost, so that a person sees it."""
-        reason = _LOST.format("a copy of its file" if copy else "its name")
-        row = {"key": key, "state": State.HELD, "path": "", "taken_at": self.clock(), "reason": reason}
-        return {**row, "file_name": copy, "copy": copy, "file_left": bool(copy)}
 
 
 def _keys(db: sqlite3.Connection) -> set[str]:
@@ -376,7 +315,7 @@ def _insert(db: sqlite3.Connection, table: str, values: Mapping[str, Any]) -> No
     )
 
 
-class Origins(Database):
+class FileOrigins(QueueDatabase):
     """What files were made from, as far as it is known here."""
 
     def origin_of(self, sha256: str) -> str:
@@ -443,8 +382,8 @@ class Origins(Database):
         except FileNotFoundError:
             return None
         except OSError as error:
-            told = f"no copy of it could be kept ({error.strerror or error}); it was not replaced"
-            raise DocumentError(path, told) from error
+            text = f"no copy of it could be kept ({error.strerror or error}); it was not replaced"
+            raise DocumentError(path, text) from error
         return target
 
 
@@ -466,20 +405,6 @@ _HELD_AGE = 3600.0
 # The folder of a second name that is a copy, where the disk has no second names.
 _COPIED = "copied"
 
-# All but what may be large.
-_COLUMNS = ", ".join(one.name for one in fields(Entry) if one.name != "superseded")
-_SELECT = f"""SELECT {_COLUMNS}, EXISTS (
-    SELECT 1 FROM sent s WHERE s.server = e.server AND s.item IN (e.identity, e.part_number) AND s.item <> ''
-    AND s.entry_id > e.id AND (s.kind = 'file' AND e.file_left OR s.kind = 'bom' AND e.bom_left)
-) AS superseded FROM entry e"""  # noqa: S608
-
-# What of a commit goes into its row as it is.
-_AS_GIVEN = (
-    *("key", "path", "label", "identity", "part_number", "taken_at", "comment", "allow_missing", "remark"),
-    *("sha256", "request", "origin", "on_top_of", "document", "renamed"),
-)
-
-
 _PAUSE = "until, reason, code, failures, told"
 
 
@@ -487,7 +412,7 @@ class _WrittenError(OSError):
     """The file has another content by now."""
 
 
-class Store(Origins):
+class Store(FileOrigins):
     """Rows and copies. Any thread may call the methods, and other processes share the file.
 
     path
@@ -526,14 +451,14 @@ class Store(Origins):
 
     def _second(self, key: str) -> Path | None:
         """What :meth:`hold` has kept for a commit."""
-        found = (path for path in (self._held / key).rglob("*") if path.is_file())
-        return next((path for path in found if not path.name.endswith(".part")), None)
+        paths = (path for path in (self._held / key).rglob("*") if path.is_file())
+        return next((path for path in paths if not path.name.endswith(".part")), None)
 
     def stage(self, commit: Commit, server: str = "") -> None:
         """Put a commit's row on disk, which takes no time; the caller then calls :meth:`finish`."""
         if commit.file is None and commit.extraction is None and not commit.request:
             raise InputError(f"{commit.path or commit.part_number}: neither a file nor a BOM to keep")
-        row = {name: getattr(commit, name) for name in _AS_GIVEN} | {
+        row = {field.name: getattr(commit, field.name) for field in fields(Said)} | {
             "server": canonical(server) if server else "",
             "state": State.KEEPING if commit.file is not None else State.WAITING,
             "stamp": json.dumps(commit.stamp) if commit.stamp else "",
@@ -542,6 +467,7 @@ class Store(Origins):
             "copy": f"{commit.key}{_ending(commit.file)}" if commit.file is not None else "",
             "bom_left": bool(commit.extraction is not None or commit.request),
             "extraction": json.dumps(to_plain(commit.extraction)) if commit.extraction is not None else "",
+            "request": commit.request,
         }
         try:
             with self.transaction() as db:
@@ -612,19 +538,24 @@ class Store(Origins):
             sha256, size = self._copied(content, copy, "" if is_copied else entry.stamp)
         except _WrittenError as error:
             if held is not None:
-                told = f"{entry.path or entry.file_name}: {error}; commit it again, then discard this"
-                self.update(entry.id, state=State.HELD, reason=told)
+                sentence = f"{entry.path or entry.file_name}: {error}; commit it again, then discard this"
+                self.update(entry.id, state=State.HELD, reason=sentence)
                 return
             raise self._lost(entry, content, str(error)) from error
         except OSError as error:
-            told = f"cannot be copied for sending ({error.strerror or error})"
-            if held is not None or content is copy:
-                self.update(entry.id, reason=f"{entry.path or entry.file_name}: {told}; it is tried again")
+            now = self.by_key(key)
+            if now is None or now.sha256:  # another program was quicker
                 return
-            raise self._lost(entry, content, told) from error
-        known = {"origin": origin} if origin and entry.origin else {}
+            sentence = f"cannot be copied for sending ({error.strerror or error})"
+            if held is not None or content is copy:
+                self.update(
+                    entry.id, reason=f"{entry.path or entry.file_name}: {sentence}; it is tried again"
+                )
+                return
+            raise self._lost(entry, content, sentence) from error
+        values = {"origin": origin} if origin and entry.origin else {}
         place = _place(copy, entry.path)
-        self.update(entry.id, state=State.WAITING, sha256=sha256, size=size, reason="", **place, **known)
+        self.update(entry.id, state=State.WAITING, sha256=sha256, size=size, reason="", **place, **values)
         shutil.rmtree(self._held / key, ignore_errors=True)
         if self.by_key(key) is None:  # discarded meanwhile
             self._drop_files(entry)
@@ -651,25 +582,23 @@ class Store(Origins):
         For a file of another name than the item's this is a person's word that it is the same part. Raises
         :class:`ConflictError` where something newer of the same item has arrived since.
         """
-        entry = self._known(entry_id)
+        entry = self._existing(entry_id)
         if entry.superseded:
             raise ConflictError(
                 f"{entry.part_number or entry.label}: a newer commit of it was sent since, and this one "
                 "would undo it. Discard it"
             )
         ready = State.WAITING if entry.sha256 or not entry.file_left else State.KEEPING
-        changed: dict[str, Any] = {"state": ready, "reason": ""}
-        changed["renamed"] = SAME_PART if entry.renamed == ASKED else entry.renamed
+        renamed = SAME_PART if entry.renamed == ASKED else entry.renamed
+        changed: dict[str, Any] = {"state": ready, "reason": "", "renamed": renamed}
         if entry.newer:
-            changed |= {"on_top_of": seen(entry.newer), "newer": ""}
-            if not entry.newer.get("set_back"):
-                changed["comment"] = on_top(entry.comment, entry.newer)
+            changed |= {"newer": "", **on_top(entry.comment, entry.newer)}
         if server is not None and canonical(server) != entry.server:
             # What was seen of the old server says nothing of the new one.
             changed |= {"server": canonical(server), "base_revision": None, "on_top_of": ""}
             changed |= {"revision": None, "comment": entry.comment}
         if self.bom(entry_id)[0]:
-            # What was refused is made anew: the missing part may have its number now.
+            # What was refused is made again: the missing part may have its number now.
             changed["request"] = ""
         self.update(entry_id, **changed)
         self.set_pause(changed.get("server", entry.server), None, entry.item)
@@ -679,7 +608,7 @@ class Store(Origins):
 
         ``keep``: the copy is kept aside first.
         """
-        entry = self._known(entry_id)
+        entry = self._existing(entry_id)
         if keep and entry.file_left:
             self.save_copy(entry_id, self.aside(entry.file_name))
         with self.transaction() as db:
@@ -690,7 +619,7 @@ class Store(Origins):
 
     def save_copy(self, entry_id: int, target: Path) -> None:
         """Write an entry's file somewhere else, as it is, also where it is damaged."""
-        entry = self._known(entry_id)
+        entry = self._existing(entry_id)
         held = self._second(entry.key)
         try:
             with open(held or self.copies / entry.copy, "rb") as read, replacing(target, mode=0o644) as out:
@@ -726,20 +655,20 @@ class Store(Origins):
     def entries(self) -> tuple[Entry, ...]:
         """All entries, oldest first."""
         with self._open() as db:
-            return tuple(_entry(row) for row in db.execute(f"{_SELECT} ORDER BY e.id"))
+            return tuple(entry_of(row) for row in db.execute(f"{SELECT} ORDER BY e.id"))
 
     def entry(self, entry_id: int) -> Entry | None:
         """One entry, None where it is gone."""
-        return self._one("e.id = ?", entry_id)
+        return self._entry_where("e.id = ?", entry_id)
 
     def by_key(self, key: str) -> Entry | None:
         """The entry of a commit, None where it is gone."""
-        return self._one("e.key = ?", key)
+        return self._entry_where("e.key = ?", key)
 
     def next_due(self, server: str, after: int) -> Entry | None:
         """The oldest entry for a server that is newer than ``after`` and no person has to look at."""
         where = "e.state <> 'held' AND e.server IN ('', ?) AND e.id > ? ORDER BY e.id LIMIT 1"
-        return self._one(where, canonical(server), after)
+        return self._entry_where(where, canonical(server), after)
 
     def bom(self, entry_id: int) -> tuple[str, str]:
         """Extraction and merge request of an entry, as JSON; "" where there is none."""
@@ -752,8 +681,8 @@ class Store(Origins):
         columns = ", ".join(f"{name} = :{name}" for name in values)
         with self.transaction() as db:
             row = {**values, "id": entry_id}
-            for found in db.execute(f"UPDATE entry SET {columns} WHERE id = :id RETURNING key", row):  # noqa: S608
-                self._describe(db, found[0])
+            for row_updated in db.execute(f"UPDATE entry SET {columns} WHERE id = :id RETURNING key", row):  # noqa: S608
+                self._describe(db, row_updated[0])
 
     def arrived(
         self,
@@ -776,9 +705,8 @@ class Store(Origins):
         left = entry.bom_left if kind == "file" else entry.file_left
         with self.transaction() as db:
             if left:
-                changes = "file_left = 0, revision = ?" if kind == "file" else "bom_left = 0, revision = ?"
                 number = revision if kind == "file" else entry.revision
-                db.execute(f"UPDATE entry SET {changes} WHERE id = ?", (number, entry.id))  # noqa: S608
+                db.execute(f"UPDATE entry SET {kind}_left = 0, revision = ? WHERE id = ?", (number, entry.id))  # noqa: S608
                 self._describe(db, entry.key)
             else:
                 self._end(db, entry)
@@ -823,7 +751,7 @@ class Store(Origins):
         for key in ended:
             self._drop(key)
         with suppress(OSError):
-            for folder in [*self._held.iterdir()] if self._held.is_dir() else []:
+            for folder in [*self._held.iterdir()]:
                 is_old = self.clock() - folder.stat().st_mtime > _HELD_AGE
                 if _key_of(folder.name) not in keys and is_old:
                     with suppress(OSError, DocumentError):
@@ -853,31 +781,19 @@ class Store(Origins):
         with suppress(OSError):
             # The mark that it has ended goes last: a copy alone would be taken for a lost commit.
             names = [name for name in os.listdir(self.copies) if _key_of(name) == key]
-            for name in sorted(names, key=lambda one: one.endswith(".gone")):
+            for name in sorted(names, key=lambda each_name: each_name.endswith(".gone")):
                 remove_patiently(self.copies / name)
 
-    def _one(self, where: str, *values: Any) -> Entry | None:
+    def _entry_where(self, where: str, *values: Any) -> Entry | None:
         with self._open() as db:
-            row = db.execute(f"{_SELECT} WHERE {where}", values).fetchone()
-        return _entry(row) if row else None
+            row = db.execute(f"{SELECT} WHERE {where}", values).fetchone()
+        return entry_of(row) if row else None
 
-    def _known(self, entry_id: int) -> Entry:
+    def _existing(self, entry_id: int) -> Entry:
         entry = self.entry(entry_id)
         if entry is None:
             raise InputError(f"the outbox has no entry {entry_id}; it was sent or discarded meanwhile")
         return entry
-
-
-def on_top(comment: str, newer: Mapping[str, Any]) -> str:
-    """The comment of a revision that a person sends on top of a colleague's, which says so."""
-    who = f" by {newer['created_by']}" if newer.get("created_by") else ""
-    note = f"(on top of revision {newer['revision_number']}{who}, which is not in it)"
-    return f"{comment} {note}".strip()
-
-
-def seen(newer: Mapping[str, Any]) -> str:
-    """What names a colleague's revision that a person saw."""
-    return seen_as(newer["revision_number"], newer.get("file_checksum"))
 
 
 def _place(copy: Path, path: str) -> dict[str, str]:
@@ -893,16 +809,6 @@ def _place(copy: Path, path: str) -> dict[str, str]:
     return {"place": place.path, "links": json.dumps(place.as_dicts())}
 
 
-_FLAGS = ("file_left", "bom_left", "allow_missing", "superseded")
-
-
-def _entry(row: sqlite3.Row) -> Entry:
-    values = dict(row)
-    values["state"] = State(values["state"])
-    values["newer"] = json.loads(values["newer"]) if values["newer"] else {}
-    return Entry(**values | {name: bool(values[name]) for name in _FLAGS})
-
-
 def _key_of(copy: str) -> str:
     """Whose copy it is; one that is being made, or was cut off, has a point before its name."""
     return copy.lstrip(".").split(".")[0]
@@ -911,4 +817,4 @@ def _key_of(copy: str) -> str:
 def _ending(file: Path) -> str:
     """The ending of a copy; never that of a description."""
     ending = file.suffix[:20]
-    return f".copy{ending}" if ending.casefold() in (".json", ".gone") else ending
+    return f"{ending}.copy" if ending.casefold() in (".json", ".gone") else ending

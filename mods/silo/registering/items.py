@@ -14,31 +14,47 @@ asked.
 
 A file may carry an identity that the server does not know, from another server or from another computer's
 run. Its item gets that identity; what brings such a file here has asked a person.
+
+What was begun and what was finished when components were registered: one SQLite file, for all processes.
+
+An intent is on disk before the server is asked, and stays until the component's file names its item. What is
+finished stays too: a FreeCAD that had the file open may save its own copy over the identity, and the item
+must be found again then.
+
+What is begun stands in the component's folder too until it is finished, so that another computer continues
+it instead of making a second item.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import sqlite3
+import time
+import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import closing, contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any, Protocol
-from uuid import UUID
 
 from silo.bom.errors import (
     BusyError,
     ConflictError,
     DocumentError,
+    InputError,
     NotFoundError,
     NotSentError,
     ServerFaultError,
     SiloError,
     UnreachableError,
 )
-from silo.bom.model import BomEntry, document_identity, own_identity
+from silo.bom.model import BomEntry, as_uuid, document_identity, own_identity
 from silo.bom.resolve import Proposal
-from silo.registering.journal import Journal, Record, Turn
-from silo.standard_items import Memory, by_description, server_of
+from silo.bom_sync import Memory, by_description, server_of
+from silo.files import folder_lock
+from silo.platform import data_folder, private_file, private_folder, remove_patiently, replacing
 
 # Servers that give UUIDs of their own still keep properties: this one finds an item made before a crash.
 REGISTRATION_PROPERTY = "registration_id"
@@ -66,7 +82,10 @@ class RegistrationApi(Protocol):
         item_type: str,
         properties: Mapping[str, Any],
         idempotency_key: str,
+        **texts: str | None,
     ) -> Mapping[str, Any]: ...
+
+    def archive_item(self, part_number: str, /) -> None: ...
 
 
 # Writes an identity into the component's file: (entry, uuid). Raises DocumentError where it cannot.
@@ -109,13 +128,13 @@ def on_disk(entry: BomEntry, *, shares_file: bool = False) -> tuple[str, str]:
         with Library() as library:
             document = library.open(entry.doc_path)
             obj = document.getObject(entry.object_name) if entry.object_name else None
-            found = own_identity(obj) if obj is not None else None
-            return str(document.Uid), found or ("" if shares_file else document_identity(document) or "")
+            identity = own_identity(obj) if obj is not None else None
+            return str(document.Uid), identity or ("" if shares_file else document_identity(document) or "")
     except DocumentError:
         return "", ""
 
 
-def finished(record: Record, journal: Journal) -> bool:
+def finished(record: RegistrationRecord, journal: Journal) -> bool:
     """Return whether the component's file names its item by now, which another computer may have written; the
     journal knows it then."""
     path, _, name = record.component.rpartition("#")
@@ -126,9 +145,9 @@ def finished(record: Record, journal: Journal) -> bool:
     return True
 
 
-def unclear(proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+def unclear(proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """The answer where nobody can be asked: an error that names the items."""
-    numbers = ", ".join(str(item["part_number"]) for item in found)
+    numbers = ", ".join(str(item["part_number"]) for item in matches)
     raise ConflictError(
         f"{proposal.name}: {numbers} may be its item: made by an interrupted run, or registered from this "
         "document before. The same part, or a copy of it? Look at that, then take it or make a new item"
@@ -162,10 +181,12 @@ def register(
     try:
         with journal.turn(proposal.entry.doc_path, component_key(proposal.entry), tell) as turn:
             run = _Run(proposal, api, turn, stamp, schema, properties or {}, ask)
-            item, found = run.item(check, copy)
+            item, existing = run.item(check, copy)
     except SiloError as error:
         return Registration(proposal, error=error)
-    return Registration(proposal, part_number=str(item["part_number"]), item_id=str(item["id"]), found=found)
+    return Registration(
+        proposal, part_number=str(item["part_number"]), item_id=str(item["id"]), found=existing
+    )
 
 
 @dataclass(frozen=True)
@@ -193,7 +214,7 @@ class _Run:
             self.stamp(entry, str(item["id"]))
             self.turn.done(uid)
             return item, True
-        wanted = "" if copy else _as_uuid(carried)
+        wanted = "" if copy else as_uuid(carried)  # what is none gives its item another
         intent, begun = self.turn.begin(wanted, uid)
         if self.turn.unseen and not wanted:
             # Where others see the file alone, it has the identity before the item is made.
@@ -204,12 +225,12 @@ class _Run:
                 self.turn.forget()
                 return self._registered_meanwhile(now), True
             entry = replace(entry, silo_uuid=wanted)
-        item, found = self._made(intent, begun, wanted)
+        item, existing = self._made(intent, begun, wanted)
         item_id = str(item["id"])
         if item_id.lower() != wanted:
             self.stamp(entry, item_id)
         self.turn.done(uid or on_disk(entry)[0])
-        return item, found
+        return item, existing
 
     def _registered_meanwhile(self, identity: str) -> Mapping[str, Any]:
         """The item that somebody gave the component since it was read."""
@@ -233,11 +254,11 @@ class _Run:
         item = self.api.get_item_by_uuid(record.item_id)
         return None if item is None else self.ask(self.proposal, (item,))
 
-    def _made(self, intent: Record, begun: bool, wanted: str) -> tuple[Mapping[str, Any], bool]:
+    def _made(self, intent: RegistrationRecord, begun: bool, wanted: str) -> tuple[Mapping[str, Any], bool]:
         """The component's item, and whether it was there already."""
         proposal, api = self.proposal, self.api
         item = self._made_before(intent) if begun or wanted else None
-        found = item is not None
+        was_there = item is not None
         if item is None:
             mark = {} if getattr(api, "keeps_item_ids", False) else {REGISTRATION_PROPERTY: intent.wanted}
             try:
@@ -246,8 +267,9 @@ class _Run:
                     proposal.category,
                     proposal.name,
                     item_type=proposal.item_type,
-                    properties={**self.properties, **mark},
+                    properties={**self.properties, **proposal.supply, **mark},
                     idempotency_key=intent.wanted,
+                    **_sourcing(proposal),
                 )
             except SiloError as error:
                 if not _may_have_arrived(error):
@@ -257,9 +279,9 @@ class _Run:
                 item = self._after_a_lost_answer(intent, error)
         if str(item["id"]) != intent.item_id:
             self.turn.replace(str(item["id"]))
-        return item, found
+        return item, was_there
 
-    def _after_a_lost_answer(self, intent: Record, error: SiloError) -> Mapping[str, Any]:
+    def _after_a_lost_answer(self, intent: RegistrationRecord, error: SiloError) -> Mapping[str, Any]:
         try:
             item = self._made_before(intent)
         except ConflictError:
@@ -270,11 +292,11 @@ class _Run:
             raise error
         return item
 
-    def _made_before(self, intent: Record) -> Mapping[str, Any] | None:
+    def _made_before(self, intent: RegistrationRecord) -> Mapping[str, Any] | None:
         """The item that this intent made, if it came that far."""
         api = self.api
-        for known in dict.fromkeys((intent.item_id, intent.wanted)):
-            item = api.get_item_by_uuid(known)
+        for fromkey in dict.fromkeys((intent.item_id, intent.wanted)):
+            item = api.get_item_by_uuid(fromkey)
             if item is not None:
                 return item
         if getattr(api, "keeps_item_ids", False):
@@ -290,12 +312,8 @@ class _Run:
         return self.ask(self.proposal, tuple(doubtful.values())) if doubtful else None
 
 
-def _as_uuid(identity: str) -> str:
-    """Return an identity as servers write it; "" where it is no UUID, so that its item gets another."""
-    try:
-        return str(UUID(identity))
-    except ValueError:
-        return ""
+def _sourcing(proposal: Proposal) -> dict[str, str | None]:
+    return {"sourcing_type": proposal.sourcing} if proposal.sourcing else {}
 
 
 def _may_have_arrived(error: SiloError) -> bool:
@@ -318,7 +336,7 @@ def _of_the_same_name(proposal: Proposal, api: RegistrationApi, since: float) ->
 
 def _all_items(name: str, api: RegistrationApi) -> Iterator[Mapping[str, Any]]:
     yield from api.search_items(name)
-    # A search may be fuzzy, late or short: what is not in it may exist all the same.
+    # A search may be fuzzy, late or short: what is not in it may exist anyway.
     seen, before = 0, frozenset[str]()
     while seen < PAGE * PAGES:
         try:
@@ -363,19 +381,269 @@ def register_standard(
     memory = memory or Memory()
     try:
         item = api.get_item_by_uuid(uuid) or by_description(designation, api)
-        found = item is not None
+        existing = item is not None
         if item is None:
             item = api.create_item(
                 schema,
                 proposal.category,
                 designation,
                 item_type=proposal.item_type,
-                properties={"standard": designation},
+                properties={"standard": designation, **proposal.supply},
                 idempotency_key=uuid,
+                **_sourcing(proposal),
             )
         item_id = str(item["id"])
         if item_id.lower() != uuid.lower():
             memory.remember(server_of(api), {uuid: item_id})
     except SiloError as error:
         return Registration(proposal, error=error)
-    return Registration(proposal, part_number=str(item["part_number"]), item_id=item_id, found=found)
+    return Registration(proposal, part_number=str(item["part_number"]), item_id=item_id, found=existing)
+
+
+RESERVED = ".silo-registering.json"
+"""In a component's folder: what is begun there and not finished, for other computers."""
+
+_TABLE = """
+CREATE TABLE IF NOT EXISTS registrations (
+    component TEXT PRIMARY KEY,
+    wanted TEXT NOT NULL,
+    item_id TEXT NOT NULL,
+    document_uid TEXT NOT NULL DEFAULT '',
+    begun_at REAL NOT NULL,
+    finished_at REAL
+)
+"""
+_COLUMNS = "component, wanted, item_id, document_uid, begun_at, finished_at"
+
+
+@dataclass(frozen=True)
+class RegistrationRecord:
+    """One component's registration.
+
+    wanted
+        the UUID that we asked the server to give the item; ``item_id`` the one that it has.
+    document_uid
+        FreeCAD's own UUID of the document, which survives saving; "" where unknown.
+    begun_at, finished_at
+        seconds since 1970; ``finished_at`` is None while the file does not name its item.
+    """
+
+    component: str
+    wanted: str
+    item_id: str
+    document_uid: str
+    begun_at: float
+    finished_at: float | None
+
+    @property
+    def finished(self) -> bool:
+        return self.finished_at is not None
+
+
+class Journal:
+    """The user's registrations. Safe to use from several threads and processes.
+
+    path
+        the file; by default in the user's data folder.
+    """
+
+    def __init__(
+        self, path: Path | None = None, *, clock: Callable[[], float] = time.time, patience: float = 300.0
+    ) -> None:
+        self.path = path or data_folder() / "registrations.sqlite3"
+        self._clock, self._patience = clock, patience
+
+    def pending(self) -> dict[str, str]:
+        """``file#object`` → the UUID that its item was to get, or has."""
+        return {record.component: record.item_id for record in self.unfinished()}
+
+    def unfinished(self) -> list[RegistrationRecord]:
+        """The registrations whose file does not name its item yet, oldest first."""
+        return self._records("finished_at IS NULL ORDER BY begun_at")
+
+    def find(self, component: str) -> RegistrationRecord | None:
+        """What is known of a component."""
+        return next(iter(self._records("component = ?", component)), None)
+
+    def begin(
+        self, component: str, carried: str = "", beside: RegistrationRecord | None = None
+    ) -> tuple[RegistrationRecord, bool]:
+        """The intent for a component's item, and whether an earlier run had already begun with it.
+
+        carried
+            the identity that its file has from elsewhere, and that the item shall have.
+        beside
+            what another computer has begun (:func:`begun_beside`). It comes before what this one began.
+        """
+        for registration_record in (beside, self.find(component)):
+            if (
+                registration_record is not None
+                and not registration_record.finished
+                and carried in ("", registration_record.wanted, registration_record.item_id)
+            ):
+                self._keep(registration_record)
+                return registration_record, True
+        wanted = carried or str(uuid.uuid4())
+        record = RegistrationRecord(component, wanted, wanted, "", self._clock(), None)
+        self._keep(record)
+        return record, False
+
+    def _keep(self, record: RegistrationRecord) -> None:
+        self._write(
+            f"REPLACE INTO registrations ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?)",  # noqa: S608
+            *vars(record).values(),
+        )
+
+    def replace(self, component: str, item_id: str) -> None:
+        """Remember the UUID that the server chose itself."""
+        self._write("UPDATE registrations SET item_id = ? WHERE component = ?", item_id, component)
+
+    def done(self, component: str, document_uid: str = "") -> None:
+        """The component's file names its item."""
+        changed = "UPDATE registrations SET finished_at = ?, document_uid = ? WHERE component = ?"
+        self._write(changed, self._clock(), document_uid, component)
+
+    def forget(self, component: str) -> None:
+        """The server made no item for it, or it was taken back."""
+        self._write("DELETE FROM registrations WHERE component = ?", component)
+
+    def item_ids(self) -> frozenset[str]:
+        """The items of all components that are known here."""
+        return frozenset(record.item_id for record in self._records("TRUE"))
+
+    @contextmanager
+    def turn(
+        self, path: str, component: str, tell: Callable[[str], object] = lambda _text: None
+    ) -> Iterator[Turn]:
+        """Hold the folder of a component's file while the component is registered, on any computer: two
+        processes never make an item for the same one, and nobody waits for another project's server.
+
+        ``tell`` gets who else does it, if that takes long. Raises InputError.
+        """
+        folder = os.path.dirname(path)
+        with folder_lock(folder, ".silo-register.lock", "registered", self._patience, tell) as unseen:
+            yield Turn(self, path, component, unseen)
+
+    def _records(self, where: str, *values: str) -> list[RegistrationRecord]:
+        with self._open() as db:
+            rows = db.execute(f"SELECT {_COLUMNS} FROM registrations WHERE {where}", values)  # noqa: S608
+            return [RegistrationRecord(*row) for row in rows]
+
+    def _write(self, statement: str, *values: object) -> None:
+        with self._open() as db:
+            db.execute(statement, values)
+
+    @contextmanager
+    def _open(self) -> Iterator[sqlite3.Connection]:
+        try:
+            with closing(self._connect()) as db:
+                db.execute("PRAGMA synchronous = FULL")
+                db.execute("BEGIN IMMEDIATE")
+                db.execute(_TABLE)
+                yield db
+                db.execute("COMMIT")
+        except (sqlite3.Error, OSError) as error:
+            raise InputError(
+                f"{self.path}: the journal of registrations cannot be read ({error}). Mend or move it; items "
+                "of an interrupted run may then exist without a file that names them."
+            ) from error
+
+    def _connect(self) -> sqlite3.Connection:
+        private_folder(self.path.parent)
+        private_file(self.path)  # before SQLite opens it
+        return sqlite3.connect(self.path, timeout=20.0, isolation_level=None)
+
+
+class Turn:
+    """The registration of one component, while nobody else registers anything in its folder.
+
+    unseen
+        why other computers see nothing of it but the component's file; "" if they do.
+    """
+
+    def __init__(self, journal: Journal, path: str, component: str, unseen: str) -> None:
+        self.journal, self.component, self.unseen = journal, component, unseen
+        self._path = path
+
+    def begin(self, carried: str, document_uid: str) -> tuple[RegistrationRecord, bool]:
+        """Begin, or continue what this or another computer began with the same document
+        (:meth:`Journal.begin`). Raises InputError."""
+        beside = begun_beside(self._path, self.component, document_uid)
+        record, begun = self.journal.begin(self.component, carried, beside)
+        if not self.unseen:
+            try:
+                self._reserve(replace(record, document_uid=document_uid))
+            except FileNotFoundError:  # no such folder: nobody else is in it
+                pass
+            except OSError as error:
+                self.unseen = error.strerror or str(error)
+        return record, begun
+
+    def replace(self, item_id: str) -> None:
+        """Remember the UUID that the server chose itself."""
+        self.journal.replace(self.component, item_id)
+
+    def done(self, document_uid: str) -> None:
+        """The component's file names its item."""
+        self.journal.done(self.component, document_uid)
+        self._release()
+
+    def forget(self) -> None:
+        """The server certainly made no item for it."""
+        self.journal.forget(self.component)
+        self._release()
+
+    def _release(self) -> None:
+        with suppress(OSError):  # what stays is found in the file first, or continued by the same document
+            self._reserve(None)
+
+    def _reserve(self, record: RegistrationRecord | None) -> None:
+        path, name = _beside(self._path), os.path.basename(self.component)
+        others = {key: value for key, value in _reserved(path).items() if key != name}
+        if record is not None:
+            others[name] = {k: v for k, v in asdict(record).items() if k not in ("component", "finished_at")}
+        if others:
+            with replacing(path, mode=0o666) as file:  # the next one may be another user
+                file.write(json.dumps(others, indent=1).encode())
+        elif os.path.lexists(path):
+            remove_patiently(path)
+
+
+def begun_beside(path: str, component: str, document_uid: str) -> RegistrationRecord | None:
+    """What a computer has begun with a component, and says so in the folder of its file.
+
+    document_uid
+        FreeCAD's own UUID of the file as it is now: another file of the same name continues nothing.
+
+    Raises InputError.
+    """
+    reservation = _reserved(_beside(path)).get(os.path.basename(component))
+    if reservation is None or not document_uid or reservation["document_uid"] != document_uid:
+        return None
+    return RegistrationRecord(
+        component, reservation["wanted"], reservation["item_id"], "", float(reservation["begun_at"]), None
+    )
+
+
+def _beside(path: str) -> str:
+    return os.path.join(os.path.dirname(path), RESERVED)
+
+
+def _reserved(path: str) -> dict[str, dict[str, Any]]:
+    """What is begun in a folder, by ``file#object``."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            reserved = json.load(file)
+        for identity in reserved.values():
+            uuid.UUID(identity["wanted"])
+            float(identity["begun_at"])
+            if not isinstance(identity["item_id"], str) or not isinstance(identity["document_uid"], str):
+                raise TypeError("UUIDs are texts")
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(
+            f"{path}: what another computer began to register here cannot be read ({error!r}). Register on "
+            "that computer, or delete this file: an item that was begun may then be made a second time."
+        ) from error
+    return dict(reserved)

@@ -3,26 +3,48 @@
 
 The Register Parts dialog in FreeCAD and ``silo-mod register`` both ask this module. A :class:`Candidate` is
 one component without a part number.
+
+What is modelled in an assembly's own file and can be declared a component there.
+
+Nothing here counts: an identity on the object does, and a person gives it. The rules of this module:
+
+* what is shown, how often, and what is used up, the count says (:mod:`silo.bom.roles`);
+* equal copies are proposed as one article: the same shape, or the same label but for FreeCAD's number.
 """
 
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
+from pathlib import Path
 from typing import Any, Protocol
 
 from silo.api.files import other_name
-from silo.bom.errors import CancelledError, NotFoundError, ServerFaultError, SiloError
+from silo.bom.document import label_of, located, object_name, own
+from silo.bom.errors import (
+    CancelledError,
+    DocumentError,
+    InputError,
+    NotFoundError,
+    ServerFaultError,
+    SiloError,
+)
 from silo.bom.findings import FindingCode
-from silo.bom.model import BomEntry, Extraction, meta_key, walk_entries
-from silo.bom.resolve import Proposal, propose, propose_all
+from silo.bom.model import BomEntry, Extraction, document_identity, meta_key, own_identity, walk_entries
+from silo.bom.objects import survey_of
+from silo.bom.resolve import Proposal, crowded_files, is_generic, propose, stems
+from silo.bom.roles import DECLARABLE
+from silo.bom.roots import choose_assembly, silent_reader
+from silo.fcstd import Library
+from silo.fcstd.document import FcstdObject
 from silo.files import content_hash
+from silo.platform import data_folder, one_path, read_memory, write_memory
 from silo.registering.items import component_key
-from silo.registering.modelled import Modelled, modelled
 
 ITEM_TYPES = ("part", "assembly", "consumable", "tool")
 # Servers without a request for many are asked for each; beyond this many nobody reads them in a dialog.
@@ -31,10 +53,12 @@ MOST_LOOKED_UP = 100
 MOST_MODELLED = 200
 # Components that are looked up in one go, between two words of progress.
 _IN_ONE = 500
+# Of a folder, what people chose last.
+MOST_LEARNT = 200
 _SAVED_AT = re.compile(rb'name="LastModifiedDate"[^>]*>\s*<String value="([^"]{0,40})"')
 
 
-class Control(Protocol):
+class RegisterControl(Protocol):
     """A running job's way to the outside."""
 
     def progress(self, detail: str = "", fraction: float | None = None) -> None: ...
@@ -43,7 +67,7 @@ class Control(Protocol):
         """Raise CancelledError where somebody wants the job to stop."""
 
 
-class State(StrEnum):
+class ComponentState(StrEnum):
     """How a component's file stands."""
 
     READY = "ready"
@@ -59,14 +83,14 @@ class State(StrEnum):
     @property
     def usable(self) -> bool:
         """True where the identity can be written."""
-        return self in (State.READY, State.EDITED, State.ELSEWHERE)
+        return self in (ComponentState.READY, ComponentState.EDITED, ComponentState.ELSEWHERE)
 
 
 @dataclass(frozen=True)
-class Seen:
+class OpenedFile:
     """What the GUI thread saw of a component's file. ``saved_at`` is the open document's own time stamp."""
 
-    state: State
+    state: ComponentState
     saved_at: str = ""
 
 
@@ -81,6 +105,64 @@ class Similar:
 
 
 @dataclass(frozen=True)
+class LearntChoice:
+    """What a person chose for a part, so for parts of the same words in the same folder."""
+
+    words: tuple[str, ...]
+    category: str
+    sourcing: str = ""
+    supplier: str = ""
+
+
+class Learnt:
+    """What people chose, by the folder of the part: one small file. Losing it costs questions."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        self._path = path or data_folder() / "learnt-choices.json"
+        self._folders = read_memory(self._path)
+
+    def of(self, entry: BomEntry, name: str) -> LearntChoice | None:
+        """Return the choice for a part whose words are all in this name; the longest, of those the newest."""
+        words = set(stems(name))
+        fitting = [
+            choice
+            for choice in self._choices_in(_folder(entry))
+            if choice.words and words.issuperset(choice.words)
+        ]
+        return max(reversed(fitting), key=lambda choice: len(choice.words), default=None)
+
+    @property
+    def recent(self) -> tuple[str, ...]:
+        """The categories that were chosen last, the newest first."""
+        folder = self._folders.get("")
+        return tuple(map(str, folder)) if isinstance(folder, list) else ()
+
+    def learn(self, choices: Iterable[tuple[BomEntry, str, LearntChoice]]) -> None:
+        """Remember what was chosen for parts of these names."""
+        for entry, name, choice in choices:
+            self._folders[""] = [choice.category, *(word for word in self.recent if word != choice.category)][
+                :8
+            ]
+            if not (words := tuple(sorted(set(stems(name))))):
+                continue
+            choice, folder = replace(choice, words=words), _folder(entry)
+            kept = [word for word in self._choices_in(folder) if word.words != words][-MOST_LEARNT + 1 :]
+            self._folders[folder] = [asdict(word) for word in (*kept, choice)]
+        write_memory(self._path, self._folders)
+
+    def _choices_in(self, folder: str) -> list[LearntChoice]:
+        choices = self._folders.get(folder)
+        try:
+            return [LearntChoice(**{**choice, "words": tuple(choice["words"])}) for choice in choices or ()]
+        except (TypeError, KeyError):  # written by somebody else
+            return []
+
+
+def _folder(entry: BomEntry) -> str:
+    return os.path.dirname(one_path(entry.doc_path)) if entry.doc_path else ""
+
+
+@dataclass(frozen=True)
 class Candidate:
     """One row of the dialog.
 
@@ -90,15 +172,18 @@ class Candidate:
         label of another row whose file has the very same content; "" if there is none.
     article
         what is modelled in the assembly's own file: counted once it has an identity.
+    learnt
+        the category is what a person chose for a part of the same words in the same folder.
     """
 
     proposal: Proposal
-    state: State
+    state: ComponentState
     similar: tuple[Similar, ...] = ()
     twin: str = ""
     same_as: str = ""
     sha256: str = field(default="", repr=False)
     article: Modelled | None = None
+    learnt: bool = False
 
     @property
     def decided(self) -> bool:
@@ -123,13 +208,13 @@ class Candidate:
     @property
     def wanted(self) -> bool:
         """Checked to begin with? Not where a person has to look first."""
-        fine = self.state.usable and self.state is not State.ELSEWHERE
+        fine = self.state.usable and self.state is not ComponentState.ELSEWHERE
         if self.proposal.is_guess or self.article is not None or self.foreign:
             return False
         return fine and not self.same_as and not any(s.same_file for s in self.similar)
 
 
-class Contents:
+class CandidateFiles:
     """The files of candidates by their content; two of each are enough to know another file."""
 
     def __init__(self) -> None:
@@ -144,7 +229,14 @@ class Contents:
     def twin(self, candidate: Candidate) -> Candidate | None:
         """Return the first candidate with the same content in another file."""
         same = self._by_sha256.get(candidate.sha256, ()) if candidate.sha256 else ()
-        return next((one for one in same if one.entry.doc_path != candidate.entry.doc_path), None)
+        return next(
+            (
+                each_candidate
+                for each_candidate in same
+                if each_candidate.entry.doc_path != candidate.entry.doc_path
+            ),
+            None,
+        )
 
 
 @dataclass(frozen=True)
@@ -157,6 +249,8 @@ class Offer:
         key of a component (of a standard part: "" and its designation) → the number that it has.
     unsearched
         why probable duplicates could not be looked for; "" where they were.
+    recent
+        categories that were chosen last, the newest first.
     """
 
     candidates: tuple[Candidate, ...]
@@ -164,6 +258,7 @@ class Offer:
     numbers: Mapping[str, str] = field(default_factory=dict)
     registered: Mapping[tuple[str, str], str] = field(default_factory=dict)
     unsearched: str = ""
+    recent: tuple[str, ...] = ()
 
 
 # --- which components, and what of them -------------------------------------------------------------------
@@ -182,14 +277,15 @@ def copied(extraction: Extraction) -> tuple[BomEntry, ...]:
 
 def offer(
     extraction: Extraction,
-    seen: Mapping[str, Seen],
+    seen: Mapping[str, OpenedFile],
     api: Any,
     schema: str,
-    control: Control,
+    control: RegisterControl,
     begun: Mapping[str, str] | None = None,
     *,
     most: int | None = MOST_LOOKED_UP,
     own_file: bool = True,
+    learnt: Learnt | None = None,
 ) -> Offer:
     """What can be registered of an assembly; a part is an extraction without entries.
 
@@ -215,10 +311,10 @@ def offer(
         for entry in _perhaps_copies(extraction, numbers, api)
         if (entry.silo_uuid or "").lower() in numbers
     ]
-    candidates = [_candidate(p, seen) for p in propose_all(resolved.unregistered, tree, categories)]
-    candidates += [
-        _candidate(p, seen, same_as=numbers[(p.entry.silo_uuid or "").lower()])
-        for p in propose_all(copies, tree, categories)
+    crowded, learnt = crowded_files(tree), learnt or Learnt()
+    candidates = [
+        _candidate(entry, seen, categories, crowded, learnt, numbers if entry in copies else {})
+        for entry in (*resolved.unregistered, *copies)
     ]
     candidates.sort(key=lambda candidate: candidate.entry.is_standard)
     candidates += _modelled(extraction, seen, categories) if own_file else []
@@ -230,59 +326,83 @@ def offer(
         if entry.silo_uuid and entry.silo_uuid.lower() in numbers
     }
     numbers_next = _next_numbers(looked, api, schema)
-    contents = Contents()
+    contents = CandidateFiles()
     for candidate in looked:
         contents.add(candidate)
     twins = [(candidate, contents.twin(candidate)) for candidate in looked]
-    found = tuple(replace(one, twin=twin.proposal.name) if twin else one for one, twin in twins)
-    return Offer(found, categories, numbers_next, registered, unsearched)
+    with_twins = tuple(
+        replace(each_candidate, twin=twin.proposal.name) if twin else each_candidate
+        for each_candidate, twin in twins
+    )
+    recent = tuple(code for code in learnt.recent if code in categories)
+    return Offer(with_twins, categories, numbers_next, registered, unsearched, recent)
 
 
 def _perhaps_copies(extraction: Extraction, numbers: Mapping[str, str], api: Any) -> tuple[BomEntry, ...]:
     """The copied ones, and the document itself where its item's file has another name."""
-    found, top = copied(extraction), extraction.assembly
+    entries, top = copied(extraction), extraction.assembly
     number = numbers.get((top.silo_uuid or "").lower())
-    if number is None or any(entry.key == top.key for entry in found):
-        return found
+    if number is None or any(entry.key == top.key for entry in entries):
+        return entries
     try:
-        return (*found, top) if other_name(top.doc_path, api.revisions(number)) else found
+        return (*entries, top) if other_name(top.doc_path, api.revisions(number)) else entries
     except NotFoundError:
-        return found
+        return entries
 
 
 def _numbers_by_identity(resolved: Any) -> dict[str, str]:
-    known = walk_entries((resolved.assembly, *resolved.entries))
-    return {e.silo_uuid.lower(): e.part_number for e in known if e.silo_uuid and e.part_number}
+    entries = walk_entries((resolved.assembly, *resolved.entries))
+    return {e.silo_uuid.lower(): e.part_number for e in entries if e.silo_uuid and e.part_number}
 
 
-def _candidate(proposal: Proposal, seen: Mapping[str, Seen], same_as: str = "") -> Candidate:
-    entry = proposal.entry
+def _candidate(
+    entry: BomEntry,
+    seen: Mapping[str, OpenedFile],
+    categories: Mapping[str, str],
+    crowded: Set[str],
+    learnt: Learnt,
+    copied: Mapping[str, str],
+) -> Candidate:
+    """``copied``: the number of each identity that another file carries too."""
+    proposal, same_as = (
+        propose(entry, categories, shares_file=entry.doc_path in crowded),
+        copied.get((entry.silo_uuid or "").lower(), ""),
+    )
     if entry.is_standard:  # no file is written for it
-        return Candidate(proposal, State.READY, same_as=same_as)
-    look = seen.get(entry.doc_path, Seen(State.MISSING))
+        return Candidate(proposal, ComponentState.READY, same_as=same_as)
+    choice = learnt.of(entry, proposal.name)
+    if is_learnt := choice is not None and choice.category in categories and not entry.is_assembly:
+        proposal = replace(
+            proposal,
+            category=choice.category,
+            sourcing=choice.sourcing,
+            supplier=choice.supplier,
+            is_guess=False,
+        )
+    look = seen.get(entry.doc_path, OpenedFile(ComponentState.MISSING))
     state, digest = look.state, ""
     if state.usable:
         if look.saved_at and changed_since(entry, look.saved_at):
-            state = State.NEWER
+            state = ComponentState.NEWER
         digest = sha256_or_nothing(entry.doc_path)
-    return Candidate(proposal, state, same_as=same_as, sha256=digest)
+    return Candidate(proposal, state, same_as=same_as, sha256=digest, learnt=is_learnt)
 
 
 def _modelled(
-    extraction: Extraction, seen: Mapping[str, Seen], categories: Mapping[str, str]
+    extraction: Extraction, seen: Mapping[str, OpenedFile], categories: Mapping[str, str]
 ) -> list[Candidate]:
     """What the saved file of the assembly holds that could be declared, or is; those come last."""
     top = extraction.assembly
-    look = seen.get(top.doc_path, Seen(State.MISSING))
+    look = seen.get(top.doc_path, OpenedFile(ComponentState.MISSING))
     try:
         articles = modelled(top.doc_path, top.object_name or None) if look.state.usable else []
     except SiloError:  # the walk has said what is wrong with the file
         return []
     if look.saved_at and changed_since(top, look.saved_at):
-        look = Seen(State.NEWER)
+        look = OpenedFile(ComponentState.NEWER)
     return [
-        Candidate(propose(one.entry, categories, shares_file=True), look.state, article=one)
-        for one in articles[:MOST_MODELLED]
+        Candidate(propose(article.entry, categories, shares_file=True), look.state, article=article)
+        for article in articles[:MOST_MODELLED]
     ]
 
 
@@ -293,8 +413,8 @@ def changed_since(entry: BomEntry, saved_at: str) -> bool:
         the open document's own time stamp.
     """
     head, _ = _look_into(entry.doc_path)
-    found = _SAVED_AT.search(head)
-    if found and found[1].decode("ascii", "replace") != saved_at:
+    match = _SAVED_AT.search(head)
+    if match and match[1].decode("ascii", "replace") != saved_at:
         return True
     # An identity that the command line has stamped into the file leaves FreeCAD's time stamp as it is.
     marks = (b'<Item key="%s" value="' % key.encode() for key in (meta_key(), meta_key(entry.object_name)))
@@ -304,18 +424,31 @@ def changed_since(entry: BomEntry, saved_at: str) -> bool:
 def fingerprint(path: str) -> str:
     """What changes whenever FreeCAD saves a file, and stays when an identity is stamped; "" where unknown."""
     head, content = _look_into(path)
-    found = _SAVED_AT.search(head)
-    return hashlib.sha256(repr((found and found[1], content)).encode()).hexdigest()[:16] if head else ""
+    match = _SAVED_AT.search(head)
+    return hashlib.sha256(repr((match and match[1], content)).encode()).hexdigest()[:16] if head else ""
 
 
 def _look_into(path: str) -> tuple[bytes, list[tuple[str, int]]]:
     """The document's own properties, which come first (a hostile file may never end), and what is beside."""
     try:
         with zipfile.ZipFile(path) as file, file.open("Document.xml") as xml:
-            beside = [(one.filename, one.CRC) for one in file.infolist() if one.filename != "Document.xml"]
+            beside = [
+                (member.filename, member.CRC)
+                for member in file.infolist()
+                if member.filename != "Document.xml"
+            ]
             return xml.read(1 << 18), sorted(beside)
     except (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError):
         return b"", []
+
+
+def picture_in(path: str) -> bytes:
+    """Return the picture that FreeCAD keeps in a file (PNG); nothing where it has none."""
+    try:
+        with zipfile.ZipFile(path) as file, file.open("thumbnails/Thumbnail.png") as picture:
+            return picture.read(1 << 20)
+    except (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError):
+        return b""
 
 
 def sha256_or_nothing(path: str) -> str:
@@ -327,34 +460,47 @@ def sha256_or_nothing(path: str) -> str:
 
 
 def _with_look_alikes(
-    candidates: Sequence[Candidate], api: Any, control: Control, begun: Mapping[str, str], most: int | None
+    candidates: Sequence[Candidate],
+    api: Any,
+    control: RegisterControl,
+    begun: Mapping[str, str],
+    most: int | None,
 ) -> tuple[list[Candidate], str]:
     """The candidates with what they may be already; why nobody knows, where the server did not say."""
-    # An item of a standard part's designation is joined, whoever made it.
-    asked = [one for one in candidates[:most] if not one.entry.is_standard and not one.decided]
-    found: dict[tuple[str, str], list[Any]] = {}
+    # An item of a standard part's designation is joined, no matter who made it.
+    asked = [
+        each_candidate
+        for each_candidate in candidates[:most]
+        if not each_candidate.entry.is_standard and not each_candidate.decided
+    ]
+    look_alikes: dict[tuple[str, str], list[Any]] = {}
     try:
         for start in range(0, len(asked), _IN_ONE):
             some = asked[start : start + _IN_ONE]
             control.check()
             control.progress(some[0].proposal.name, start / len(asked))
-            found |= api.find_look_alikes(_searched(one) for one in some)
+            look_alikes |= api.find_look_alikes(_searched(each_candidate) for each_candidate in some)
     except CancelledError:
         raise
     except SiloError as error:
         # Registering must not fail for want of suggestions; but that there are none is no news of the server.
         return list(candidates), str(error)
 
-    def of(one: Candidate) -> tuple[Similar, ...]:
-        own = begun.get(component_key(one.entry), "")
+    def of(candidate: Candidate) -> tuple[Similar, ...]:
+        own = begun.get(component_key(candidate.entry), "")
         return tuple(
             Similar(like.part_number, like.id, like.name, like.same_file)
-            for like in found.get(_searched(one), ())
-            if like.part_number != one.same_as and like.id != own
+            for like in look_alikes.get(_searched(candidate), ())
+            if like.part_number != candidate.same_as and like.id != own
         )
 
-    looked = {id(one) for one in asked}
-    return [replace(one, similar=of(one)) if id(one) in looked else one for one in candidates], ""
+    looked = {id(each_candidate) for each_candidate in asked}
+    return [
+        replace(each_candidate, similar=of(each_candidate))
+        if id(each_candidate) in looked
+        else each_candidate
+        for each_candidate in candidates
+    ], ""
 
 
 def _searched(candidate: Candidate) -> tuple[str, str]:
@@ -374,3 +520,180 @@ def next_number(api: Any, schema: str, category: str) -> str:
         return str(api.generate_part_number(api.find_schema(schema), category))
     except SiloError:
         return ""
+
+
+# FreeCAD numbers copies with three digits.
+_NUMBER = re.compile(r"\d{3}$")
+
+
+@dataclass(frozen=True)
+class Modelled:
+    """One article that is modelled in the file.
+
+    entry
+        its first object, as a BOM entry; ``quantity`` is what the BOM would count of all its objects.
+    objects
+        names of the objects that are equal, the first one first.
+    alike
+        why they are taken for equal: "shape" or "label"; "" for a single one.
+    source
+        the file that A2plus imported it from.
+    no_part
+        a person said that it is no part, and the file keeps that (``SiloBomExclude``).
+    """
+
+    entry: BomEntry
+    objects: tuple[str, ...]
+    alike: str = ""
+    source: str = ""
+    no_part: bool = False
+
+    @property
+    def decided(self) -> bool:
+        """True where a person has said what it is: a component, or no part."""
+        return self.declared or self.no_part
+
+    @property
+    def declared(self) -> bool:
+        """True where it is a component already."""
+        return self.entry.silo_uuid is not None
+
+    def apart(self) -> tuple[Modelled, ...]:
+        """Each object as an article of its own; the quantity of each is not known then."""
+        return tuple(
+            replace(
+                self, entry=replace(self.entry, object_name=name, label=name, quantity=1), objects=(name,)
+            )
+            for name in self.objects
+        )
+
+
+def modelled(path: str, assembly: str | None = None) -> list[Modelled]:
+    """What is modelled in the file of an assembly, read without FreeCAD. DocumentError, InputError."""
+    with Library() as library:
+        return modelled_in(choose_assembly(library.open(path), assembly), _shape_of)
+
+
+def _shape_of(obj: object) -> str:
+    try:
+        return obj.shape_key() if isinstance(obj, FcstdObject) else ""
+    except DocumentError:  # damaged: nothing is known of it
+        return ""
+
+
+def chosen(articles: Sequence[Modelled], names: Iterable[str], *, apart: bool = False) -> list[Modelled]:
+    """The articles that these names (or labels) mean, each once. InputError for a name that means none."""
+    by_chain: dict[tuple[str, ...], Modelled] = {}
+    for name in names:
+        fitting = [article for article in articles if name in article.objects] or [
+            article for article in articles if name == article.entry.label
+        ]
+        if len(fitting) != 1:
+            label_text = ", ".join(article.entry.object_name for article in articles) or "nothing"
+            what = "nothing" if not fitting else f"{len(fitting)} things"
+            raise InputError(f"{name!r} means {what} that is modelled in this file; there is: {label_text}")
+        for article in fitting[0].apart() if apart else fitting:
+            by_chain[article.objects] = article
+    return list(by_chain.values())
+
+
+def source_identity(article: Modelled) -> str | None:
+    """The identity of the file that A2plus imported an article from; None where there is none to be read."""
+    if not article.source or not os.path.isfile(article.source):
+        return None
+    try:
+        with Library() as library:
+            return document_identity(library.open(article.source))
+    except SiloError:
+        return None
+
+
+def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
+    """The articles modelled in the file of an assembly (or of a single part); what is decided comes last.
+
+    shape_of
+        something equal for equal shapes wherever they are placed; "" where that is not known.
+    """
+    contents = silent_reader().contents(top)
+    shown: dict[str, tuple[Any, int]] = {}
+    for count in () if contents.is_part else contents.own:
+        name = object_name(count.target)
+        shown[name] = (count.target, count.quantity + (shown[name][1] if name in shown else 0))
+    articles = [
+        _article(objects, alike, sum(shown[object_name(obj)][1] for obj in objects))
+        for objects, alike in _alike([obj for obj, _ in shown.values()], shape_of)
+    ]
+    declared: dict[str, tuple[list[Any], int]] = {}
+    for count in contents.counts:
+        target = count.target
+        is_here = getattr(target, "Document", None) is top.Document
+        if is_here and (identity := own_identity(target)):
+            objects, before = declared.get(identity, ([], 0))
+            objects += [] if target in objects else [target]
+            declared[identity] = (objects, before + count.quantity)
+    for identity, (objects, quantity) in declared.items():
+        article = _article(objects, "", quantity)
+        articles.append(replace(article, entry=replace(article.entry, silo_uuid=identity)))
+    of_file = survey_of(top.Document).of(DECLARABLE)
+    no_parts = _alike([obj for obj, _ in of_file if own(obj, "SiloBomExclude") is True], shape_of)
+    return articles + [
+        replace(_article(objects, alike, len(objects)), no_part=True) for objects, alike in no_parts
+    ]
+
+
+def label_stem(label: str, labels: Set[str]) -> str:
+    """A label without the number that FreeCAD gives to copies; "" where that says nothing.
+
+    labels
+        all labels: a number is FreeCAD's only where the label without it is there too.
+    """
+    stem = _NUMBER.sub("", label)
+    stem = stem if stem in labels else label
+    return "" if is_generic(stem) else stem
+
+
+def _alike(objects: Iterable[Any], shape_of: Callable[[Any], str]) -> list[tuple[list[Any], str]]:
+    """Equal objects together: those of one shape, and those of one label whose shapes do not differ."""
+    groups: list[tuple[list[Any], str]] = []
+    by_shape: dict[tuple[str, str], int] = {}
+    by_stem: dict[str, int] = {}
+    offered = list(objects)
+    labels = {label_of(obj) for obj in offered}
+    for obj in offered:
+        shape, stem = shape_of(obj), label_stem(label_of(obj), labels)
+        keys: list[tuple[dict[Any, int], Any, str]] = []
+        if shape:
+            keys.append((by_shape, (getattr(obj, "TypeId", ""), shape), "shape"))
+        if stem:
+            keys.append((by_stem, stem, "label"))
+        match = next(((positions[key], why) for positions, key, why in keys if key in positions), None)
+        if match is None:
+            groups.append(([obj], ""))
+            place = len(groups) - 1
+        else:
+            place, why = match
+            members, before = groups[place]
+            members.append(obj)
+            groups[place] = (members, "label" if "label" in (why, before) else "shape")
+        for index, key, _ in keys:
+            index.setdefault(key, place)
+    return groups
+
+
+def _article(objects: Sequence[Any], alike: str, quantity: int) -> Modelled:
+    first = objects[0]
+    path = getattr(first.Document, "FileName", "") or ""
+    source = own(first, "sourceFile") or ""
+    entry = BomEntry(
+        path,
+        quantity=quantity,
+        object_name=object_name(first),
+        label=label_of(first),
+        document_label=getattr(first.Document, "Label", "") or "",
+    )
+    return Modelled(
+        entry,
+        tuple(map(object_name, objects)),
+        alike,
+        located(source, path) if isinstance(source, str) and source else "",
+    )

@@ -150,8 +150,10 @@ def _submodule(
     common: Path, here: Path, name: str, commit: str, target: Path, laid: dict[str, Path]
 ) -> list[tuple[str, str]]:
     """Lay out a sub-module at its commit."""
-    known = [one for one in (here, common / "modules" / name) if (one / ".git").exists() or one != here]
-    for repository in filter(os.path.isdir, known):
+    paths = [
+        folder for folder in (here, common / "modules" / name) if (folder / ".git").exists() or folder != here
+    ]
+    for repository in filter(os.path.isdir, paths):
         try:
             lost = lay_out(os.fspath(repository), _commit(os.fspath(repository), commit), target, laid)
         except InputError:
@@ -230,9 +232,9 @@ def _copy(ask: BinaryIO, answer: BinaryIO, blob: str, name: str, file: BinaryIO)
 
 def _take_from_lfs(objects: Path, path: Path) -> None:
     """Replace a pointer by its file, where that was fetched."""
-    if path.stat().st_size > _POINTER_SIZE or (found := _POINTER.match(path.read_bytes())) is None:
+    if path.stat().st_size > _POINTER_SIZE or (match := _POINTER.match(path.read_bytes())) is None:
         return
-    oid = found[1].decode()
+    oid = match[1].decode()
     stored = objects / oid[:2] / oid[2:4] / oid
     if stored.is_file():
         shutil.copyfile(stored, path)
@@ -243,8 +245,10 @@ def _commit(repository: str, revision: str) -> str:
         # Before the first commit there is nothing: git knows the empty tree without having it.
         return _git(repository, "hash-object", "-t", "tree", os.devnull).decode().strip()
     # The two dashes: a revision that begins with a dash is no option.
-    found = _git(repository, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}")
-    return found.decode().strip()
+    output = _git(
+        repository, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}"
+    )
+    return output.decode().strip()
 
 
 def _environment() -> dict[str, str]:

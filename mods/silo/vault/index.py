@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What was found out about FreeCAD files, kept in one SQLite file until a file says something else.
+"""What is known about FreeCAD files, kept in one SQLite file until a file says something else.
 
 The index is a memory of answers. An answer is a value computed from files; with it stands its trail: every
 file that was read for it, by content, and every path of a link that was followed, with where it led. An
@@ -14,12 +14,12 @@ The rules of this module:
 * content is the packed ``Document.xml`` with the container's directory, which has a checksum of every entry;
 * a row has a checksum; a row that fails it is not there;
 * code that reads otherwise asks under another name (``ENGINE``), so an update never meets old answers;
-* a database that is damaged is made anew (:mod:`silo.vault.index`). Where nothing can be written the
+* a database that is damaged is made again (:mod:`silo.vault.index`). Where nothing can be written the
   answers live in memory. Nothing here makes a run fail.
 
 The SQLite file of the index, which several processes may use, and which may be lost at any time.
 
-A database that is damaged or of another format is made anew; one that cannot be written is left alone.
+A database that is damaged or of another format is made again; one that cannot be written is left alone.
 Nothing here makes a run fail.
 
 Answers about files, and the trail of each: all that it depends on.
@@ -44,8 +44,8 @@ import silo.bom
 import silo.fcstd
 from silo.bom.errors import InputError
 from silo.fcstd.container import FcstdError, FileState
-from silo.fcstd.library import Content, Contents, Facts, Library, Remembered
-from silo.fcstd.locate import Found, Locator, NotFound
+from silo.fcstd.library import Content, FileContents, FileFacts, Library, Remembered
+from silo.files import FoundFile, Locator, NotFound
 from silo.platform import cache_folder, hold_lock, remove_patiently
 
 log = logging.getLogger("silo.vault")
@@ -67,7 +67,7 @@ CREATE TABLE places (vault TEXT, uuid TEXT, path TEXT, PRIMARY KEY (vault, uuid,
 """
 
 
-class Database:
+class IndexDatabase:
     """A database at a path; None for one of this process alone.
 
     given
@@ -85,7 +85,11 @@ class Database:
         self._guard: BinaryIO | None = None
         self._database = _empty()
         if path is not None:
-            self._open(path, given)
+            try:
+                self._open(path, given)
+            except InputError:
+                self.close()
+                raise
 
     def close(self) -> None:
         """Let others rebuild the database."""
@@ -135,7 +139,7 @@ class Database:
             for attempt in range(2):
                 self._guard = hold_lock(f"{path}.lock", shared=True)
                 if self._guard is None:
-                    self.trouble = f"the index {path} is being made anew by another process"
+                    self.trouble = f"the index {path} is being made again by another process"
                     return
                 try:
                     database = _connected(path)
@@ -143,7 +147,7 @@ class Database:
                     self._database = database
                     return
                 except _Unusable as error:
-                    log.info("%s: %s; it is made anew", path, error)
+                    log.info("%s: %s; it is made again", path, error)
                     self._guard.close()
                     if attempt or not _removed(path):
                         self.trouble = f"the index {path} cannot be used ({error})"
@@ -244,7 +248,7 @@ def engine() -> str:
     return digest.hexdigest()[:16]
 
 
-class Seen(NamedTuple):
+class SeenFile(NamedTuple):
     """A file at the time of a look. ``content`` begins with "!" for a file that could not be read."""
 
     content: str
@@ -255,7 +259,7 @@ class Seen(NamedTuple):
     read_ns: int
 
     @classmethod
-    def of(cls, content: Content | Remembered) -> Seen:
+    def of(cls, content: Content | Remembered) -> SeenFile:
         """What was read."""
         state = content.state
         return cls(
@@ -268,7 +272,7 @@ class Seen(NamedTuple):
         )
 
     @classmethod
-    def unread(cls, error: FcstdError) -> Seen | None:
+    def unread(cls, error: FcstdError) -> SeenFile | None:
         """What could not be read: known by its state, so that any change of it counts. None without one."""
         state = error.state
         if not isinstance(state, FileState):
@@ -281,7 +285,7 @@ class Seen(NamedTuple):
         return f"{self.inode} {self.size} {self.modified_ns} {self.changed_ns} {self.read_ns} {self.content}"
 
     @classmethod
-    def from_text(cls, text: str) -> Seen:
+    def from_text(cls, text: str) -> SeenFile:
         """What :meth:`text` wrote."""
         *numbers, content = text.split(" ", 5)
         return cls(content, *map(int, numbers))
@@ -310,29 +314,33 @@ class StoredAnswer(NamedTuple):
 
     answer: str
     trail: str
-    seen: Mapping[str, Seen] = {}
+    seen: Mapping[str, SeenFile] = {}
     lasting: bool = True
 
     @classmethod
     def found_in(cls, library: Library, answer: Any) -> StoredAnswer:
         """An answer that was found in a session which did nothing else."""
-        seen: dict[str, Seen] = {}
+        seen: dict[str, SeenFile] = {}
         lasting = True
         for path, document in library.documents.items():
             if not isinstance(document, FcstdError):
-                seen[path] = Seen.of(document.content)
-            elif (unread := Seen.unread(document)) is not None:
+                seen[path] = SeenFile.of(document.content)
+            elif (unread := SeenFile.unread(document)) is not None:
                 seen[path] = unread
             else:
                 lasting = False
         led: dict[tuple[str, ...], dict[str, str]] = {}
-        for (folders, recorded), found in library.lookups.items():
-            if isinstance(found, Found) and found.real in seen and found.is_straight(recorded, folders[0]):
+        for (folders, recorded), location in library.lookups.items():
+            if (
+                isinstance(location, FoundFile)
+                and location.real in seen
+                and location.is_straight(recorded, folders[0])
+            ):
                 continue
-            led.setdefault(folders, {})[recorded] = led_to(found)
+            led.setdefault(folders, {})[recorded] = led_to(location)
         if len(seen) == 1 and not led:
             return cls(json_of(answer), next(iter(seen.values())).content, seen, lasting)
-        files = {path: one.content for path, one in seen.items()}
+        files = {path: file.content for path, file in seen.items()}
         return cls(json_of(answer), json_of([files, list(led.items())]), seen, lasting)
 
     @property
@@ -346,20 +354,20 @@ class StoredAnswer(NamedTuple):
         if self.is_of_one_file:
             return frozenset()
         files, lookups = json.loads(self.trail)
-        found = frozenset(
+        link_paths = frozenset(
             _target(to) or os.path.normpath(os.path.join(folders[-1], recorded))
             for folders, led in lookups
             for recorded, to in led.items()
         )
-        return found.union(files) - {next(iter(files), "")}
+        return link_paths.union(files) - {next(iter(files), "")}
 
 
-def led_to(found: Found | NotFound) -> str:
-    if isinstance(found, NotFound):
-        return f"!{found.code}:{found.detail}"
-    if found.opened == found.real and not found.respelt:
-        return found.real
-    return f"{found.opened}\0{found.real}\0{found.respelt}"
+def led_to(location: FoundFile | NotFound) -> str:
+    if isinstance(location, NotFound):
+        return f"!{location.code}:{location.detail}"
+    if location.opened == location.real and not location.respelt:
+        return location.real
+    return f"{location.opened}\0{location.real}\0{location.respelt}"
 
 
 def _target(led: str) -> str | None:
@@ -386,7 +394,7 @@ def _mark(*texts: str) -> int:
 
 
 def _facts_mark(path: str, facts: str) -> bytes:
-    """Also tells what other code has found out, which must never be taken."""
+    """Also keep what other code has recorded, which must never be taken."""
     text = f"{engine()}\0{path}\0{facts}"
     return blake2b(text.encode("utf-8", "surrogateescape"), digest_size=16).digest()
 
@@ -403,16 +411,16 @@ class Index:
     """
 
     def __init__(
-        self, path: Path | None = None, *, given: bool = False, contents: Contents | None = None
+        self, path: Path | None = None, *, given: bool = False, contents: FileContents | None = None
     ) -> None:
-        self.contents = contents or Contents()
-        self._database = Database(path, given)
-        self._now: dict[str, Seen | None] = {}
+        self.contents = contents or FileContents()
+        self._database = IndexDatabase(path, given)
+        self._now: dict[str, SeenFile | None] = {}
         self._led: dict[tuple[tuple[str, ...], str], str] = {}
         self._locator = Locator()
         self._unsaved: dict[tuple[str, str], StoredAnswer] = {}
         self._facts: dict[str, str] = {}
-        self._files: dict[str, Seen] = {}
+        self._files: dict[str, SeenFile] = {}
         self._rows: dict[str, tuple[str, int]] = {}
         self._expected = ""
 
@@ -435,28 +443,28 @@ class Index:
     # --- answers ----------------------------------------------------------------------------------------
 
     def recall(self, path: str, question: str) -> StoredAnswer | None:
-        """The answer to a question about a file; None where it must be found out (again)."""
+        """The answer to a question about a file; None where it must be read (again)."""
         return next(self.recall_all([(path, question)]))
 
     def recall_all(self, asked: Sequence[tuple[str, str]]) -> Iterator[StoredAnswer | None]:
         """The same for several questions, in their order."""
         rows: dict[tuple[str, str], tuple[str, str, int]] = {}
         for question in dict.fromkeys(question for _, question in asked):
-            paths = [_text(path) for path, one in asked if one == question]
-            found = self._database.select_in(f"{_ANSWERS} WHERE question = ? AND path IN", paths, question)
-            rows |= {(path, question): row for path, *row in found}
+            paths = [_text(path) for path, wanted in asked if wanted == question]
+            answers = self._database.select_in(f"{_ANSWERS} WHERE question = ? AND path IN", paths, question)
+            rows |= {(path, question): row for path, *row in answers}
         for path, question in asked:
-            known = self._unsaved.get((path, question))
-            if known is None and (row := rows.get((_text(path), question))) is not None:
+            stored_answer = self._unsaved.get((path, question))
+            if stored_answer is None and (row := rows.get((_text(path), question))) is not None:
                 answer, trail, mark = row
                 if mark == _mark(path, question, answer, trail):
-                    known = StoredAnswer(answer, trail)
-            yield known if known is not None and self._holds(path, known) else None
+                    stored_answer = StoredAnswer(answer, trail)
+            yield stored_answer if stored_answer is not None and self._holds(path, stored_answer) else None
 
-    def _holds(self, path: str, known: StoredAnswer) -> bool:
-        if known.is_of_one_file:
-            return self.content(path) == known.trail
-        files, lookups = json.loads(known.trail)
+    def _holds(self, path: str, answer: StoredAnswer) -> bool:
+        if answer.is_of_one_file:
+            return self.content(path) == answer.trail
+        files, lookups = json.loads(answer.trail)
         for file, content in files.items():
             if self.content(file) != content:
                 return False
@@ -467,17 +475,17 @@ class Index:
                     return False
         return True
 
-    def remember(self, path: str, question: str, known: StoredAnswer) -> None:
+    def remember(self, path: str, question: str, answer: StoredAnswer) -> None:
         """Keep an answer; on disk with the next :meth:`save`."""
-        if not known.lasting:
+        if not answer.lasting:
             return
-        for file, seen in known.seen.items():
+        for file, seen in answer.seen.items():
             self._note(file, seen)
-        self._unsaved[path, question] = StoredAnswer(known.answer, known.trail)
+        self._unsaved[path, question] = StoredAnswer(answer.answer, answer.trail)
         if len(self._unsaved) >= _SAVED_EACH:
             self.save()
 
-    def _note(self, file: str, seen: Seen) -> None:
+    def _note(self, file: str, seen: SeenFile) -> None:
         before = self._now.get(file)
         if before is None or before.content != seen.content:
             self._now[file] = seen
@@ -486,28 +494,33 @@ class Index:
 
     def remember_facts(self, path: str, facts: str) -> None:
         """Keep the facts of a file as it was read."""
-        known = Facts(*json.loads(facts))
-        _, inode, size, modified_ns = known.state
-        self._note(path, Seen(known.digest, inode, size, modified_ns, known.changed_ns, known.read_ns))
+        file_facts = FileFacts(*json.loads(facts))
+        _, inode, size, modified_ns = file_facts.state
+        self._note(
+            path,
+            SeenFile(file_facts.digest, inode, size, modified_ns, file_facts.changed_ns, file_facts.read_ns),
+        )
         self._facts[path] = facts
         if len(self._facts) >= _SAVED_EACH:
             self.save()
 
     def facts(self, paths: Sequence[str]) -> dict[str, str]:
         """The facts of these files, of those that are what they were then."""
-        found = {path: self._facts[path] for path in paths if path in self._facts}
+        facts_by_path = {path: self._facts[path] for path in paths if path in self._facts}
         rows = {
             path: (facts, mark)
             for path, facts, mark in self._database.select_in(
                 "SELECT path, facts, mark FROM facts WHERE path IN",
-                [_text(path) for path in paths if path not in found],
+                [_text(path) for path in paths if path not in facts_by_path],
             )
         }
         for path in paths:
             facts, mark = rows.get(_text(path), ("", b""))
             if facts and mark == _facts_mark(path, facts):
-                found[path] = facts
-        return {path: text for path, text in found.items() if text.startswith(f'["{self.content(path)}"')}
+                facts_by_path[path] = facts
+        return {
+            path: text for path, text in facts_by_path.items() if text.startswith(f'["{self.content(path)}"')
+        }
 
     def content(self, path: str) -> str | None:
         """What lies at a path without symlinks now, as the trails name it; None where nobody can say."""
@@ -516,20 +529,20 @@ class Index:
         seen = self._now[path]
         return seen.content if seen is not None else None
 
-    def _look(self, path: str) -> Seen | None:
+    def _look(self, path: str) -> SeenFile | None:
         try:
             status = os.lstat(path)
         except (OSError, ValueError):
             return None
         if stat.S_ISLNK(status.st_mode) or not self._locator.lies_straight(path):
             return None  # the file has another path by now
-        known = self._known_file(path)
-        if known is not None and known.still(status):
-            return known
+        file = self._known_file(path)
+        if file is not None and file.still(status):
+            return file
         try:
-            seen = Seen.of(self.contents.read(path))
+            seen = SeenFile.of(self.contents.read(path))
         except FcstdError as error:
-            return Seen.unread(error)
+            return SeenFile.unread(error)
         self._files[path] = seen
         return seen
 
@@ -554,11 +567,11 @@ class Index:
 
     def places(self, vault: str) -> dict[str, set[str]]:
         """Identity → files that carried it when the vault was last read."""
-        found: dict[str, set[str]] = {}
+        result: dict[str, set[str]] = {}
         rows = self._database.select("SELECT uuid, path FROM places WHERE vault = ?", _text(vault))
         for uuid, path in rows:
-            found.setdefault(uuid, set()).add(os.fsdecode(path))
-        return found
+            result.setdefault(uuid, set()).add(os.fsdecode(path))
+        return result
 
     def keep_places(self, vault: str, places: Iterable[tuple[str, str]]) -> None:
         """Replace what is known of a vault."""
@@ -575,13 +588,13 @@ class Index:
 
     def keep_told(self, vault: str, sentences: Iterable[str]) -> None:
         """Remember what the report of this run says."""
-        rows = [(_text(vault), os.fsencode(one)) for one in {"", *sentences}]
+        rows = [(_text(vault), os.fsencode(sentence)) for sentence in {"", *sentences}]
         self._database.write(
             ("DELETE FROM told WHERE vault = ?", [(_text(vault),)]), ("INSERT INTO told VALUES (?, ?)", rows)
         )
 
     def forget(self, folder: str, but: Collection[str]) -> None:
-        """Forget the files of a folder but these, and what older code has found out."""
+        """Forget the files of a folder but these, and what older code has recorded."""
         rows = self._database.select("SELECT path FROM files WHERE path >= ? AND path < ?", *_below(folder))
         kept = {path for path in but if path.isascii()} | {_text(path) for path in but if not path.isascii()}
         gone = [path for (path,) in rows if path not in kept]
@@ -607,8 +620,15 @@ class Index:
             for path, text in ((path, seen.text()) for path, seen in self._files.items())
         ]
         answers = [
-            (_text(path), question, one.answer, one.trail, now, _mark(path, question, one.answer, one.trail))
-            for (path, question), one in self._unsaved.items()
+            (
+                _text(path),
+                question,
+                answer.answer,
+                answer.trail,
+                now,
+                _mark(path, question, answer.answer, answer.trail),
+            )
+            for (path, question), answer in self._unsaved.items()
         ]
         facts = [(_text(path), text, _facts_mark(path, text)) for path, text in self._facts.items()]
         if self._database.write(
@@ -620,22 +640,22 @@ class Index:
             self._facts.clear()
             self._unsaved.clear()
 
-    def _known_file(self, path: str) -> Seen | None:
+    def _known_file(self, path: str) -> SeenFile | None:
         if path in self._files:
             return self._files[path]
         row = self._rows.get(path)
         if row is None and not self._all_below(path):
-            found = self._database.select("SELECT path, seen, mark FROM files WHERE path = ?", _text(path))
-            row = found[0][1:] if found else None
-        return Seen.from_text(row[0]) if row is not None and row[1] == _mark(path, row[0]) else None
+            rows = self._database.select("SELECT path, seen, mark FROM files WHERE path = ?", _text(path))
+            row = rows[0][1:] if rows else None
+        return SeenFile.from_text(row[0]) if row is not None and row[1] == _mark(path, row[0]) else None
 
     def expect(self, folder: str) -> None:
         """Load what is known of all files below a folder, since most will be asked for."""
         self._expected = os.path.join(folder, "")
-        found = self._database.select(
+        rows = self._database.select(
             "SELECT path, seen, mark FROM files WHERE path >= ? AND path < ?", *_below(folder)
         )
-        self._rows = {path: (seen, mark) for path, seen, mark in found}
+        self._rows = {path: (seen, mark) for path, seen, mark in rows}
 
     def _all_below(self, path: str) -> bool:
         return bool(self._expected) and path.startswith(self._expected) and path == _text(path)

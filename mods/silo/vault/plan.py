@@ -5,33 +5,55 @@ Every file is asked for its assembly, then for the sub-assemblies that others us
 The plan keeps how the assemblies hang together, not what they hold; that is asked for again, from the index,
 when an assembly's turn comes. So memory grows with the number of files, and little.
 
-All assemblies of a folder, each once, read without FreeCAD.
+A job carries a plan out: it looks everything up at once, compares, and merges what is news, children before
+parents. Requests depend on the number of identities and of changes, not on that of assemblies: identities
+and BOMs are asked for by the thousand. Assemblies that do not depend on each other are merged side by side.
+Whatever ends the job, the next one continues: what was merged agrees then, and is not sent again. There is
+one job at a time on a vault: if its disk carries no locks, the report says what that cannot prevent.
 """
 
 from __future__ import annotations
 
 import os
+import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
-from silo.bom.compare import Assembly
+from silo.api.policy import ends_run
+from silo.api.wire import SourceDocument
+from silo.batch import SyncOptions, TopResult, source_document, suggest_by_identity
+from silo.bom.compare import ComparedAssembly
 from silo.bom.document import relative
-from silo.bom.errors import InputError, SeveralAssembliesError, SiloError
+from silo.bom.errors import CancelledError, DocumentError, InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.links import MAX_LEVELS, extract
+from silo.bom.links import MAX_LEVELS, Rings, extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import shorten, whole_row
+from silo.bom.resolve import Known
 from silo.bom.roots import choose_assembly, find_assemblies
-from silo.bom.walk.rings import Rings
-from silo.bom.walk.standard import standard_uuid
+from silo.bom.standard import standard_uuid
+from silo.bom_sync import (
+    Outcome,
+    Resolved,
+    Status,
+    SyncApi,
+    blocking,
+    known_items,
+    plain_lines,
+    resolve_known,
+    sync,
+)
 from silo.fcstd import Library
 from silo.fcstd.linked import with_suggestions
-from silo.files import documents_in
-from silo.vault.reading import Answer, Question, Reading, collecting_seldom
+from silo.files import documents_in, folder_lock
+from silo.vault.reading import Question, VaultReader, WalkAnswer, collecting_seldom, grouped
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +67,7 @@ class FolderBoms:
     """
 
     base: str
-    assemblies: tuple[Assembly, ...] = ()
+    assemblies: tuple[ComparedAssembly, ...] = ()
     unreadable: tuple[tuple[str, str], ...] = ()
     findings: tuple[Finding, ...] = ()
 
@@ -68,15 +90,17 @@ def read_folder(
     base = os.path.realpath(folder)
     if not os.path.isdir(base):
         raise InputError(f"{folder} is no folder. Name a folder of FreeCAD files.")
-    assemblies: dict[tuple[str, str], Assembly] = {}
+    assemblies: dict[tuple[str, str], ComparedAssembly] = {}
     unreadable = [(relative(os.path.join(root or base, path), base), why) for path, why in lost]
     findings: dict[Finding, None] = {}
     with Library(root) as library:
         for path in _users_first(documents_in([base]), library):
             try:
-                for found in _extractions(library, path, assemblies):
-                    findings.update(dict.fromkeys(f for f in found.findings if f.severity is Severity.ERROR))
-                    for assembly in _assemblies(found):
+                for extraction in _extractions(library, path, assemblies):
+                    findings.update(
+                        dict.fromkeys(f for f in extraction.findings if f.severity is Severity.ERROR)
+                    )
+                    for assembly in _assemblies(extraction):
                         assemblies.setdefault(assembly.head.key, assembly)
             except SiloError as error:
                 unreadable.append((relative(path, base), _without(str(error), base, root)))
@@ -106,11 +130,13 @@ def _users_first(paths: Sequence[str], library: Library) -> list[str]:
     return sorted(paths, key=lambda path: os.path.basename(path).lower() in used)
 
 
-def _extractions(library: Library, path: str, known: dict[tuple[str, str], Assembly]) -> Iterator[Extraction]:
+def _extractions(
+    library: Library, path: str, assemblies: dict[tuple[str, str], ComparedAssembly]
+) -> Iterator[Extraction]:
     """The BOMs of a file's assemblies, without those that were read as part of another one."""
     document = library.open(path)
     for top in _tops(document):
-        if (document.FileName, top.Name) not in known:
+        if (document.FileName, top.Name) not in assemblies:
             yield extract(top)
 
 
@@ -121,30 +147,30 @@ def _tops(document: Any) -> Iterable[Any]:
         return find_assemblies(document)
 
 
-def _assemblies(found: Extraction) -> Iterator[Assembly]:
+def _assemblies(extraction: Extraction) -> Iterator[ComparedAssembly]:
     """The assembly itself and every sub-assembly below it that has lines."""
     seen: set[int] = set()
-    stack = [(found.assembly, found.entries)]
+    stack = [(extraction.assembly, extraction.entries)]
     while stack:
         head, lines = stack.pop()
         if lines and id(lines) not in seen:
             seen.add(id(lines))
-            yield Assembly(replace(head, children=(), quantity=1, level=0), tuple(lines))
+            yield ComparedAssembly(replace(head, children=(), quantity=1, level=0), tuple(lines))
             stack += [(line, line.children) for line in lines]
 
 
-def _relative(assembly: Assembly, base: str) -> Assembly:
+def _relative(assembly: ComparedAssembly, base: str) -> ComparedAssembly:
     def moved(entry: BomEntry) -> BomEntry:
         return replace(entry, doc_path=relative(entry.doc_path, base), children=())
 
-    return Assembly(moved(assembly.head), tuple(moved(line) for line in assembly.lines))
+    return ComparedAssembly(moved(assembly.head), tuple(moved(line) for line in assembly.lines))
 
 
 Key = tuple[str, str]
 
 
 @dataclass(slots=True)
-class Node:
+class PlannedAssembly:
     """One assembly of the plan.
 
     top
@@ -188,8 +214,8 @@ class Plan:
     """
 
     tops: list[str] = field(default_factory=list)
-    nodes: dict[Key, Node] = field(default_factory=dict)
-    layers: list[list[Node]] = field(default_factory=list)
+    nodes: dict[Key, PlannedAssembly] = field(default_factory=dict)
+    layers: list[list[PlannedAssembly]] = field(default_factory=list)
     errors: dict[str, SiloError] = field(default_factory=dict)
     parts: int = 0
     uuids: dict[str, None] = field(default_factory=dict)
@@ -199,28 +225,28 @@ class Plan:
     findings: dict[Key, list[Finding]] = field(default_factory=dict)
     shared: list[Finding] = field(default_factory=list)
     _assemblies: dict[Key, bool] = field(default_factory=dict)
-    _meant: dict[Finding, Finding] = field(default_factory=dict)
+    _with_suggestion: dict[Finding, Finding] = field(default_factory=dict)
     _files: dict[str, str] = field(default_factory=dict)
 
-    def extraction(self, node: Node, reading: Reading) -> Extraction:
+    def extraction(self, node: PlannedAssembly, reading: VaultReader) -> Extraction:
         """What an assembly holds, with all that the whole plan knows of it. Raises SiloError."""
-        found = reading.ask(node.question).found
-        if isinstance(found, SiloError):
-            raise found
+        error = reading.ask(node.question).found
+        if isinstance(error, SiloError):
+            raise error
         entries = tuple(
             replace(entry, is_assembly=self._assemblies.get(entry.key, entry.is_assembly))
-            for entry in found.entries
+            for entry in error.entries
         )
-        told = dict.fromkeys(self._meant.get(finding, finding) for finding in found.findings)
+        findings = dict.fromkeys(self._with_suggestion.get(finding, finding) for finding in error.findings)
         for key in (node.key, *(entry.key for entry in entries)):
-            told.update(dict.fromkeys(self.findings.get(key, ())))
-        return replace(found, entries=entries, findings=tuple(told))
+            findings.update(dict.fromkeys(self.findings.get(key, ())))
+        return replace(error, entries=entries, findings=tuple(findings))
 
 
 @collecting_seldom()
 def make_plan(
     tops: Sequence[str],
-    reading: Reading,
+    reading: VaultReader,
     *,
     assembly: str | None = None,
     hardware: bool = True,
@@ -289,12 +315,12 @@ def _announced(tops: Iterable[str], progress: Callable[[str], None]) -> Iterator
         yield top
 
 
-def _error(answer: Answer) -> SiloError | None:
+def _error(answer: WalkAnswer) -> SiloError | None:
     if "table" in answer.plain:
         return None
-    found = answer.found
-    assert isinstance(found, SiloError)  # the only other thing that an answer may be
-    return found
+    error = answer.found
+    assert isinstance(error, SiloError)  # the only other thing that an answer may be
+    return error
 
 
 _Row = Mapping[str, Any]
@@ -311,7 +337,7 @@ def _is_part(plain: Mapping[str, Any], head: _Row, entries: Sequence[_Row]) -> b
     """No assembly: nothing in it, or an unregistered file of screws or parts for others to link."""
     if any(finding["severity"] == Severity.ERROR for finding in plain["findings"]):
         return False
-    if not entries:  # a named assembly of own parts that are no items yet is one all the same
+    if not entries:  # a named assembly of own parts that are no items yet is one anyway
         return not (head.get("own") and (head["is_assembly"] or head["silo_uuid"]))
     return head["silo_uuid"] is None and all(entry["doc_path"] == head["doc_path"] for entry in entries)
 
@@ -321,12 +347,12 @@ def _is_article(row: Mapping[str, Any]) -> bool:
     return standard is not None and row["silo_uuid"] == standard_uuid(standard)
 
 
-def _node(question: Question, rows: _Rows, top: str) -> Node:
+def _node(question: Question, rows: _Rows, top: str) -> PlannedAssembly:
     head, entries = rows
     content = sorted(
         (str(e["silo_uuid"] or (e["doc_path"], e["object_name"])), e["quantity"]) for e in entries
     )
-    return Node(
+    return PlannedAssembly(
         (head["doc_path"], head["object_name"]),
         top,
         question,
@@ -338,7 +364,7 @@ def _node(question: Question, rows: _Rows, top: str) -> Node:
     )
 
 
-def _add(plan: Plan, node: Node, rows: _Rows, wanted: dict[Key, str]) -> None:
+def _add(plan: Plan, node: PlannedAssembly, rows: _Rows, wanted: dict[Key, str]) -> None:
     plan.nodes.setdefault(node.key, node)
     plan._assemblies[node.key] = True
     head, entries = rows
@@ -359,7 +385,7 @@ def _entry(row: Mapping[str, Any]) -> BomEntry:
     return BomEntry(**{name: row[name] for name in names})
 
 
-def _add_used_parts(plan: Plan, reading: Reading, hardware: bool, recursive: bool) -> None:
+def _add_used_parts(plan: Plan, reading: VaultReader, hardware: bool, recursive: bool) -> None:
     """Named assemblies without components are left alone, except where another assembly uses them."""
     if not recursive:
         return
@@ -400,7 +426,7 @@ def _put_in_order(plan: Plan) -> None:
     for deep in plan.layers[MAX_LEVELS:]:
         for node in deep:
             message = f"The assembly is nested more than {MAX_LEVELS} levels deep, so it is not synced."
-            _tell(plan, node.key, FindingCode.TOO_DEEP, Severity.ERROR, message, [node.key])
+            _tell(plan, node.key, FindingCode.TOO_DEEP, message, [node.key])
 
 
 def _report_rings(plan: Plan, keys: Sequence[Key]) -> None:
@@ -409,15 +435,13 @@ def _report_rings(plan: Plan, keys: Sequence[Key]) -> None:
     for key in keys:
         members = [key] if rings.same_ring(key, key) else [k for k in keys if rings.same_ring(k, k)]
         ring = rings.example(members[0])
-        path = " → ".join(str(Place(*one)) for one in (*ring, ring[0]))
-        _tell(
-            plan, key, FindingCode.CYCLE, Severity.ERROR, f"An assembly contains itself: {path}", [*ring, key]
-        )
+        path = " → ".join(str(Place(*node)) for node in (*ring, ring[0]))
+        _tell(plan, key, FindingCode.CYCLE, FindingCode.CYCLE.sentence.format(path=path), [*ring, key])
 
 
 def _find_copies(plan: Plan) -> None:
     """Files that claim to be one item: fine where they hold the same, else no BOM of that item is right."""
-    users: dict[str, list[Node]] = {}
+    users: dict[str, list[PlannedAssembly]] = {}
     for node in plan.nodes.values():
         if node.uuid:
             users.setdefault(node.uuid.lower(), []).append(node)
@@ -430,7 +454,7 @@ def _find_copies(plan: Plan) -> None:
                 "components, so none of them is synced. Give the new one a number of its own."
             )
             for key in keys:
-                _tell(plan, key, FindingCode.COPIED_IDENTITY, Severity.ERROR, message, keys)
+                _tell(plan, key, FindingCode.COPIED_IDENTITY, message, keys)
     paths: dict[str, set[str]] = {}
     for uuid, path in plan.places:
         paths.setdefault(uuid, set()).add(path)
@@ -448,25 +472,192 @@ def _find_copies(plan: Plan) -> None:
             )
 
 
-def _tell(
-    plan: Plan, key: Key, code: FindingCode, severity: Severity, message: str, where: Iterable[Key]
-) -> None:
-    places = tuple(sorted({Place(*one) for one in where}))
-    plan.findings.setdefault(key, []).append(Finding(code, severity, message, places))
+def _tell(plan: Plan, key: Key, code: FindingCode, message: str, where: Iterable[Key]) -> None:
+    places = tuple(sorted({Place(*extraction) for extraction in where}))
+    plan.findings.setdefault(key, []).append(Finding(code, Severity.ERROR, message, places))
 
 
-def _find_meant(plan: Plan, reading: Reading) -> None:
+def _find_meant(plan: Plan, reading: VaultReader) -> None:
     """Which files were meant where some are missing; the project's files are read once for all of it."""
     broken = [node for node in plan.nodes.values() if node.broken]
     if not broken:
         return
-    found = [
-        one for one in (reading.ask(node.question).found for node in broken) if isinstance(one, Extraction)
+    extractions = [
+        extraction
+        for extraction in (reading.ask(node.question).found for node in broken)
+        if isinstance(extraction, Extraction)
     ]
-    heads = [replace(one.assembly, children=one.entries) for one in found]
-    findings = [finding for one in found for finding in one.findings]
+    heads = [replace(extraction.assembly, children=extraction.entries) for extraction in extractions]
+    findings = [finding for extraction in extractions for finding in extraction.findings]
     used = [BomEntry(path) for path in sorted({path for _, path in plan.places})]
     whole = Extraction(replace(heads[0], children=()), (*heads, *used), tuple(findings))
     for before, after in zip(findings, with_suggestions(whole).findings, strict=True):
         if after is not before:
-            plan._meant[before] = after
+            plan._with_suggestion[before] = after
+
+
+NAME = ".silo-sync.lock"
+
+
+@contextmanager
+def only_job(folder: str) -> Iterator[str]:
+    """Keep a second job away from a folder; gives what the lock cannot prevent, "" for nothing.
+
+    Raises InputError with the name of the first one.
+    """
+    with folder_lock(folder, NAME, "synced") as problem:
+        yield problem and (
+            f"{folder} cannot be locked ({problem}): a job of another user or machine is not "
+            "noticed. Two jobs at once cost requests; the BOMs are right anyway."
+        )
+
+
+_AT_ONCE = 500  # assemblies whose BOMs are in memory at one time
+_SENDERS = 4
+Lines = Mapping[str, Sequence[Mapping[str, Any]]]
+_KEPT = ("id", "part_number", "name", "description", "last_sync")
+
+
+@dataclass
+class SyncJob:
+    """One run of a plan.
+
+    base
+        the folder that paths in the results are relative to; "" for that of each file.
+    stop
+        set where the job is interrupted, so that no merge waits for a busy server any more.
+    senders
+        merges that are under way at one time.
+    """
+
+    plan: Plan
+    reading: VaultReader
+    api: SyncApi
+    options: SyncOptions
+    base: str
+    stop: threading.Event = field(default_factory=threading.Event)
+    senders: int = _SENDERS
+
+    def __post_init__(self) -> None:
+        self.stopped: SiloError | None = None
+        self._sent: dict[str, Future[Outcome]] = {}
+
+    def results(self) -> Iterator[TopResult]:
+        """The result of each file, as soon as it is known; files that could not be read first."""
+        for top, error in self.plan.errors.items():
+            yield TopResult(top, self._base(top), error=error)
+        try:
+            items = self._known_items()
+        except SiloError as error:
+            self.stopped = error
+            for top, count in Counter(node.top for node in self.plan.nodes.values()).items():
+                yield TopResult(top, self._base(top), error=error, left=count)
+            return
+        left = Counter(node.top for node in self.plan.nodes.values())
+        done: dict[str, list[Outcome]] = {}
+        for layer in self.plan.layers:
+            for nodes in grouped(layer, _AT_ONCE):
+                for node, outcome in zip(nodes, self._outcomes(nodes, items), strict=True):
+                    done.setdefault(node.top, []).append(outcome)
+                    left[node.top] -= 1
+                    if not left[node.top]:
+                        yield TopResult(node.top, self._base(node.top), outcomes=tuple(done.pop(node.top)))
+
+    def _base(self, top: str) -> str:
+        return self.base or os.path.dirname(os.path.realpath(top))
+
+    def _known_items(self) -> Known:
+        """What the server knows of everything in the plan, as far as it is needed."""
+        items = known_items(self.plan.uuids, self.plan.standards.values(), self.api)
+        return {
+            key: {name: item.get(name) for name in _KEPT} for key, item in items.items() if item is not None
+        }
+
+    def _outcomes(self, nodes: Sequence[PlannedAssembly], items: Known) -> list[Outcome]:
+        """Of assemblies that do not depend on each other."""
+        several = [resolve_known(self.plan.extraction(node, self.reading), items) for node in nodes]
+        numbers = [resolved.assembly.part_number for resolved in several]
+        lines = self._lines([number for number in numbers if number is not None])
+        several = [self._with_suggestion(resolved, lines) for resolved in several]
+        with ThreadPoolExecutor(self.senders, "silo-merge") as pool:
+            asked = []
+            try:
+                for resolved in several:
+                    number = resolved.assembly.part_number
+                    first = self._sent.get(number or "")
+                    # Copies of one file are one item, and one merge.
+                    if first is None or blocking(resolved):
+                        first = pool.submit(self._sync, resolved, lines)
+                        if number is not None and not blocking(resolved):
+                            self._sent[number] = first
+                    asked.append(first)
+                outcomes = [future.result() for future in asked]
+            except BaseException:  # Ctrl-C, also while the first are sent; the senders end what is under way
+                self.stopped = self.stopped or CancelledError("the job was stopped")
+                self.stop.set()
+                raise
+        return [
+            outcome if outcome.resolved is resolved else _as_the_first(resolved, outcome)
+            for resolved, outcome in zip(several, outcomes, strict=True)
+        ]
+
+    def _with_suggestion(self, resolved: Resolved, lines: Lines) -> Resolved:
+        """Missing files, with those that have the identity which the server knows from the last sync."""
+        line = lines.get(resolved.assembly.part_number or "", ())
+        return suggest_by_identity(resolved, [(resolved, line)], self._files_with if self.base else None)
+
+    def _files_with(self, identities: Iterable[str]) -> set[str]:
+        """The files of the folder that have one of these identities: all were read, none is read again."""
+        wanted = {identity.lower() for identity in identities}
+        return {path for identity, path in self.plan.places | self.plan.spares if identity in wanted}
+
+    def _lines(self, numbers: Sequence[str]) -> Lines:
+        many = getattr(self.api, "get_boms", None)
+        if self.stopped is not None or many is None or not numbers:
+            return {}
+        try:
+            return {number: plain_lines(answer) for number, answer in many(numbers).items()}
+        except SiloError as error:
+            self._stop_for(error)
+            return {}
+
+    def _sync(self, resolved: Resolved, lines: Lines) -> Outcome:
+        if self.stopped is not None:
+            return Outcome(Status.FAILED, resolved, error=self.stopped)
+        try:
+            outcome = sync(
+                resolved,
+                self.api,
+                sync_id=str(uuid4()),
+                allow_missing=self.options.allow_missing
+                and not any(
+                    finding.code in (FindingCode.CYCLE, FindingCode.TOO_DEEP) for finding in resolved.findings
+                ),
+                dry_run=self.options.dry_run,
+                describe=lambda: self._source(resolved),
+                lines=lines.get(resolved.assembly.part_number or ""),
+            )
+        except SiloError as error:
+            outcome = Outcome(Status.FAILED, resolved, error=error)
+        if outcome.error is not None:
+            self._stop_for(outcome.error)
+        return outcome
+
+    def _source(self, resolved: Resolved) -> SourceDocument:
+        """The file of a BOM that is about to be sent; it must still be the one that was read."""
+        if not self.reading.index.untouched(resolved.assembly.doc_path):
+            raise DocumentError(
+                resolved.assembly.doc_path, "it was changed while the job ran; the next run takes it"
+            )
+        return source_document(resolved.assembly)
+
+    def _stop_for(self, error: SiloError) -> None:
+        """What concerns every request ends the job; the others have it as their error."""
+        if self.stopped is None and ends_run(error, self.api):
+            self.stopped = error
+
+
+def _as_the_first(resolved: Resolved, first: Outcome) -> Outcome:
+    """What became of a copy: what became of the file that was sent for both."""
+    status = Status.UNCHANGED if first.status is Status.MERGED else first.status
+    return replace(first, resolved=resolved, status=status, result=None)

@@ -34,10 +34,9 @@ from silo.bom.links import extract, file_bom
 from silo.bom.model import Extraction, held_items
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
-from silo.fcstd.locate import Found, Locator
-from silo.files import Kept, Project, content_hash, documents_in
-from silo.outbox.entry import SAME_PART, UNKNOWN, Commit, InFile, new_key
-from silo.outbox.store import Store, on_top, seen
+from silo.files import FoundFile, Locator, Project, ProjectEntry, content_hash, documents_in
+from silo.outbox.entry import SAME_PART, UNKNOWN, Commit, InFile, new_key, on_top
+from silo.outbox.store import Store
 from silo.platform import one_path
 from silo.vault.pull import file_revisions
 
@@ -45,7 +44,7 @@ if TYPE_CHECKING:
     from silo.api.client import SiloClient
 
 
-class State(StrEnum):
+class ProjectState(StrEnum):
     """How a file of the project stands to Silo."""
 
     SAME = "same"  # is in Silo as it is here
@@ -86,14 +85,14 @@ class ProjectFile:
     held: tuple[tuple[str, str], ...] = ()
     bom: Extraction | None = field(default=None, repr=False)
     problem: str = ""
-    kept: Kept | None = None
+    kept: ProjectEntry | None = None
     moved_from: str = ""
 
     @property
     def base(self) -> str:
         """The content that it was made from, as far as the project remembers; "" where it does not."""
-        known = self.kept is not None and self.kept.document.lower() == self.document.lower()
-        return self.kept.sha256 if known and self.kept is not None else ""
+        is_same_document = self.kept is not None and self.kept.document.lower() == self.document.lower()
+        return self.kept.sha256 if is_same_document and self.kept is not None else ""
 
 
 @dataclass(frozen=True)
@@ -120,11 +119,11 @@ class Belonging:
 
 
 @dataclass(frozen=True)
-class Standing:
+class FileStanding:
     """A file and how it stands; ``newest``: its newest revision in Silo, None where there is none."""
 
     file: ProjectFile
-    state: State
+    state: ProjectState
     newest: Revision | None = None
 
 
@@ -138,13 +137,13 @@ def find_project(tops: Sequence[str], root: str | None = None) -> Project:
         if not os.path.isdir(root):
             raise InputError(f"{root} is no folder; name the folder of the project")
         return Project(one_path(root))
-    found = {marked.root for top in tops if (marked := Project.of(top)) is not None}
-    if len(found) > 1:
+    roots = {marked.root for top in tops if (marked := Project.of(top)) is not None}
+    if len(roots) > 1:
         raise InputError(
-            f"these files are of several projects: {', '.join(sorted(found))}; commit each alone"
+            f"these files are of several projects: {', '.join(sorted(roots))}; commit each alone"
         )
-    if found:
-        return Project(found.pop())
+    if roots:
+        return Project(roots.pop())
     folders = [one_path(top) for top in tops if os.path.isdir(top)]
     if len(folders) == len(tops) == 1:
         return Project(folders[0])
@@ -170,13 +169,13 @@ def read_project(tops: Sequence[str], project: Project, *, hardware: bool = True
         raise InputError(f"{stray[0]} lies outside the project {project.root}; name its folder with --root")
     locator = Locator(project.root)
     order, unreadable, outside, missing = _reached(paths, locator, project)
-    known = project.files()
-    gone = {place: kept for place, kept in known.items() if not os.path.exists(project.path(place))}
+    noted = project.files()
+    gone = {place: kept for place, kept in noted.items() if not os.path.exists(project.path(place))}
     files: list[ProjectFile] = []
     with Library(project.root) as library:
         for path in order:
             try:
-                files.append(_read(path, project, known, library, hardware=hardware))
+                files.append(_read(path, project, noted, library, hardware=hardware))
             except (DocumentError, OSError) as error:
                 reason = error.reason if isinstance(error, DocumentError) else str(error)
                 unreadable.append((project.place(path) or path, reason))
@@ -214,20 +213,20 @@ def _reached(
             if project is not None:
                 unreadable.append((name(path), error.reason))
             return
-        for one in recorded:
-            found = locator.find(one, (os.path.dirname(path),))
-            if isinstance(found, Found):
-                yield found.real
+        for link in recorded:
+            location = locator.find(link, (os.path.dirname(path),))
+            if isinstance(location, FoundFile):
+                yield location.real
                 continue
-            anywhere = Locator().find(one, (os.path.dirname(path),))
-            (outside if isinstance(anywhere, Found) else missing).append((name(path), one))
+            anywhere = Locator().find(link, (os.path.dirname(path),))
+            (outside if isinstance(anywhere, FoundFile) else missing).append((name(path), link))
 
     for top in paths:
         stack = [(top, links(top))] if top not in entered else []
         entered.add(top)
         while stack:
             path, below = stack[-1]
-            following = next((one for one in below if one not in entered), None)
+            following = next((each_path for each_path in below if each_path not in entered), None)
             if following is None:
                 stack.pop()
                 order.append(path)
@@ -239,7 +238,7 @@ def _reached(
 
 
 def _read(
-    path: str, project: Project, known: Mapping[str, Kept], library: Library, *, hardware: bool
+    path: str, project: Project, noted: Mapping[str, ProjectEntry], library: Library, *, hardware: bool
 ) -> ProjectFile:
     place = project.place(path) or path
     document, sha256 = library.open(path), content_hash(path)
@@ -251,9 +250,9 @@ def _read(
     except SeveralAssembliesError as error:
         problem = str(error)
     held = held_items(document)
-    main = [one for one in held if one[0] == item]
-    held = (*main, *(one for one in held if one not in main))
-    kept = known.get(place)
+    main = [noted_files for noted_files in held if noted_files[0] == item]
+    held = (*main, *(noted_files for noted_files in held if noted_files not in main))
+    kept = noted.get(place)
     own = "" if item else (kept.document if kept is not None else "")
     return ProjectFile(
         path, place, sha256, str(document.Uid), item or own, item or "", held, bom, problem, kept
@@ -263,10 +262,16 @@ def _read(
 def _one_file_per_item(files: Sequence[ProjectFile]) -> tuple[list[ProjectFile], list[tuple[str, str]]]:
     """Let an item have one file: a copy with other content is a document of its own, and is reported."""
     owner: dict[str, ProjectFile] = {}
-    for file in sorted(files, key=lambda one: (one.kept is None or one.kept.document != one.item, one.place)):
+    for file in sorted(
+        files,
+        key=lambda project_file: (
+            project_file.kept is None or project_file.kept.document != project_file.item,
+            project_file.place,
+        ),
+    ):
         if file.item:
             owner.setdefault(file.item.lower(), file)
-    found, doubtful = [], []
+    project_files, doubtful = [], []
     for file in files:
         first = owner.get(file.item.lower(), file)
         if first.place != file.place:
@@ -274,20 +279,20 @@ def _one_file_per_item(files: Sequence[ProjectFile]) -> tuple[list[ProjectFile],
             if first.sha256 != file.sha256:
                 own = file.kept.document if file.kept and file.kept.document != file.item else ""
                 file = replace(file, document=own, item="", held=(), bom=None)
-        found.append(file)
-    return found, doubtful
+        project_files.append(file)
+    return project_files, doubtful
 
 
-def _moved(file: ProjectFile, gone: Mapping[str, Kept], files: Sequence[ProjectFile]) -> ProjectFile:
+def _moved(file: ProjectFile, gone: Mapping[str, ProjectEntry], files: Sequence[ProjectFile]) -> ProjectFile:
     """The file with its place before: a remembered file is gone, and only this one can be it."""
     if file.kept is not None and (file.kept.document == file.document or not file.document):
         return file
-    rules: tuple[Callable[[Kept], bool], ...] = (
+    rules: tuple[Callable[[ProjectEntry], bool], ...] = (
         (lambda kept: bool(file.item) and kept.document.lower() == file.item.lower()),
         (lambda kept: not file.item and kept.sha256 == file.sha256),
         (lambda kept: not file.item and bool(kept.uid) and kept.uid == file.uid),
     )
-    taken = {one.document for one in files if one.place != file.place}
+    taken = {project_file.document for project_file in files if project_file.place != file.place}
     for fits in rules:
         places = [place for place, kept in gone.items() if kept.document not in taken and fits(kept)]
         if len(places) == 1:
@@ -296,7 +301,15 @@ def _moved(file: ProjectFile, gone: Mapping[str, Kept], files: Sequence[ProjectF
     return file
 
 
-def name_documents(found: Belonging, client: SiloClient | None, *, new: bool = True) -> Belonging:
+def stand(
+    tops: Sequence[str], project: Project, client: SiloClient | None, store: Store
+) -> tuple[Belonging, list[FileStanding]]:
+    """Return what belongs to files or folders, and how each file stands. Changes nothing."""
+    belonging = name_documents(read_project(tops, project), client, new=False)
+    return belonging, compare(belonging, client, store)
+
+
+def name_documents(belonging: Belonging, client: SiloClient | None, *, new: bool = True) -> Belonging:
     """Give each file without an item its UUID, and write them down before the first request that has one.
 
     new
@@ -305,28 +318,30 @@ def name_documents(found: Belonging, client: SiloClient | None, *, new: bool = T
     A folder that remembers nothing (a copy of the files alone) learns from the files in Silo that link to a
     file which document it is.
     """
-    known = _linked_documents(found, client) if client is not None else {}
+    numbers = _linked_documents(belonging, client) if client is not None else {}
     files = [
         file
         if file.document
-        else replace(file, document=known.get(file.place) or (str(uuid4()) if new else ""))
-        for file in found.files
+        else replace(file, document=numbers.get(file.place) or (str(uuid4()) if new else ""))
+        for file in belonging.files
     ]
     named = {
-        new.place: Kept(new.document, "", new.uid)
-        for old, new in zip(found.files, files, strict=True)
+        new.place: ProjectEntry(new.document, "", new.uid)
+        for old, new in zip(belonging.files, files, strict=True)
         if not old.document
     }
     if new:
-        found.project.note(named)  # also without any: the file marks the root, from which places are counted
-    return replace(found, files=tuple(files))
+        belonging.project.note(
+            named
+        )  # also without any: the file marks the root, from which places are counted
+    return replace(belonging, files=tuple(files))
 
 
-def _linked_documents(found: Belonging, client: SiloClient) -> dict[str, str]:
+def _linked_documents(belonging: Belonging, client: SiloClient) -> dict[str, str]:
     """Place → document, as the newest revisions of the registered files above record their links."""
-    nameless = {file.place for file in found.files if not file.document}
-    known: dict[str, str] = {}
-    users = [file for file in found.files if file.item] if nameless else []
+    nameless = {file.place for file in belonging.files if not file.document}
+    documents: dict[str, str] = {}
+    users = [file for file in belonging.files if file.item] if nameless else []
     for file in users:
         try:
             links = client.get_document(file.item).links
@@ -338,29 +353,33 @@ def _linked_documents(found: Belonging, client: SiloClient) -> dict[str, str]:
         for link in links:
             place = os.path.normpath(os.path.join(folder, link.path)).replace(os.sep, "/")
             if link.document and place in nameless:
-                known.setdefault(place, link.document)
-    return known
+                documents.setdefault(place, link.document)
+    return documents
 
 
-def compare(found: Belonging, client: SiloClient | None, store: Store) -> list[Standing]:
+def compare(belonging: Belonging, client: SiloClient | None, store: Store) -> list[FileStanding]:
     """Return how each file stands to the server, in the same order. One request if it knows documents.
 
     client
         None: the server cannot be asked now, and what the project remembers counts.
     """
-    newest = newest_files(found.files, client) if client is not None else _remembered(found.files)
-    strange = [one.item for one in found.files if one.item and one.document.lower() not in newest]
+    newest = newest_files(belonging.files, client) if client is not None else _remembered(belonging.files)
+    strange = [
+        project_file.item
+        for project_file in belonging.files
+        if project_file.item and project_file.document.lower() not in newest
+    ]
     here = set(client.get_items_by_uuid(strange) if client is not None else strange)
     waiting = {(entry.identity, entry.sha256) for entry in store.entries() if entry.file_left}
     standings = []
-    for file in found.files:
+    for file in belonging.files:
         revision = newest.get(file.document.lower())
         state = _state(file, revision, client)
         if revision is None and file.item and file.item not in here:
-            state = State.NO_ITEM
-        if (file.document, file.sha256) in waiting and (state is not State.SAME or client is None):
-            state = State.WAITING
-        standings.append(Standing(file, state, revision))
+            state = ProjectState.NO_ITEM
+        if (file.document, file.sha256) in waiting and (state is not ProjectState.SAME or client is None):
+            state = ProjectState.WAITING
+        standings.append(FileStanding(file, state, revision))
     return standings
 
 
@@ -386,56 +405,59 @@ def newest_files(files: Iterable[ProjectFile], client: SiloClient) -> dict[str, 
         pass
     main = {file.document.lower(): file.held[0][0] for file in several if file.held}
     items = client.get_items_by_uuid(main.values())
-    found = _remembered(file for file in several if not file.held)
+    revisions = _remembered(file for file in several if not file.held)
     for document, uuid in main.items():
         item = items.get(uuid)
-        if item is not None and (known := file_revisions(client.revisions(item.part_number))):
-            found[document] = known[0]
-    return found
+        if item is not None and (by_name := file_revisions(client.revisions(item.part_number))):
+            revisions[document] = by_name[0]
+    return revisions
 
 
-def _state(file: ProjectFile, newest: Revision | None, client: SiloClient | None) -> State:
+def _state(file: ProjectFile, newest: Revision | None, client: SiloClient | None) -> ProjectState:
     if newest is None:
-        return State.NEW
+        return ProjectState.NEW
     there, base = checksum_of(newest), file.base
     if there == file.sha256:
-        return State.SAME
+        return ProjectState.SAME
     if there == base:
-        return State.EDITED
+        return ProjectState.EDITED
     if not there:  # a server without checksums: what was committed from here is all that is known
-        return State.SAME if base == file.sha256 else State.EDITED
+        return ProjectState.SAME if base == file.sha256 else ProjectState.EDITED
     if base == file.sha256 or client is None:
-        return State.NEWER
-    older = {checksum_of(one) for one in client.revisions(_address(file, client))}
-    return State.NEWER if file.sha256 in older else State.BOTH
+        return ProjectState.NEWER
+    older = {checksum_of(revision) for revision in client.revisions(address_of(file, client))}
+    return ProjectState.NEWER if file.sha256 in older else ProjectState.BOTH
 
 
-def _address(file: ProjectFile, client: SiloClient) -> str:
+def address_of(file: ProjectFile, client: SiloClient) -> str:
+    """Return what names the file's revisions on the server: a part number, or the document itself."""
     item = client.get_item_by_uuid(file.item) if file.item else None
     return item.part_number if item is not None else DocumentId(file.document)
 
 
 def commits(
-    found: Belonging,
-    standings: Sequence[Standing],
+    belonging: Belonging,
+    standings: Sequence[FileStanding],
     *,
     comment: str = "",
     allow_missing: bool = False,
-    over_newer: bool = False,
+    over_newer: Container[str] = (),
     boms: bool = True,
 ) -> Iterator[tuple[ProjectFile, Commit]]:
     """Make the commits of what belongs and is not in Silo: files that differ, and the BOMs of the assemblies.
 
     over_newer
-        also files that are newer in Silo, which a person saw: on top of those.
+        files that go although they are newer in Silo, which a person saw: on top of those.
     boms
         also the BOMs of files that are in Silo already.
     """
-    users = _users(found)
-    for one in standings:
-        file = one.file
-        wanted = one.state in (State.NEW, State.EDITED) or (over_newer and one.state is State.BOTH)
-        bom = file.bom if file.item and (wanted or (boms and one.state is State.SAME)) else None
+    users = _users(belonging)
+    for standing in standings:
+        file = standing.file
+        wanted = standing.state in (ProjectState.NEW, ProjectState.EDITED) or (
+            standing.state is ProjectState.BOTH and file.path in over_newer
+        )
+        bom = file.bom if file.item and (wanted or (boms and standing.state is ProjectState.SAME)) else None
         if not wanted and bom is None:
             continue
         commit = Commit(
@@ -454,25 +476,25 @@ def commits(
             document=InFile(file.held, not file.item, users.get(file.place, "")).to_json(),
             renamed=SAME_PART if file.moved_from else "",
         )
-        if one.state is State.BOTH and one.newest is not None:
-            newer = one.newest.model_dump(mode="json", exclude={"properties", "links"})
-            commit = replace(commit, on_top_of=seen(newer), comment=on_top(comment, newer))
+        if standing.state is ProjectState.BOTH and standing.newest is not None:
+            newer = standing.newest.model_dump(mode="json", exclude={"properties", "links"})
+            commit = replace(commit, **on_top(comment, newer))
         yield file, commit
 
 
-def _users(found: Belonging) -> dict[str, str]:
+def _users(belonging: Belonging) -> dict[str, str]:
     """Place → an item whose file links to it, for a Silo that keeps other files as attachments."""
     users: dict[str, str] = {}
-    registered = [file for file in found.files if file.item]
+    registered = [file for file in belonging.files if file.item]
     for file in registered:
         folder = os.path.dirname(file.path)
-        locator = Locator(found.project.root)
+        locator = Locator(belonging.project.root)
         for recorded in recorded_paths(file.path):
             target = locator.find(recorded, (folder,))
-            if isinstance(target, Found) and (place := found.project.place(target.real)):
+            if isinstance(target, FoundFile) and (place := belonging.project.place(target.real)):
                 users.setdefault(place, file.item)
     top = registered[-1].item if registered else ""
-    return {file.place: users.get(file.place, top) for file in found.files}
+    return {file.place: users.get(file.place, top) for file in belonging.files}
 
 
 def keep(project: Project, store: Store, file: ProjectFile, commit: Commit, server: str) -> None:
@@ -492,28 +514,35 @@ def send_along(
     how
         as for :func:`commits`.
     """
-    found = read_project([path], find_project([path]))
-    if all(file.item and file.path in skip for file in found.files):
+    belonging = read_project([path], find_project([path]))
+    if all(file.item and file.path in skip for file in belonging.files):
         return 0
-    found = name_documents(found, client)
-    standings = compare(found, client, store)
-    remember(found.project, (one.file for one in standings if one.state in (State.SAME, State.WAITING)))
+    belonging = name_documents(belonging, client)
+    standings = compare(belonging, client, store)
+    remember(
+        belonging.project,
+        (
+            standing.file
+            for standing in standings
+            if standing.state in (ProjectState.SAME, ProjectState.WAITING)
+        ),
+    )
     count = 0
-    for file, commit in commits(found, standings, boms=False, **how):
+    for file, commit in commits(belonging, standings, boms=False, **how):
         if file.path not in skip:
-            keep(found.project, store, file, commit, server)
+            keep(belonging.project, store, file, commit, server)
             count += 1
     return count
 
 
 def remember(project: Project, files: Iterable[ProjectFile]) -> None:
     """Remember files as they are in Silo, or on their way there."""
-    known: dict[str, Kept | None] = {}
+    noted: dict[str, ProjectEntry | None] = {}
     for file in files:
-        kept = Kept(file.document, file.sha256, file.uid)
+        kept = ProjectEntry(file.document, file.sha256, file.uid)
         if file.moved_from:
-            known[file.moved_from] = None
+            noted[file.moved_from] = None
         if kept != file.kept or file.moved_from:
-            known[file.place] = kept
-    if known:
-        project.note(known)
+            noted[file.place] = kept
+    if noted:
+        project.note(noted)

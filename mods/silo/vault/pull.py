@@ -35,31 +35,30 @@ from typing import TYPE_CHECKING, Any
 from silo.api.files import DocumentId, Standing, checksum_of, download_revision, has_file
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import Item, LinkedFile, Release, Revision
-from silo.bom.compare import Assembly, LineChange, ThreeLines, compare_assemblies, compare_three
+from silo.bom.compare import ComparedAssembly, LineChange, ThreeLines, compare_assemblies, compare_three
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError, listed
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.resolve import display_name
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.fcstd.library import Contents
+from silo.fcstd.library import FileContents
 from silo.fcstd.linked import identity_in, recorded_paths
-from silo.fcstd.locate import refusal
-from silo.files import Kept, Project, content_hash
+from silo.files import Project, ProjectEntry, content_hash, refusal
 from silo.platform import folded, one_path, remove_patiently, replacing, scratch_folder
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
 
 
-def top_of(extraction: Extraction) -> Assembly:
+def top_of(extraction: Extraction) -> ComparedAssembly:
     """The assembly itself with its direct lines."""
-    return Assembly(extraction.assembly, tuple(extraction.entries))
+    return ComparedAssembly(extraction.assembly, tuple(extraction.entries))
 
 
-def bom_in(content: Path | str, path: str) -> Assembly | None:
+def bom_in(content: Path | str, path: str) -> ComparedAssembly | None:
     """The BOM of a file that belongs at ``path``; None for a part, or where it holds several assemblies."""
-    contents = Contents(instead={os.path.realpath(path): os.fspath(content)})
+    contents = FileContents(instead={os.path.realpath(path): os.fspath(content)})
     with Library(contents=contents) as library:
         try:
             return top_of(extract(choose_assembly(library.open(path))))
@@ -75,7 +74,7 @@ class RevisionBoms:
     part_number: str
     path: str
     cancelled: Cancel | None = None
-    _known: dict[int, Assembly | None] = field(default_factory=dict)
+    _known: dict[int, ComparedAssembly | None] = field(default_factory=dict)
     _stack: ExitStack = field(default_factory=ExitStack)
 
     def __enter__(self) -> RevisionBoms:
@@ -85,7 +84,7 @@ class RevisionBoms:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def bom(self, number: int) -> Assembly | None:
+    def bom(self, number: int) -> ComparedAssembly | None:
         """The BOM of a revision; None for a part."""
         if number not in self._known:
             target = self._folder / f"{number}.FCStd"
@@ -100,7 +99,7 @@ class RevisionBoms:
         changes = compare_assemblies([before] if before else [], [after] if after else [])
         return tuple(line for change in changes for line in change.lines)
 
-    def three(self, stands: Standing, mine: Assembly | None) -> tuple[ThreeLines, ...]:
+    def three(self, stands: Standing, mine: ComparedAssembly | None) -> tuple[ThreeLines, ...]:
         """Base → theirs → mine, where all of them are assemblies."""
         if mine is None or stands.newest is None:
             return ()
@@ -111,7 +110,7 @@ class RevisionBoms:
 
 def file_revisions(revisions: Sequence[Revision]) -> list[Revision]:
     """Those with a file, newest first."""
-    return sorted(filter(has_file, revisions), key=lambda one: one.revision_number, reverse=True)
+    return sorted(filter(has_file, revisions), key=lambda revision: revision.revision_number, reverse=True)
 
 
 def words(lines: Sequence[LineChange], most: int = 6) -> str:
@@ -121,18 +120,18 @@ def words(lines: Sequence[LineChange], most: int = 6) -> str:
 
 def line_texts(lines: Iterable[LineChange]) -> list[str]:
     """The lines of a difference in words."""
-    told = []
+    texts = []
     for line in lines:
         name = display_name(line.entry) or line.entry.object_name
         if line.old is None:
-            told.append(f"+ {name} {line.entry.quantity:g}")
+            texts.append(f"+ {name} {line.entry.quantity:g}")
         elif line.new is None:
-            told.append(f"- {name} {line.entry.quantity:g}")
+            texts.append(f"- {name} {line.entry.quantity:g}")
         elif line.old.quantity != line.new.quantity:
-            told.append(f"{name} {line.old.quantity:g} → {line.new.quantity:g}")
+            texts.append(f"{name} {line.old.quantity:g} → {line.new.quantity:g}")
         else:
-            told.append(f"{name} moved")
-    return told
+            texts.append(f"{name} moved")
+    return texts
 
 
 MOST_FILES = 20_000
@@ -177,7 +176,7 @@ class Fetched:
 
 
 @dataclass(frozen=True)
-class Lost:
+class LostLink:
     """A link whose file could not be fetched: who links, to which path, and why."""
 
     position: str
@@ -186,11 +185,11 @@ class Lost:
 
 
 @dataclass(frozen=True)
-class Tree:
+class FileTree:
     """All files, the top first, and the links that lead nowhere."""
 
     files: tuple[Fetched, ...]
-    lost: tuple[Lost, ...] = ()
+    lost: tuple[LostLink, ...] = ()
 
 
 @dataclass
@@ -202,17 +201,21 @@ class _Fetch:
     progress: Progress
     most: int
     files: dict[str, Fetched] = field(default_factory=dict)
-    lost: list[Lost] = field(default_factory=list)
+    lost: list[LostLink] = field(default_factory=list)
     release: Release | None = None
     _at: datetime | None = None
     _revisions: dict[str, list[Revision]] = field(default_factory=dict)
     _contents: dict[tuple[str, int], tuple[Path, str]] = field(default_factory=dict)
     _sought: set[str] = field(default_factory=set)
 
-    def tree(self, item: Item, number: int | None) -> Tree:
+    def tree(self, item: Item, number: int | None) -> FileTree:
         holder = self.holder(item)
-        known = self.revisions(holder)
-        wanted = known if number is None else [one for one in known if one.revision_number == number]
+        revisions = self.revisions(holder)
+        wanted = (
+            revisions
+            if number is None
+            else [each_revision for each_revision in revisions if each_revision.revision_number == number]
+        )
         if self.release is not None:
             wanted = list(filter(None, [self.frozen(holder)]))
         if not wanted:
@@ -228,32 +231,36 @@ class _Fetch:
         # place.
         left = [(posixpath.join(above, name) if _is_place(above) else name, holder, top)]
         while left:
-            position, one, revision = left.pop(0)
-            left += self.fetch(position, one, revision)
+            position, other_revision, revision = left.pop(0)
+            left += self.fetch(position, other_revision, revision)
             if not left:
                 left = self.unlinked()
-        return Tree(tuple(self.files.values()), tuple(self.lost))
+        return FileTree(tuple(self.files.values()), tuple(self.lost))
 
     def frozen(self, holder: Holder) -> Revision | None:
         """The revision of a file in the release that is fetched; None if the file is not in it."""
         files = self.release.files if self.release is not None else ()
-        numbers = {one.document: one.revision for one in files}
-        known = self.revisions(holder) if holder.id in numbers else []
-        return next((one for one in known if one.revision_number == numbers[holder.id]), None)
+        numbers = {file.document: file.revision for file in files}
+        revisions = self.revisions(holder) if holder.id in numbers else []
+        return next(
+            (revision for revision in revisions if revision.revision_number == numbers[holder.id]), None
+        )
 
     def unlinked(self) -> list[tuple[str, Holder, Revision]]:
         """The next file of the release that no link led to: a person uploaded it."""
-        there = {one.item for one in self.files.values()} | self._sought
-        for one in self.release.files if self.release is not None else ():
-            if one.document not in there:
-                self._sought.add(one.document)
-                holder = Holder(DocumentId(one.document), one.document)
+        there = {file.item for file in self.files.values()} | self._sought
+        for file in self.release.files if self.release is not None else ():
+            if file.document not in there:
+                self._sought.add(file.document)
+                holder = Holder(DocumentId(file.document), file.document)
                 revision = self.frozen(holder)
-                above, name = posixpath.split((one.file_path or one.file_name).replace("\\", "/"))
+                above, name = posixpath.split((file.file_path or file.file_name).replace("\\", "/"))
                 place = posixpath.join(above, _safe_name(name)) if _is_place(above) else _safe_name(name)
                 if revision is not None and place not in self.files:
                     return [(place, holder, revision)]
-                self.lost.append(Lost(place, place, "it is in the release, and not in Silo at this place"))
+                self.lost.append(
+                    LostLink(place, place, "it is in the release, and not in Silo at this place")
+                )
         return []
 
     def holder(self, item: Item) -> Holder:
@@ -272,10 +279,10 @@ class _Fetch:
     ) -> Iterator[tuple[str, Holder, Revision]]:
         """Fetch one file; gives what it links to and was not seen before."""
         stop_if(self.cancelled)
-        if (known := self.files.get(position)) is not None:
-            if known.item != holder.id:
-                one, other = (text or "another file" for text in (known.part_number, holder.part_number))
-                self.lost.append(Lost(position, position, f"{one} and {other} want the same place"))
+        if (file := self.files.get(position)) is not None:
+            if file.item != holder.id:
+                path, other = (text or "another file" for text in (file.part_number, holder.part_number))
+                self.lost.append(LostLink(position, position, f"{path} and {other} want the same place"))
             return
         if len(self.files) >= self.most:
             raise InputError(f"more than {self.most} files are not fetched in one go")
@@ -288,7 +295,7 @@ class _Fetch:
         try:
             recorded = recorded_paths(content)
         except DocumentError as error:
-            self.lost.append(Lost(position, "", f"its links cannot be read: {error.reason}"))
+            self.lost.append(LostLink(position, "", f"its links cannot be read: {error.reason}"))
             return
         if recorded:
             yield from self.linked(position, holder, revision, recorded)
@@ -316,8 +323,8 @@ class _Fetch:
         self, position: str, holder: Holder, revision: Revision, recorded: Sequence[str]
     ) -> Iterator[tuple[str, Holder, Revision]]:
         by_top = len(self.files) == 1
-        told = self.client.get_revision(holder.of, revision.revision_number)
-        links = {link.path.replace("\\", "/"): link for link in told.links}
+        linked_revision = self.client.get_revision(holder.of, revision.revision_number)
+        links = {link.path.replace("\\", "/"): link for link in linked_revision.links}
         ids = [link.item for link in links.values() if link.item]
         items = self.client.get_items_by_uuid(ids, cancelled=self.cancelled) if ids else {}
         others = _Children(self, holder.part_number)
@@ -334,7 +341,7 @@ class _Fetch:
             if not why and chosen is None:
                 why = f"{(child.part_number if child else '') or path} has no file in Silo"
             if why or child is None or chosen is None:
-                self.lost.append(Lost(position, path, why))
+                self.lost.append(LostLink(position, path, why))
             else:
                 yield target, child, chosen
 
@@ -357,15 +364,17 @@ class _Fetch:
         """
         if self.release is not None:
             return self.frozen(child)
-        known = self.revisions(child)
-        if not self.pinned or not known:
-            return known[0] if known else None
+        revisions = self.revisions(child)
+        if not self.pinned or not revisions:
+            return revisions[0] if revisions else None
         at = self._at
-        same = [one for one in known if sha256 and checksum_of(one) == sha256]
-        before = [one for one in known if at and one.created_at and one.created_at <= at]
+        same = [revision for revision in revisions if sha256 and checksum_of(revision) == sha256]
+        before = [
+            revision for revision in revisions if at and revision.created_at and revision.created_at <= at
+        ]
         if same and by_top:
             return same[0]
-        return max([*same[:1], *before[:1]] or known[-1:], key=lambda one: one.revision_number)
+        return max([*same[:1], *before[:1]] or revisions[-1:], key=lambda revision: revision.revision_number)
 
 
 @dataclass
@@ -392,7 +401,9 @@ class _Children:
             return {}, {}
         for line in lines:
             number = line.child_part_number
-            by_path |= {str(one.get("file", "")).replace("\\", "/"): number for one in line.components}
+            by_path |= {
+                str(component.get("file", "")).replace("\\", "/"): number for component in line.components
+            }
             for revision in self.fetch.revisions(Holder(number, ""))[:1]:
                 by_name[(revision.file_name or "").casefold()] = number
         return by_path, by_name
@@ -400,15 +411,15 @@ class _Children:
 
 def _is_place(folder: str) -> bool:
     """True for a folder inside a project, such as ``parts/bought``."""
-    return not any(":" in one or one in ("", ".", "..") or refusal(one) for one in folder.split("/"))
+    return not any(":" in part or part in ("", ".", "..") or refusal(part) for part in folder.split("/"))
 
 
 def _refused(path: str) -> str:
     """Why a recorded path is not followed; "" where it is."""
     if _ABSOLUTE.match(path):
         return "it is an absolute path, which has no place in another folder"
-    if (found := refusal(path)) is not None:
-        return found.detail or "its path cannot be one"
+    if (refused := refusal(path)) is not None:
+        return refused.detail or "its path cannot be one"
     if posixpath.splitext(path)[1].lower() != ".fcstd":
         return "it is no FreeCAD file"
     return ""
@@ -430,7 +441,7 @@ def fetched(
     cancelled: Cancel | None = None,
     progress: Progress = lambda _name, _count: None,
     most: int = MOST_FILES,
-) -> Iterator[Tree]:
+) -> Iterator[FileTree]:
     """The tree of an item, in a scratch folder that goes with the block.
 
     revision
@@ -447,7 +458,7 @@ def fetched(
         yield fetch.tree(item, number)
 
 
-class State(StrEnum):
+class PullState(StrEnum):
     """What became of a file."""
 
     NEW = "new"  # was not there
@@ -459,13 +470,13 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True)
-class Placed:
+class PulledFile:
     """A file in the user's folder. ``kept``: where the copy of an overwritten one is."""
 
     path: Path
     part_number: str
     revision: int
-    state: State
+    state: PullState
     kept: Path | None = None
 
 
@@ -474,13 +485,15 @@ class Pulled:
     """What became of a pull: the top file, all files, and the links that lead nowhere."""
 
     top: Path
-    files: tuple[Placed, ...]
-    lost: tuple[Lost, ...]
+    files: tuple[PulledFile, ...]
+    lost: tuple[LostLink, ...]
 
     @property
     def complete(self) -> bool:
         """True where every file is there as wanted."""
-        return not self.lost and not any(one.state in (State.EDITED, State.OPEN) for one in self.files)
+        return not self.lost and not any(
+            file.state in (PullState.EDITED, PullState.OPEN) for file in self.files
+        )
 
 
 # --- lay out ---------------------------------------------------------------------------------------------
@@ -492,20 +505,22 @@ def lay_out(files: Iterable[tuple[str, str | None]]) -> list[str]:
     files
         (position, ``file_path`` of the revision); the paths name folders that the positions only step out of.
     """
-    split = [(*_ups(position), (told or "").replace("\\", "/").split("/")) for position, told in files]
+    split = [
+        (*_ups(position), (each_place or "").replace("\\", "/").split("/")) for position, each_place in files
+    ]
     most = max((ups for ups, _, _ in split), default=0)
     # names[n]: the folder n steps above the top file's own.
     names: dict[int, str] = {}
-    for ups, parts, told in split:
-        above = told[: -len(parts)] if told[-len(parts) :][:-1] == parts[:-1] else []
+    for ups, parts, place_text in split:
+        above = place_text[: -len(parts)] if place_text[-len(parts) :][:-1] == parts[:-1] else []
         for step, name in enumerate(reversed(above)):
             if name not in ("", ".", "..") and refusal(name) is None:
                 names.setdefault(ups + step, name)
     above_top = [names.get(step, "folder") for step in range(most)]
     places = ["/".join([*reversed(above_top[ups:]), *parts]) for ups, parts, _ in split]
     # A link may spell a name in another way than its file does.
-    spelt = [("/".join(told), place) for (_, _, told), place in zip(split, places, strict=True)]
-    return [told if folded(told) == folded(place) else place for told, place in spelt]
+    spelt = [("/".join(each_place), place) for (_, _, each_place), place in zip(split, places, strict=True)]
+    return [each_place if folded(each_place) == folded(place) else place for each_place, place in spelt]
 
 
 def _ups(position: str) -> tuple[int, list[str]]:
@@ -514,22 +529,26 @@ def _ups(position: str) -> tuple[int, list[str]]:
     return ups, parts[ups:]
 
 
-def _anchor(tree: Tree, places: Sequence[str], into: Path) -> Path:
+def _anchor(tree: FileTree, places: Sequence[str], into: Path) -> Path:
     """Where the folder of the places begins: the item may have its file in the user's folder already."""
     top, name = tree.files[0], posixpath.basename(places[0])
-    known = into.joinpath(*places[0].split("/"))
-    if known.exists() or not into.is_dir():
+    path = into.joinpath(*places[0].split("/"))
+    if path.exists() or not into.is_dir():
         return into
     with Library() as library:
         item = top.item.lower()
-        found = [one for one in into.rglob(name) if identity_in(library, str(one)).lower() == item]
-    if len(found) != 1:
+        paths = [
+            each_path
+            for each_path in into.rglob(name)
+            if identity_in(library, str(each_path)).lower() == item
+        ]
+    if len(paths) != 1:
         return into
-    base = found[0]
+    base = paths[0]
     for _ in places[0].split("/"):
         base = base.parent
     inside = base == into or into in base.parents
-    return base if inside and base.joinpath(*places[0].split("/")) == found[0] else into
+    return base if inside and base.joinpath(*places[0].split("/")) == paths[0] else into
 
 
 # --- place -----------------------------------------------------------------------------------------------
@@ -553,37 +572,37 @@ class Rules:
     learn: Callable[[str, str, int], object] = lambda _sha256, _item, _revision: None
 
 
-def place(tree: Tree, into: Path | str, rules: Rules = Rules()) -> Pulled:
+def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
     """Write the files of a tree below a folder. What has no place there is lost, the others come.
 
     Raises DocumentError where the disk does not take one, or the top has no place; those before it are whole.
     """
     base = Path(os.path.realpath(into))
-    places = lay_out((one.position, one.revision.file_path) for one in tree.files)
+    places = lay_out((file.position, file.revision.file_path) for file in tree.files)
     anchor = _anchor(tree, places, base)
-    placed: list[Placed] = []
-    known: dict[str, Kept | None] = {}
+    placed: list[PulledFile] = []
+    noted: dict[str, ProjectEntry | None] = {}
     lost = list(tree.lost)
     # The disk says which names are one file: by their case, their Unicode form, or a link.
-    taken: dict[str, Placed] = {}
+    taken: dict[str, PulledFile] = {}
     for one, where in zip(tree.files, places, strict=True):
         target = anchor.joinpath(*where.split("/"))
         if (before := taken.get(one_path(str(target)))) is not None:
             if (before.part_number, before.revision) != (one.part_number, one.revision.revision_number):
                 why = f"{before.part_number}, revision {before.revision}, has the same place on this disk"
-                lost.append(Lost(one.position, where, why))
+                lost.append(LostLink(one.position, where, why))
             continue
         if why := _in_the_way(target, base):
             if not placed:
                 raise DocumentError(str(target), why)
-            lost.append(Lost(one.position, where, why))
+            lost.append(LostLink(one.position, where, why))
             continue
         placed.append(_place(one, target, rules))
         taken[one_path(str(target))] = placed[-1]
-        if placed[-1].state not in (State.EDITED, State.OPEN):
-            known[str(target)] = Kept(one.item, one.sha256, _uid_of(target))
+        if placed[-1].state not in (PullState.EDITED, PullState.OPEN):
+            noted[str(target)] = ProjectEntry(one.item, one.sha256, _uid_of(target))
     project = Project.of(anchor) or Project(one_path(str(anchor)))
-    project.note({at: kept for path, kept in known.items() if (at := project.place(path)) is not None})
+    project.note({at: kept for path, kept in noted.items() if (at := project.place(path)) is not None})
     return Pulled(placed[0].path, tuple(placed), tuple(lost))
 
 
@@ -604,28 +623,28 @@ def _in_the_way(target: Path, base: Path) -> str:
     return ""
 
 
-def _place(one: Fetched, target: Path, rules: Rules) -> Placed:
+def _place(one: Fetched, target: Path, rules: Rules) -> PulledFile:
     number = one.revision.revision_number
     rules.learn(one.sha256, one.item, number)
 
-    def done(state: State, kept: Path | None = None) -> Placed:
-        return Placed(target, one.part_number, number, state, kept)
+    def done(state: PullState, kept: Path | None = None) -> PulledFile:
+        return PulledFile(target, one.part_number, number, state, kept)
 
     try:
         real = Path(os.path.realpath(target))
         real.parent.mkdir(parents=True, exist_ok=True)
-        state, kept = State.NEW, None
+        state, kept = PullState.NEW, None
         if target.exists():
             there = content_hash(target)
             if there == one.sha256:
-                return done(State.SAME)
+                return done(PullState.SAME)
             if rules.is_open(str(target)):
-                return done(State.OPEN)
-            state = State.UPDATED
+                return done(PullState.OPEN)
+            state = PullState.UPDATED
             if there not in one.earlier:
                 if not rules.overwrite:
-                    return done(State.EDITED)
-                state, kept = State.OVERWRITTEN, rules.keep(str(target))
+                    return done(PullState.EDITED)
+                state, kept = PullState.OVERWRITTEN, rules.keep(str(target))
         # Through a link to where the file is: another assembly may use it there.
         with one.content.open("rb") as read, replacing(real, mode=0o644) as write:
             shutil.copyfileobj(read, write, 1 << 20)
@@ -645,13 +664,13 @@ def pulled_json(pulled: Pulled, base: Path) -> dict[str, Any]:
         "complete": pulled.complete,
         "files": [
             {
-                "path": below(one.path),
-                "part_number": one.part_number,
-                "revision": one.revision,
-                "state": one.state.value,
-                "kept": str(one.kept) if one.kept else None,
+                "path": below(file.path),
+                "part_number": file.part_number,
+                "revision": file.revision,
+                "state": file.state.value,
+                "kept": str(file.kept) if file.kept else None,
             }
-            for one in pulled.files
+            for file in pulled.files
         ],
         "missing": [
             {"file": lost.position, "link": lost.path, "reason": lost.reason} for lost in pulled.lost

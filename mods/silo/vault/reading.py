@@ -3,7 +3,7 @@
 
 Many questions are answered in two steps, each spread over the executor. First every file is read, once: that
 gives its facts, and the answer where it links to no other. Then the assemblies are walked, with the facts of
-what they link to in place of the files. Answers come back in the order of the questions, whoever found them.
+what they link to in place of the files. Answers come back in the order of the questions.
 
 Questions about files, and what a worker does to answer them; its values travel between processes.
 
@@ -36,8 +36,8 @@ from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.report import from_plain, to_plain
 from silo.bom.roots import choose_assembly
-from silo.fcstd.library import Content, Contents, Library, facts_of
-from silo.fcstd.locate import Found, Locator
+from silo.fcstd.library import Content, FileContents, Library, facts_of
+from silo.files import FoundFile, Locator
 from silo.platform import workers
 from silo.vault.index import Index, StoredAnswer, engine
 
@@ -115,12 +115,12 @@ class First(NamedTuple):
     facts: str = ""
     content: Content | None = None
     folders: tuple[str, ...] = ()
-    linked: Mapping[str, Found] = {}
+    linked: Mapping[str, FoundFile] = {}
 
     @property
     def files(self) -> list[str]:
         """The file, and those that it links to."""
-        return [self.path, *(found.real for found in self.linked.values())]
+        return [self.path, *(location.real for location in self.linked.values())]
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,14 +133,14 @@ class Supplies:
 
     contents: Mapping[str, Content] = field(default_factory=dict)
     facts: Mapping[str, str] = field(default_factory=dict)
-    found: Sequence[tuple[tuple[str, ...], Mapping[str, Found]]] = ()
+    found: Sequence[tuple[tuple[str, ...], Mapping[str, FoundFile]]] = ()
 
 
-class Session:
+class WalkSession:
     """What a worker keeps between questions."""
 
-    def __init__(self, contents: Contents | None = None) -> None:
-        self.contents = contents or Contents()
+    def __init__(self, contents: FileContents | None = None) -> None:
+        self.contents = contents or FileContents()
         self.locator = Locator(remembers_files=True)
 
     def ask(self, question: Question, facts: Callable[[str], str] = lambda _path: "") -> StoredAnswer:
@@ -160,13 +160,13 @@ class Session:
             library.dissolve()
 
     def _read(self, library: Library, question: Question) -> First:
-        path, facts, linked = "", "", dict[str, Found]()
+        path, facts, linked = "", "", dict[str, FoundFile]()
         try:
             document = library.open(question.path)
             path, facts = document.FileName, facts_of(document)
             for recorded in document.linked():
-                if isinstance(found := self.locator.find(recorded, document.folders), Found):
-                    linked[recorded] = found
+                if isinstance(location := self.locator.find(recorded, document.folders), FoundFile):
+                    linked[recorded] = location
         except DocumentError:
             pass  # which is the answer
         else:
@@ -180,9 +180,9 @@ class Session:
             document = library.open(question.path)
             top = document.getObject(question.assembly or "") if question.name_only else None
             top = choose_assembly(document, question.assembly) if top is None else top
-            found = extract(top, hardware=question.hardware, below=question.below)
-            told = respelt_findings(library.notes, document.FileName)
-            return to_plain(replace(found, findings=(*found.findings, *told)))
+            extraction = extract(top, hardware=question.hardware, below=question.below)
+            findings = respelt_findings(library.notes, document.FileName)
+            return to_plain(replace(extraction, findings=(*extraction.findings, *findings)))
         except DocumentError as error:
             return {"document": [error.path, error.reason]}
         except SeveralAssembliesError as error:
@@ -209,11 +209,11 @@ def work(questions: Sequence[Question], supplies: Supplies | None, run: str) -> 
         names the run: what a worker of a cluster keeps from another one may be old.
     """
     if getattr(_mine, "run", None) != run:
-        _mine.run, _mine.session = run, Session()
+        _mine.run, _mine.session = run, WalkSession()
     return work_in(_mine.session, questions, supplies)
 
 
-def work_in(session: Session, questions: Sequence[Question], supplies: Supplies | None) -> Done:
+def work_in(session: WalkSession, questions: Sequence[Question], supplies: Supplies | None) -> Done:
     """:func:`work` in this process."""
     reads, begin = session.contents.reads, time.thread_time()
     if supplies is None:
@@ -221,8 +221,8 @@ def work_in(session: Session, questions: Sequence[Question], supplies: Supplies 
     else:
         for path, content in supplies.contents.items():
             session.contents.add(path, content)
-        for folders, found in supplies.found:
-            session.locator.learn(folders, found)
+        for folders, locations in supplies.found:
+            session.locator.learn(folders, locations)
         facts = supplies.facts
         firsts = [First(session.ask(question, lambda path: facts.get(path, ""))) for question in questions]
     return Done(firsts, session.contents.reads - reads, time.thread_time() - begin)
@@ -287,7 +287,10 @@ def pool_of(jobs: int, dask: str | None = None, *, worth: int = _WORTH_A_POOL) -
             workers = sum(client.nthreads().values())
             # Dask cancels where nobody waits, also what was begun.
             yield Pool(
-                client.get_executor, max(1, workers), worth=worth, end=lambda one: one.shutdown(wait=False)
+                client.get_executor,
+                max(1, workers),
+                worth=worth,
+                end=lambda executor: executor.shutdown(wait=False),
             )
         return
     pool = Pool(lambda: _processes(jobs), jobs, worth=worth) if jobs > 1 else None
@@ -322,8 +325,8 @@ _LEAST = 8  # questions that travel together, also at the end
 _WORKER_LOST = (BrokenExecutor, CancelledError)
 
 
-class Answer:
-    """What was found out."""
+class WalkAnswer:
+    """What is known of it."""
 
     __slots__ = ("_plain", "known", "question")
 
@@ -360,7 +363,7 @@ class _Chunk:
     tries: int = 0
 
 
-class Reading:
+class VaultReader:
     """Asks questions: the index first, then the files.
 
     pool
@@ -378,31 +381,31 @@ class Reading:
         self.seconds = 0.0
         self._elsewhere = 0
         self._pool = pool
-        self._session = Session(index.contents)
+        self._session = WalkSession(index.contents)
 
     @property
     def reads(self) -> int:
         return self._session.contents.reads + self._elsewhere
 
-    def ask(self, question: Question) -> Answer:
+    def ask(self, question: Question) -> WalkAnswer:
         """One question."""
-        known = self.index.recall(question.path, question.name)
-        if known is None:
+        answer = self.index.recall(question.path, question.name)
+        if answer is None:
             self.asked += 1
-            known = self._session.ask(question, lambda path: self.index.facts([path]).get(path, ""))
-            self.index.remember(question.path, question.name, known)
-        return Answer(question, known)
+            answer = self._session.ask(question, lambda path: self.index.facts([path]).get(path, ""))
+            self.index.remember(question.path, question.name, answer)
+        return WalkAnswer(question, answer)
 
-    def ask_many(self, questions: Iterable[Question]) -> Iterator[Answer]:
+    def ask_many(self, questions: Iterable[Question]) -> Iterator[WalkAnswer]:
         """The answers in the order of the questions."""
         asked = list(questions)
         waiting: dict[int, StoredAnswer] = {}
         left: list[int] = []
-        for number, found in self._recalled(asked, range(len(asked))):
-            if found is None:
+        for number, answer in self._recalled(asked, range(len(asked))):
+            if answer is None:
                 left.append(number)
             elif len(waiting) < self._waiting:
-                waiting[number] = found
+                waiting[number] = answer
         self.asked += len(left)
         pool = self._pool if self._pool is not None and len(left) >= self._pool.worth else None
         jobs, size = (1, CHUNK) if pool is None else (pool.jobs, pool.chunk)
@@ -426,14 +429,14 @@ class Reading:
         again = self._recalled(asked, rest)
         for number, question in enumerate(asked):
             if number in linked:
-                known = next(walked).known
-                assert known is not None  # since supplies were given
-                self._remember(question, known)
+                stored_answer = next(walked).known
+                assert stored_answer is not None  # since supplies were given
+                self._remember(question, stored_answer)
             elif number in waiting:
-                known = waiting.pop(number)
+                stored_answer = waiting.pop(number)
             else:
-                known = next(again)[1] or self.ask(question).known
-            yield Answer(question, known)
+                stored_answer = next(again)[1] or self.ask(question).known
+            yield WalkAnswer(question, stored_answer)
 
     def _recalled(
         self, asked: Sequence[Question], numbers: Iterable[int]
@@ -456,11 +459,14 @@ class Reading:
         own = dict.fromkeys(linked[number].path for number in group)
         given = {path: contents.pop(path) for path in own if path in contents}
         files = dict.fromkeys(file for number in group for file in linked[number].files)
-        found = [(linked[number].folders, linked[number].linked) for number in group]
-        return _Chunk([asked[number] for number in group], Supplies(given, self.index.facts([*files]), found))
+        folders_and_links = [(linked[number].folders, linked[number].linked) for number in group]
+        return _Chunk(
+            [asked[number] for number in group],
+            Supplies(given, self.index.facts([*files]), folders_and_links),
+        )
 
-    def _remember(self, question: Question, known: StoredAnswer) -> None:
-        self.index.remember(question.path, question.name, known)
+    def _remember(self, question: Question, answer: StoredAnswer) -> None:
+        self.index.remember(question.path, question.name, answer)
 
     def _worked_on(self, chunks: Iterable[_Chunk], pool: Pool | None) -> Iterator[First]:
         """What the chunks gave, in their order."""

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The add-on while FreeCAD runs: what the commands and the pane's buttons ask for. Work is done elsewhere."""
+"""The add-on while FreeCAD runs: what the commands and the pane's buttons ask for. Work is done elsewhere.
+
+What the buttons of the pane do: each action goes to the flow that it belongs to. GUI thread.
+"""
 
 from __future__ import annotations
 
@@ -8,25 +11,29 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.workbench.commit.opened import Opened
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt
 from silo.workbench.pane.dock import ActivityDock
-from silo.workbench.settings.preferences import GROUP, Preferences
+from silo.workbench.settings import GROUP, Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from silo.outbox.send import Sent
-    from silo.workbench.buttons import Buttons
     from silo.workbench.commit.flow import CommitFlow
-    from silo.workbench.freecad.edits import CommitHook
+    from silo.workbench.commit.opened import Opened
+    from silo.workbench.freecad.facts import CommitHook
     from silo.workbench.freecad.live_desk import LiveDesk, SiloGroup
+    from silo.workbench.pane.activity import Action, Do
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
-    from silo.workbench.revisions.flow import RevisionFlow
-    from silo.workbench.session.session import Newer, Session, Shown
+    from silo.workbench.revisions.flow import ProjectFlow, RevisionFlow
+    from silo.workbench.session.session import Newer, PaneState, Session
+
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
 BEGIN_AFTER_MS = 1500
@@ -34,24 +41,29 @@ BEGIN_AFTER_MS = 1500
 TICK_MS = 20_000
 # Events may come by the hundred: the pane is drawn at most this often.
 DRAW_MS = 60
+# The project view looks at its files this long after a commit arrived.
+REFRESH_MS = 1500
 # What a commit needs and that a worker may import.
 WITHOUT_WIDGETS = ("freecad.live", "freecad.live_desk", "commit.flow")
 
 
 class AddOn:
-    """One per FreeCAD. Made at start, so everything that costs time is made when it is first needed."""
+    """One per FreeCAD. Made before its window stands, so what costs time is made when it is first needed.
 
-    def __init__(self) -> None:
+    opened
+        what each document was made from, observed since FreeCAD's start.
+    """
+
+    def __init__(self, opened: Opened) -> None:
         self.preferences = Preferences(host.parameters(GROUP))
         self.dock = ActivityDock(host.main_window(), lambda action: self.buttons.act(action))
         self.relay = qt.Relay(self._bug)
-        # From the start: what a document was made from is known only when it is opened.
-        self.opened = Opened(lambda: self.session.outbox)
-        host.add_document_observer(self.opened)
+        self.opened = opened
         self._hook: CommitHook | None = None
-        self._drawn: Shown | None = None
+        self._drawn: PaneState | None = None
         self._present: tuple[Any, tuple[str, ...]] = (None, ())
         self._window: Any = None
+        self._refreshing = False
         self._timer: Any = None
         self._watch: Any = None
 
@@ -82,6 +94,9 @@ class AddOn:
         from silo.workbench.gui.widgets import CloseWatch
 
         self._watch = CloseWatch(host.main_window(), self._closing)
+        from silo.workbench.pane.dock import ProjectDock
+
+        self.project = ProjectDock(host.main_window(), lambda: self.projects)
         self._find_foreign_commit()
 
     def _prepared(self) -> None:
@@ -132,14 +147,18 @@ class AddOn:
         from silo.workbench.session.session import Listener, Session
         from silo.workbench.settings.server import Keyring, read_known
 
-        listener = Listener(shown=self._shown, console=host.warning, sent=self._sent, bug=self._bug)
-        return Session(self.relay.post, read_known(self.preferences), Keyring(), listener=listener)
+        def drawing() -> list[str]:
+            from silo.workbench.freecad.drawing import command
+
+            return command()
+
+        listener = Listener(shown=self._show_state, console=host.warning, sent=self._sent, bug=self._bug)
+        preferences = read_known(self.preferences)
+        return Session(self.relay.post, preferences, Keyring(), listener=listener, drawing=drawing)
 
     @cached_property
     def buttons(self) -> Buttons:
         """What the buttons of the pane do."""
-        from silo.workbench.buttons import Buttons
-
         return Buttons(self)
 
     @cached_property
@@ -168,6 +187,13 @@ class AddOn:
         from silo.workbench.revisions.flow import RevisionFlow
 
         return RevisionFlow(self.session, self.desk)
+
+    @cached_property
+    def projects(self) -> ProjectFlow:
+        """The project folder."""
+        from silo.workbench.revisions.flow import ProjectFlow
+
+        return ProjectFlow(self.session, self.preferences, self.commits, self.desk, self.revisions)
 
     @cached_property
     def previews(self) -> PreviewFlow:
@@ -208,7 +234,7 @@ class AddOn:
         )
         self._ask_team()
 
-    def _shown(self, shown: Shown) -> None:
+    def _show_state(self, shown: PaneState) -> None:
         waits = self._drawn is None
         self._drawn = shown
         if waits:
@@ -226,14 +252,14 @@ class AddOn:
         # To find the item of each document takes a while where there are hundreds.
         asked = (colleagues, [(doc.Name, since) for doc, since in docs])
         if asked != self._present[0]:
-            from silo.workbench.pane.waiting import presence_text
+            from silo.workbench.pane.activity import presence_text
 
-            found = []
+            texts = []
             for doc, since in docs:
                 newer = self.session.newer_than(self.desk.identity(doc) or "", since)
                 if newer is not None:
-                    found.append(presence_text(newer, str(doc.Label)))
-            self._present = (asked, tuple(found))
+                    texts.append(presence_text(newer, str(doc.Label)))
+            self._present = (asked, tuple(texts))
         return self._present[1]
 
     def _sent(self, sent: Sent) -> None:
@@ -243,9 +269,20 @@ class AddOn:
             self.group.know(path, sent.resolved.entries)
         if "previews" in vars(self):
             self.previews.again(path)
+        self._refresh_project()
         left = len(sent.resolved.unresolved) if sent.resolved is not None else 0
         if left and self.preferences.flag("AskRegister") and self.commits.was_asked_for(sent.entry.key):
             self.buttons.register(path)
+
+    def _refresh_project(self) -> None:
+        """Once for all that arrives together."""
+        if not self._refreshing:
+            self._refreshing = True
+            qt.later(REFRESH_MS, self._refresh_now)
+
+    def _refresh_now(self) -> None:
+        self._refreshing = False
+        self.project.refresh()
 
     def _bug(self, error: BaseException) -> None:
         host.error(plain(f"[Silo] unexpected problem: {type(error).__name__}: {error}", 500))
@@ -263,22 +300,16 @@ class AddOn:
         """True where Commit belongs in every workbench's File menu."""
         return self.preferences.flag("ShowEverywhere")
 
-    def preference_page(self) -> type:
-        """What FreeCAD makes the preference page with; it wants a class, and calls it when the page opens."""
-        addon = self
+    def preference_page(self) -> Any:
+        """The preference page of our own settings."""
+        from silo.workbench.settings.page import PreferencePage
 
-        class Page:
-            def __new__(cls, _parent: object = None) -> Any:
-                from silo.workbench.settings.page import PreferencePage
-
-                return PreferencePage(addon.preferences, addon.session, addon.settings_changed)
-
-        return Page
+        return PreferencePage(self.preferences, self.session, self.settings_changed)
 
     def hook_commit(self, name: str) -> None:
         """Sync the BOM after this command, which is not ours."""
         if self._hook is None:
-            from silo.workbench.freecad.edits import CommitHook
+            from silo.workbench.freecad.facts import CommitHook
 
             self._hook = CommitHook(
                 host,
@@ -291,13 +322,13 @@ class AddOn:
 
     def _find_foreign_commit(self) -> None:
         """The Kindred workbench has further commands that upload a revision; connect to what is there."""
-        from silo.workbench.commands import COMMIT, commands
-        from silo.workbench.freecad.edits import FOREIGN
+        from silo.workbench.freecad.facts import FOREIGN
+        from silo.workbench.start import COMMIT, commands
 
         ours = commands(self)[COMMIT].text
         for name in FOREIGN:
-            told = host.command_info(name).get("menuText")
-            if told is not None and told != ours:
+            title = host.command_info(name).get("menuText")
+            if title is not None and title != ours:
                 self.hook_commit(name)
         if self._hook is not None:
             self._hook.connect()
@@ -332,16 +363,16 @@ class AddOn:
 
     def open_from_silo(self) -> None:
         """Find an item and open its file."""
-        from silo.files import Project
         from silo.workbench.revisions.dialog import OpenDialog
 
-        active = host.active_document()
-        several = [active, *host.documents()] if active is not None else host.documents()
-        found = (Project.of(doc.FileName) for doc in several if doc.FileName)
-        # The root of a project is marked, and never guessed from where a document lies.
-        folder = next((project.root for project in found if project is not None), "")
+        folder = next(iter(self.projects.roots()), "")
         self._window = OpenDialog(self.revisions, host.main_window(), folder)
         self._window.show()
+
+    def show_project(self) -> None:
+        """Show the project view, with what is so now."""
+        self.project.show_and_raise()
+        self.project.refresh()
 
     def history(self) -> None:
         """The revisions of the active document."""
@@ -370,6 +401,158 @@ class AddOn:
 
     def show_help(self) -> None:
         """Show the add-on's page of the documentation."""
-        from silo.workbench.gui.installing import HelpWindow
+        from silo.workbench.settings.page import HelpWindow
 
         HelpWindow(host.main_window()).show()
+
+
+class Buttons:
+    """One per FreeCAD."""
+
+    def __init__(self, addon: AddOn) -> None:
+        self._addon = addon
+
+    def act(self, action: Action) -> None:
+        """Do what a button of the pane asks for."""
+        self._actions()[action.do](action)
+
+    def _actions(self) -> dict[Do, Callable[[Action], object]]:
+        from silo.workbench.pane.activity import Do
+
+        addon = self._addon
+        return {
+            Do.VIEW: lambda action: self.open_page(action.target),
+            Do.SHOW: lambda action: self.show_objects(action.document, action.objects),
+            Do.RETRY: self._retry,
+            Do.OPEN_THEIRS: self._choose,
+            Do.TAKE_THEIRS: self._choose,
+            Do.COMPARE: self._compare,
+            Do.SEND_HERE: lambda action: addon.session.send_here(map(int, action.target.split(","))),
+            Do.SAVE_COPY: self._save_copy,
+            Do.DISCARD: lambda action: addon.session.discard(int(action.target)),
+            Do.DETAILS: self._details,
+            Do.STOP: lambda _action: addon.session.cancel(),
+            Do.PREVIEW: lambda action: self._with_document(action.document, addon.previews.start),
+            Do.MEND: lambda action: self._with_document(
+                action.document, lambda doc: addon.previews.start(doc, mend=True)
+            ),
+            Do.SYNC_WITHOUT: lambda action: self._with_document(
+                action.document, lambda doc: addon.commits.sync_only(doc, allow_missing=True)
+            ),
+            Do.SAME: self._same_part,
+            Do.REGISTER: lambda action: self.register(action.document),
+            Do.DECIDE: lambda action: self.register(action.document),
+            Do.SETTINGS: lambda _action: addon.show_settings(),
+            Do.INSTALL: lambda _action: _install(),
+        }
+
+    def _retry(self, action: Action) -> None:
+        if action.target:
+            self._addon.session.retry(int(action.target))
+        else:
+            self._addon.session.retry_all()
+
+    def _choose(self, action: Action) -> None:
+        """What to do about the colleague's revision for which a commit is held."""
+        from silo.workbench.commit.flow import Choice, of_held
+        from silo.workbench.pane.activity import Do
+
+        session, entry_id = self._addon.session, int(action.target)
+        held = next((entry for entry in session.shown.waiting if entry.id == entry_id), None)
+        if held is None:
+            return
+        if action.do is Do.OPEN_THEIRS:
+            self._addon.revisions.choose(held.path, of_held(held), Choice.OPEN)
+        else:
+            self._addon.revisions.choose(
+                held.path, of_held(held), Choice.TAKE, taken=lambda: session.discard(entry_id, keep=True)
+            )
+
+    def _compare(self, action: Action) -> None:
+        """The colleague's revision as a ghost beside the document that a held commit is of."""
+        from silo.workbench.commit.flow import of_held
+
+        held = next(
+            (entry for entry in self._addon.session.shown.waiting if str(entry.id) == action.target), None
+        )
+        if held is not None:
+            self._addon.revisions.compare(
+                held.path,
+                held.part_number,
+                of_held(held).revision,
+                qt.tell_at_pointer,
+                self._addon.session.problem,
+            )
+
+    def _details(self, action: Action) -> None:
+        """All lines of the BOM difference for which a commit is held."""
+        from silo.workbench.commit.flow import line_texts
+        from silo.workbench.gui import widgets
+
+        theirs = self._addon.session.shown.theirs.get(int(action.target))
+        if theirs is not None:
+            widgets.read(host.main_window(), theirs.headline, line_texts(theirs))
+
+    def _same_part(self, action: Action) -> None:
+        """These files are one part on purpose; the BOM is synced without the question."""
+        commits = self._addon.commits
+        commits.accept(action.target, action.objects)
+        doc = host.find_document(action.document)
+        if doc is not None:
+            commits.sync_only(doc)
+
+    def _save_copy(self, action: Action) -> None:
+        """Ask where to, and write the file of something that waits."""
+        target = qt.ask_where_to_save(host.main_window(), translate("Silo", "Save a copy"), action.document)
+        if target:
+            self._addon.session.save_copy(int(action.target), Path(target))
+
+    def register(self, path: str) -> None:
+        """Give part numbers to the components of this document, where it is open."""
+        self._with_document(path, self._addon.registrations.start)
+
+    def _with_document(self, path: str, call: Callable[[object], object]) -> None:
+        doc = host.find_document(path)
+        if doc is None:
+            # The report view is often hidden.
+            qt.tell_at_pointer(translate("Silo", "This document is not open any more."))
+            host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
+        else:
+            call(doc)
+
+    def open_page(self, url: str) -> None:
+        """Open a page of the server in use; where no browser opens, the address is on the clipboard."""
+        from silo.api.config import ServerAddress
+        from silo.bom.errors import SiloError
+
+        try:
+            # A box may be older than the settings.
+            page = ServerAddress.parse(self._addon.session.shown.server.url).web(url)
+        except SiloError:
+            text = translate("Silo", "[Silo] Not opened, for it is not on the Silo server in use: ")
+            host.warning(text + plain(url, 300))
+            return
+        if not qt.open_url(page):
+            qt.copy(page)
+            qt.tell_at_pointer(translate("Silo", "No browser could be opened. The address was copied."))
+            text = translate("Silo", "[Silo] No browser could be opened; the address was copied: ")
+            host.message(text + page)
+
+    def show_objects(self, path: str, names: tuple[str, ...]) -> None:
+        """Select objects of a document in the 3D view and the tree."""
+        self._with_document(path, lambda doc: _told(self._addon.desk.light(doc, names)))
+
+
+def _install() -> None:
+    from silo import FREECAD_PACKAGES
+    from silo.workbench.settings.page import show_install
+
+    show_install(tuple(FREECAD_PACKAGES))
+
+
+def _told(count: int) -> None:
+    if not count:
+        host.warning(translate("Silo", "[Silo] These objects are not in the document any more."))
+    elif count > host.MOST_SELECTED:
+        text = translate("Silo", "[Silo] The first {n} of {all} objects are selected.")
+        host.message(text.replace("{n}", str(host.MOST_SELECTED)).replace("{all}", str(count)))

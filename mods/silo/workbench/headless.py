@@ -41,11 +41,11 @@ if TYPE_CHECKING:
     from silo.batch import TopResult
     from silo.bom.model import Extraction
     from silo.bom_sync import Outcome
-    from silo.workbench.freecad.witness import Account
+    from silo.workbench.freecad.live import SolidCount
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class HeadlessJob:
     """What ``SILO_ARGS`` asks for. Paths may be relative to the folder in which freecadcmd was started."""
 
     tops: tuple[str, ...]
@@ -60,7 +60,7 @@ class Job:
     verify: bool = False
 
     @classmethod
-    def from_text(cls, text: str | None) -> Job:
+    def from_text(cls, text: str | None) -> HeadlessJob:
         """Raises InputError that names what is wrong."""
         try:
             data = json.loads(text or "")
@@ -73,11 +73,11 @@ class Job:
         tops = data.get("tops")
         if not isinstance(tops, list) or not tops or not all(isinstance(top, str) and top for top in tops):
             raise InputError('SILO_ARGS: "tops" must be a list of files and folders, and not an empty one')
-        for known in fields(cls)[1:]:
-            wanted = bool if known.default is False else str
-            if known.name in data and not isinstance(data[known.name], wanted):
+        for field in fields(cls)[1:]:
+            wanted = bool if field.default is False else str
+            if field.name in data and not isinstance(data[field.name], wanted):
                 kind = "true or false" if wanted is bool else "a text"
-                raise InputError(f'SILO_ARGS: "{known.name}" must be {kind}, got {data[known.name]!r}')
+                raise InputError(f'SILO_ARGS: "{field.name}" must be {kind}, got {data[field.name]!r}')
         return cls(**{**data, "tops": tuple(tops)})
 
 
@@ -87,7 +87,7 @@ _EXAMPLE = '{"tops": ["TopAssembly.FCStd"]}'
 def main(env: Mapping[str, str] = os.environ) -> int:
     """Do the job that the environment describes; the exit code."""
     try:
-        job = Job.from_text(job_text(env))
+        job = HeadlessJob.from_text(job_text(env))
         check_writable(job.json, job.report)
         if not documents_in(job.tops):
             raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(job.tops)}")
@@ -107,54 +107,54 @@ def _tell(error: Exception) -> int:
 
 
 def _extractions(
-    tops: list[str], job: Job, look: Callable[[Extraction], None] = lambda _found: None
+    tops: list[str], job: HeadlessJob, look: Callable[[Extraction], None] = lambda _found: None
 ) -> Iterator[tuple[str, Extraction | SiloError]]:
     from silo.workbench.freecad import host, live
 
     for top in tops:
-        found: Extraction | SiloError
+        extraction: Extraction | SiloError
         try:
-            found = live.read_checked(top, job.assembly, hardware=not job.no_hardware)
-            look(found)
+            extraction = live.read_checked(top, job.assembly, hardware=not job.no_hardware)
+            look(extraction)
         except SiloError as error:
-            found = error
+            extraction = error
         except Exception as error:  # noqa: BLE001  # a fault of ours costs this file only, and is not FreeCAD's
             where = traceback.extract_tb(error.__traceback__)[-1]
             place = f"{os.path.basename(where.filename)}:{where.lineno}"
-            told = f"{type(error).__name__}: {error} ({place})"
-            found = DocumentError(
-                top, f"a fault of silo-mod, no fault of the file: {told}; please report this"
+            text = f"{type(error).__name__}: {error} ({place})"
+            extraction = DocumentError(
+                top, f"a fault of silo-mod, no fault of the file: {text}; please report this"
             )
         # The next file starts from nothing: no half loaded parts of this one, and no memory held. Before the
         # result is reported, so that what FreeCAD may die of in closing is this file's fault, not the
         # next one's.
         host.close_all()
-        yield top, found
+        yield top, extraction
 
 
-def _write_lines(job: Job, out: TextIO) -> int:
+def _write_lines(job: HeadlessJob, out: TextIO) -> int:
     """One line when a file is begun and one when it is done, so that a reader knows where FreeCAD died."""
     from silo.bom.report import to_plain
 
     fine = True
     tops = documents_in(job.tops)
-    seen: list[Account] = []
+    seen: list[SolidCount] = []
 
     def look(extraction: Extraction) -> None:
-        from silo.workbench.freecad import witness
+        from silo.workbench.freecad import live
 
-        seen[:] = witness.accounts(extraction, hardware=not job.no_hardware) if job.verify else []
+        seen[:] = live.accounts(extraction, hardware=not job.no_hardware) if job.verify else []
 
-    found = _extractions(tops, job, look)
+    extractions = _extractions(tops, job, look)
     for top in tops:
         _line(out, {"begun": top})
-        _, result = next(found)
+        _, result = next(extractions)
         if isinstance(result, SiloError):
             fine = False
             _line(out, {"top": top, "error": error_json(result)})
         else:
-            told = {"witness": [account.as_dict() for account in seen]} if job.verify else {}
-            _line(out, {"top": top, "extraction": to_plain(result), **told})
+            record = {"witness": [account.as_dict() for account in seen]} if job.verify else {}
+            _line(out, {"top": top, "extraction": to_plain(result), **record})
     return Exit.DONE if fine else Exit.UNDONE
 
 
@@ -170,24 +170,24 @@ def error_json(error: SiloError) -> dict[str, str]:
     return {**data, "path": path, "reason": reason} if isinstance(path, str) and reason else data
 
 
-def _sync(job: Job) -> int:
+def _sync(job: HeadlessJob) -> int:
     try:
         client = _client()
     except ImportError as error:
         return _without_server(job, error)
-    from silo.batch import Json, Markdown, Options, Report, Summary, TopResult, stopped_by, sync_top
+    from silo.batch import Json, Markdown, ReportFile, Summary, SyncOptions, TopResult, stopped_by, sync_top
     from silo.workbench.freecad import host
 
     tops = documents_in(job.tops)
-    options = Options(
+    options = SyncOptions(
         recursive=job.recursive,
         allow_missing=job.allow_missing,
         dry_run=job.dry_run,
         skip_parts=any(os.path.isdir(top) for top in job.tops),
     )
     summary = Summary()
-    reports = [Report(job.json, Json())] if job.json is not None else []
-    reports += [Report(job.report, Markdown())] if job.report is not None else []
+    reports = [ReportFile(job.json, Json())] if job.json is not None else []
+    reports += [ReportFile(job.report, Markdown())] if job.report is not None else []
 
     def take(result: TopResult) -> None:
         summary.add(result)
@@ -195,8 +195,8 @@ def _sync(job: Job) -> int:
             report.add(result)
 
     with client:
-        for number, (top, found) in enumerate(_each(tops, job), start=1):
-            result = sync_top(top, found, client, options)
+        for number, (top, extraction) in enumerate(_each(tops, job), start=1):
+            result = sync_top(top, extraction, client, options)
             take(result)
             host.message(f"Silo: [{number}/{len(tops)}] {_in_words(result)}")
             if (stopped := stopped_by(result, client)) is not None:
@@ -212,10 +212,10 @@ def _sync(job: Job) -> int:
     return summary.exit_code or (Exit.UNDONE if any(report.trouble for report in reports) else Exit.DONE)
 
 
-def _each(tops: list[str], job: Job) -> Iterator[tuple[str, Extraction | SiloError]]:
+def _each(tops: list[str], job: HeadlessJob) -> Iterator[tuple[str, Extraction | SiloError]]:
     """The BOM of each file, read by a FreeCAD of its own: where that dies of a file, another reads the rest.
 
-    Where this program cannot start itself anew, the files are read in here.
+    Where this program cannot start itself again, the files are read in here.
     """
     from silo.freecads import run_freecad
     from silo.workbench.freecad import host
@@ -239,24 +239,24 @@ def _client() -> Any:
     return SiloClient(where.url, where.token, verify=where.verify)
 
 
-def _without_server(job: Job, error: ImportError) -> int:
+def _without_server(job: HeadlessJob, error: ImportError) -> int:
     """The packages for a server are not there: write the BOMs, which need none, and say what to do."""
     from silo.bom.report import bom_json
 
-    told = ConfigError(
+    config_error = ConfigError(
         f"FreeCAD's Python has no package {error.name!r}, so nothing was synced. `silo-mod install-addon` "
         "installs what it needs, or run `silo-mod sync`, which needs no FreeCAD"
     )
     if job.json is not None:
         results = [
-            {"top": top, "error": error_json(found)}
-            if isinstance(found, SiloError)
-            else {"top": top, "bom": bom_json(found)}
-            for top, found in _each(documents_in(job.tops), job)
+            {"top": top, "error": error_json(silo_error)}
+            if isinstance(silo_error, SiloError)
+            else {"top": top, "bom": bom_json(silo_error)}
+            for top, silo_error in _each(documents_in(job.tops), job)
         ]
         _write(job.json, json.dumps({"results": results}, indent=2, ensure_ascii=False) + "\n")
-        told = ConfigError(f"{told}. The BOMs themselves were written to {job.json}")
-    return _tell(told)
+        config_error = ConfigError(f"{config_error}. The BOMs themselves were written to {job.json}")
+    return _tell(config_error)
 
 
 def _write(path: str, text: str) -> None:

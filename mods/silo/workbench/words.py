@@ -114,9 +114,9 @@ def tip(text: str) -> str:
     return f"<qt>{html.escape(plain(text, MOST_TIP), quote=False)}</qt>" if text else ""
 
 
-def counted(count: int, one: str, many: str) -> str:
+def counted(count: int, singular: str, many: str) -> str:
     """``one`` or ``many``, with ``{n}`` replaced by the count."""
-    return (one if count == 1 else many).replace("{n}", str(count))
+    return (singular if count == 1 else many).replace("{n}", str(count))
 
 
 def quantity(value: float | None) -> str:

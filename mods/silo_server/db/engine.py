@@ -14,20 +14,27 @@ two advisory locks keep the rest in order: :data:`STRUCTURE_LOCK` while edges ar
 cannot close a cycle together), :data:`EVENT_LOCK` from the first event to the commit (so that event ids
 become visible in their order, which replay by id relies on). They are always taken in that order.
 
-A bounded queue before something scarce: the database's writers, the memory that a password hash needs.
+A turnstile is a bounded queue before something scarce: the database's writers, the memory of a password
+hash.
 
-Many rows in one statement, by the quick way of each database.
+Many rows go in one statement, by the quick way of each database. SQLite: ``executemany`` of a prepared
+statement, sets as one JSON parameter. PostgreSQL: arrays through ``UNNEST``, one round trip however many
+rows there are.
 
-SQLite: ``executemany`` of a prepared statement, sets as one JSON parameter. PostgreSQL: arrays through
-``UNNEST``, one round trip however many rows there are.
+Answers are kept for repeated requests: key → hash of the whole request → answer. The key is ``sync_id`` in
+a merge, ``Idempotency-Key`` in an upload and an import, the UUID of a new item. A client whose connection
+broke sends the request again and gets the first answer. Another request under the same key is refused: the
+answer to the first would drop its content in silence. Housekeeping deletes old answers.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import threading
+import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
@@ -56,9 +63,9 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import ARRAY
 
-from silo.bom.errors import BusyError, ReadOnlyError
+from silo.bom.errors import BusyError, ConflictError, ReadOnlyError
 from silo.platform import data_folder, private_file, private_folder
-from silo_server.db.tables import bom_lines, events, items, product_summaries, server_state
+from silo_server.db.tables import answers, bom_lines, events, items, product_summaries, server_state
 from silo_server.settings import Clock, Settings, stamp, utc_now
 from silo_server.values import SYSTEM, Actor, NewEvent
 
@@ -77,6 +84,7 @@ class Turnstile:
         self._lock = threading.Lock()
         self._seconds = seconds
         self._who = who
+        self._closed = False
 
     @contextmanager
     def enter(self) -> Iterator[None]:
@@ -92,12 +100,23 @@ class Turnstile:
                     "try again later"
                 )
             try:
+                self.check()
                 yield
             finally:
                 self._free.release()
         finally:
             with self._lock:
                 self._here -= 1
+
+    def close(self) -> None:
+        """The server ends: who waits goes away now, who is inside at the next :meth:`check`."""
+        self._closed = True
+        self._free.release(self._room)
+
+    def check(self) -> None:
+        """Raise BusyError if the server ends."""
+        if self._closed:
+            raise BusyError("the server is stopping; try again later")
 
     @property
     def here(self) -> int:
@@ -148,7 +167,7 @@ class Tx:
         return stamp(self.at)
 
     def take_time(self, after: str) -> None:
-        """Take the time anew behind a lock; later than ``after``, whatever the clock says.
+        """Take the time again behind a lock; later than ``after``, whatever the clock says.
 
         Else what waited longer would be of an earlier time than what it waited for.
         """
@@ -311,8 +330,8 @@ def _reader_options(settings: Settings) -> dict[str, Any]:
 def _postgres_engine(settings: Settings, connections: int, seconds: float | None = None) -> Engine:
     """``seconds``: how long one statement may take, None = as long as it takes."""
 
-    # Compiling a query costs more than any of ours takes.
-    options = ["-c jit=off"]
+    # Compiling a query costs more than any of ours takes; a look into an index is one into memory.
+    options = ["-c jit=off -c random_page_cost=1.1"]
     if seconds is not None:
         milliseconds = {
             "statement_timeout": seconds,
@@ -331,10 +350,39 @@ def _postgres_engine(settings: Settings, connections: int, seconds: float | None
     )
     if seconds is not None:
         # A server that is frozen keeps none of its own time-outs.
-        from silo_server.db.patience import connect  # late: a server on SQLite never needs psycopg
+        def connect(_dialect: Any, _record: Any, args: Any, named: Any) -> Any:
+            return _patient_connection(seconds + 2, *args, **named)
 
-        event.listen(engine, "do_connect", lambda _d, _r, args, named: connect(seconds + 2, *args, **named))
+        event.listen(engine, "do_connect", connect)
     return engine
+
+
+def _patient_connection(seconds: float, *args: Any, **named: Any) -> Any:
+    """Connect to PostgreSQL; a statement that brings no answer within ``seconds`` is an OperationalError.
+
+    psycopg alone waits without end for a server that is stopped or frozen.
+    """
+    import psycopg  # late: a server on SQLite never needs it
+
+    class Connection(psycopg.Connection[Any]):
+        def wait(self, gen: Generator[Any, Any, Any], *more: Any, **named: Any) -> Any:
+            return super().wait(self._bounded(gen), *more, **named)
+
+        def _bounded(self, gen: Generator[Any, Any, Any]) -> Generator[Any, Any, Any]:
+            # psycopg resumes its generator several times a second, even if the server says nothing.
+            end = time.monotonic() + seconds
+            try:
+                wanted = next(gen)
+                while True:
+                    ready = yield wanted
+                    if not ready and time.monotonic() > end:
+                        self.pgconn.finish()
+                        raise psycopg.OperationalError(f"the database said nothing for {seconds:g} s")
+                    wanted = gen.send(ready)
+            except StopIteration as done:
+                return done.value
+
+    return Connection.connect(*args, **named)
 
 
 def _sqlite_engine(settings: Settings) -> Engine:
@@ -368,10 +416,12 @@ def _keep_private(path: Path) -> None:
 def _prepare_sqlite(connection: Any, _record: Any) -> None:
     # The driver must not begin or commit by itself: a merge is exactly one transaction of ours.
     connection.isolation_level = None
-    cursor = connection.cursor()
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "cache_size=-32000"):
-        cursor.execute(f"PRAGMA {pragma}")
-    cursor.close()
+    try:
+        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "cache_size=-32000"):
+            connection.execute(f"PRAGMA {pragma}").close()
+    except BaseException:
+        connection.close()  # the pool does not know it yet
+        raise
 
 
 def _begin_sqlite(conn: Connection) -> None:
@@ -387,11 +437,8 @@ def one_of(tx: Tx, column: ColumnElement[Any], values: Collection[Any]) -> Colum
     listed = list(values)
     if tx.postgres:
         array: ColumnElement[Any] = cast(literal(listed, ARRAY(column.type)), ARRAY(column.type))
-        if len(listed) >= FEW:
-            # A long constant misleads the planner into looking at each row; an array that it learns at run
-            # time goes through the index once (66 000 parents: 0.1 s instead of 45 s).
-            array = func.array(select(func.unnest(array)).scalar_subquery(), type_=ARRAY(column.type))
-        return column == any_(array)
+        # A long constant misleads the planner into looking at each row.
+        return among(tx, column, select(func.unnest(array))) if len(listed) >= FEW else column == any_(array)
     each = func.json_each(json.dumps(listed)).table_valued("value")
     return column.in_(select(each.c.value))
 
@@ -433,11 +480,19 @@ def _unnest(table: Table, names: Sequence[str], rows: Sequence[Mapping[str, Any]
     arrays = [
         cast(bindparam(None, [row[c.name] for row in rows], ARRAY(c.type)), ARRAY(c.type)) for c in columns
     ]
-    return func.unnest(*arrays).table_valued(*[_plain(c) for c in columns], name="given").render_derived()
+    return (
+        func.unnest(*arrays)
+        .table_valued(*[Column(c.name, c.type) for c in columns], name="given")
+        .render_derived()
+    )
 
 
-def _plain(column: Column[Any]) -> Column[Any]:
-    return Column(column.name, column.type)
+def among(tx: Tx, column: ColumnElement[Any], query: Select[Any]) -> ColumnElement[bool]:
+    """``column`` is one of those that ``query`` selects. PostgreSQL would rather read all of a table, not
+    knowing how many they are (66 000 parents: 45 s instead of 0.1 s)."""
+    if not tx.postgres:
+        return column.in_(query)
+    return column == any_(func.array(query.scalar_subquery(), type_=ARRAY(column.type)))
 
 
 def newest_first(
@@ -454,3 +509,70 @@ def newest_first(
     if after is None:
         return list(tx.conn.execute(query.order_by(column.desc()).limit(limit)))
     return list(tx.conn.execute(query.where(column > after).order_by(column).limit(limit)))[::-1]
+
+
+@dataclass(frozen=True, slots=True)
+class KeyedRequest:
+    """A request that may come again.
+
+    subject
+        what it is about (``merge 12``: internal id), within which the ``key`` is unique.
+    """
+
+    subject: str
+    key: str
+    hash: str
+
+    @classmethod
+    def of(cls, subject: str, key: str | None, *content: Any) -> KeyedRequest | None:
+        """Return the request with this content (JSON values); None for a request without a key."""
+        if not key:
+            return None
+        written = json.dumps(content, sort_keys=True, separators=(",", ":"))
+        return cls(subject, key, hashlib.sha256(written.encode()).hexdigest())
+
+
+@dataclass(frozen=True, slots=True)
+class KeptAnswer:
+    """What was answered: text, version, and the change of a BOM that the text needs to be whole."""
+
+    text: str
+    version: int = 0
+    change_id: int | None = None
+
+
+def earlier_answer(tx: Tx, request: KeyedRequest | None) -> KeptAnswer | None:
+    """Return the answer to the same request of before, None if there was none.
+
+    The caller holds a lock that makes two repeats wait for one another. Raises ConflictError.
+    """
+    if request is None:
+        return None
+    row = tx.conn.execute(
+        select(answers).where(answers.c.subject == request.subject, answers.c.key == request.key)
+    ).one_or_none()
+    if row is None:
+        return None
+    if row.request_hash != request.hash:
+        name = {"merge": "sync_id", "item": "id"}.get(request.subject.partition(" ")[0], "Idempotency-Key")
+        raise ConflictError(
+            f"{name} {request.key!r} was used before for another request, which was carried out; send a new "
+            "one with new content"
+        )
+    return KeptAnswer(row.answer, row.version, row.change_id)
+
+
+def keep_answer(tx: Tx, request: KeyedRequest | None, answer: KeptAnswer) -> None:
+    """Keep the answer to a request that was carried out, together with what it changed."""
+    if request is not None:
+        tx.conn.execute(
+            insert(answers).values(
+                subject=request.subject,
+                key=request.key,
+                request_hash=request.hash,
+                answer=answer.text,
+                version=answer.version,
+                change_id=answer.change_id,
+                at=tx.stamp,
+            )
+        )

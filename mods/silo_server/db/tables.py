@@ -32,14 +32,13 @@ from sqlalchemy import (
     text,
 )
 
-metadata = MetaData(
-    naming_convention={
-        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
-        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
-        "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
-        "pk": "pk_%(table_name)s",
-    }
-)
+NAMES = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+    "pk": "pk_%(table_name)s",
+}
+metadata = MetaData(naming_convention=NAMES)
 
 # SQLite gives out row ids (and never reuses one) only for a column of exactly INTEGER.
 Id = BigInteger().with_variant(Integer, "sqlite")
@@ -83,6 +82,9 @@ items = Table(
     Column("long_description", Text),
     Column("thumbnail_key", String(64)),
     Column("properties", Text, nullable=False),
+    Column("supplier_parts", Text),
+    Column("origins", Text),
+    Column("made_from", String(64)),
     Column("current_revision", Integer, nullable=False),
     Column("bom_version", Integer, nullable=False),
     Column("version", Integer, nullable=False, server_default="1"),
@@ -162,6 +164,16 @@ revisions = Table(
     UniqueConstraint("document_id", "revision_number"),
     Index(None, "file_checksum"),
     sqlite_autoincrement=True,
+)
+
+# What is drawn of a file, by the SHA-256 of its content: the hashes of both parts in the store, packed.
+models = Table(
+    "models",
+    metadata,
+    Column("file_checksum", String(64), primary_key=True),
+    Column("geometry", String(64)),
+    Column("geometry_size", BigInteger),
+    Column("structure", String(64)),
 )
 
 bom_lines = Table(
@@ -279,6 +291,26 @@ product_looks = Table(
     Column("since", Stamp),
 )
 
+# What a person follows ("item:UUID", "folder:PATH"), and up to when and which event they have seen its news.
+follows = Table(
+    "follows",
+    metadata,
+    Column("user_id", Id, primary_key=True, autoincrement=False),
+    Column("target", String(1024), primary_key=True),
+    Column("seen", Stamp, nullable=False),
+    Column("event", Id, nullable=False),
+)
+
+# Who settles what is open in a BOM.
+assignees = Table(
+    "assignees",
+    metadata,
+    Column("item_id", Id, primary_key=True, autoincrement=False),
+    Column("user_id", Id, nullable=False),
+    Column("at", Stamp, nullable=False),
+    Index(None, "user_id"),
+)
+
 # What is frozen of an item when a product is submitted: JSON under its SHA-256. A row never changes.
 frozen_items = Table(
     "frozen_items",
@@ -318,6 +350,42 @@ release_approvals = Table(
     Column("username", String(64), primary_key=True),
     Column("at", Stamp, nullable=False),
     Column("comment", Text, nullable=False),
+)
+
+# What became of an item's supplier parts: the whole list before and after.
+supplier_changes = Table(
+    "supplier_changes",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("item_id", Id, ForeignKey("items.id"), nullable=False),
+    Column("at", Stamp, nullable=False),
+    Column("username", String(64), nullable=False),
+    Column("before", Text, nullable=False),
+    Column("after", Text, nullable=False),
+    Index(None, "item_id", "id"),
+    sqlite_autoincrement=True,
+)
+
+# What was ordered for a product; ``ended_at``: it was taken back. Amounts are decimals as text.
+orders = Table(
+    "orders",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("product_id", Id, ForeignKey("items.id"), nullable=False),
+    Column("item_id", Id, ForeignKey("items.id"), nullable=False),
+    Column("at", Stamp, nullable=False),
+    Column("username", String(64), nullable=False),
+    Column("quantity", String(64), nullable=False),
+    Column("unit", String(32)),
+    Column("supplier", Text, nullable=False),
+    Column("number", Text, nullable=False),
+    Column("price", String(64)),
+    Column("currency", String(3)),
+    Column("note", Text, nullable=False),
+    Column("ended_at", Stamp),
+    Column("ended_by", String(64)),
+    Index(None, "product_id"),
+    sqlite_autoincrement=True,
 )
 
 events = Table(
@@ -412,4 +480,10 @@ audit = Table(
 )
 
 # Every place that refers to a file of the store, by its hash: what a backup takes, and housekeeping keeps.
-FILE_REFERENCES = (revisions.c.file_checksum, revisions.c.thumbnail_key, items.c.thumbnail_key)
+FILE_REFERENCES = (
+    revisions.c.file_checksum,
+    revisions.c.thumbnail_key,
+    items.c.thumbnail_key,
+    models.c.geometry,
+    models.c.structure,
+)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
 from tempfile import SpooledTemporaryFile
@@ -22,7 +22,7 @@ from starlette.responses import Response, StreamingResponse
 from silo.api.wire import MergeResult
 from silo.bom.errors import CycleError, RejectedError
 from silo.bom.numbers import plain, whole_number
-from silo_server.db.engine import Tx
+from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer
 from silo_server.routes import context, models
 from silo_server.routes.context import (
     FORM_TYPES,
@@ -49,9 +49,9 @@ from silo_server.routes.models import (
     Short,
     Text,
 )
-from silo_server.services.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
-from silo_server.services.bom import history, review, transfer, tree
+from silo_server.services.bom import history, imports, review, transfer, tree
 from silo_server.services.bom import review as service
+from silo_server.services.bom.frozen import changes_of
 from silo_server.services.bom.lines import (
     LineId,
     check_line_count,
@@ -113,22 +113,22 @@ def get_boms(call: Viewer, body: NumbersBody) -> Response:
     413 if they have more than 10 000 lines in all; half of them may be asked for, or one however large.
     """
     with call.read() as tx:
-        found = get_by_numbers(tx, body.part_numbers)
-        check_line_count(tx, [item.id for item in found.values()])
-        rows = _lines_of(tx, list(found.values()))
-    return json_answer({"boms": {number: rows[item.id] for number, item in found.items()}})
+        items = get_by_numbers(tx, body.part_numbers)
+        check_line_count(tx, [item.id for item in items.values()])
+        rows = _lines_of(tx, list(items.values()))
+    return json_answer({"boms": {number: rows[item.id] for number, item in items.items()}})
 
 
 def _lines_of(tx: Tx, parents: Sequence[Item]) -> dict[int, list[dict[str, Any]]]:
     """The lines of these items as the API has them, by the item's internal id."""
     ids = [parent.id for parent in parents]
-    lines, told, last = lines_of_many(tx, ids), told_quantities(tx, ids), last_syncs(tx, ids)
+    lines, quantities, last = lines_of_many(tx, ids), told_quantities(tx, ids), last_syncs(tx, ids)
     return {
         parent.id: [
             {
                 **line_to_wire(line, parent.part_number),
-                "assembly_told": line.child_id in told.get(parent.id, {}),
-                "assembly_quantity": plain(told.get(parent.id, {}).get(line.child_id)),
+                "assembly_told": line.child_id in quantities.get(parent.id, {}),
+                "assembly_quantity": plain(quantities.get(parent.id, {}).get(line.child_id)),
                 "components": last.get(parent.id, NEVER).components.get(line.child_id, []),
             }
             for line in lines.get(parent.id, [])
@@ -213,8 +213,8 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
         still = summary_of(tx, graph.root).open.values()
     return {
         "part_number": graph.root.part_number,
-        "incomplete": {one.part_number: one.incomplete for one in still if one.incomplete},
-        "open": {one.part_number: one.questions for one in still if one.questions},
+        "incomplete": {bom.part_number: bom.incomplete for bom in still if bom.incomplete},
+        "open": {bom.part_number: bom.questions for bom in still if bom.questions},
         "flat_bom": [
             {
                 "part_number": row.line.child_part_number,
@@ -275,23 +275,23 @@ def get_summary(call: Viewer, part_number: str) -> dict[str, Any]:
     """
     with call.read() as tx:
         item = get_item(tx, part_number)
-        found = summary_of(tx, item)
-    costs = found.worth.costs.items()
+        summary = summary_of(tx, item)
+    costs = summary.worth.costs.items()
     return {
         "part_number": item.part_number,
-        "open": {one.part_number: one.questions for one in found.open.values() if one.questions},
-        "incomplete": {one.part_number: one.incomplete for one in found.open.values() if one.incomplete},
-        "questions": found.questions,
-        **to_wire(found, "open", "worth", "as_part", "levels", "no_mass", "no_cost", "changed"),
-        "levels": len(found.levels),
-        "total_mass_kg": plain(found.worth.mass),
+        "open": {bom.part_number: bom.questions for bom in summary.open.values() if bom.questions},
+        "incomplete": {bom.part_number: bom.incomplete for bom in summary.open.values() if bom.incomplete},
+        "questions": summary.questions,
+        **to_wire(summary, "open", "worth", "as_part", "levels", "no_mass", "no_cost", "changed"),
+        "levels": len(summary.levels),
+        "total_mass_kg": plain(summary.worth.mass),
         "totals": [{"currency": currency, "total_cost": plain(cost)} for currency, cost in costs],
-        "mass_missing": {"count": found.no_mass, "first": list(found.mass_missing)},
-        "cost_missing": {"count": found.no_cost, "first": list(found.cost_missing)},
+        "mass_missing": {"count": summary.no_mass, "first": list(summary.mass_missing)},
+        "cost_missing": {"count": summary.no_cost, "first": list(summary.cost_missing)},
         "last_change": {
-            "at": wire(found.changed.at),
-            "user": found.changed.username,
-            "item": found.changed.part_number,
+            "at": wire(summary.changed.at),
+            "user": summary.changed.username,
+            "item": summary.changed.part_number,
         },
     }
 
@@ -307,7 +307,7 @@ def get_where_used(
     """The parents; with ``indirect`` theirs as well. ``X-Total-Count`` says how many there are in all."""
     with call.read() as tx:
         item = get_item(tx, part_number)
-        found, total = tree.where_used(tx, item, indirect=indirect, limit=limit, offset=offset)
+        usages, total = tree.where_used(tx, item, indirect=indirect, limit=limit, offset=offset)
     rows = [
         {
             "parent_part_number": usage.parent.part_number,
@@ -318,7 +318,7 @@ def get_where_used(
             **to_wire(usage, "parent"),
             "quantity": plain(usage.quantity),
         }
-        for usage in found
+        for usage in usages
     ]
     return json_answer(rows, headers={"X-Total-Count": str(total)})
 
@@ -376,7 +376,7 @@ def render_expanded(rows: Iterable[tree.Occurrence]) -> bytes:
     children: dict[int, bytes] = {}
     parents: dict[str, bytes] = {}
     states: dict[int, bytes] = {}
-    keep: list[LineState] = []  # states are found by their identity, which must not be given out anew
+    keep: list[LineState] = []  # states are found by their identity, which must not be given out again
     parts: list[bytes] = []
     for line, parent, depth, total in rows:
         line_state = line.state
@@ -446,13 +446,13 @@ class UndoBody(Body):
 def get_review(call: Viewer, part_number: str) -> Response:
     """What is open: unreferenced lines, conflicts with both values, and the last merge."""
     with call.read() as tx:
-        found = service.review(tx, part_number)
-        open_below = summary_of(tx, found.parent).told(found.parent.id)
-    name = found.parent.part_number
+        open_lines = service.review(tx, part_number)
+        open_below = summary_of(tx, open_lines.parent).told(open_lines.parent.id)
+    name = open_lines.parent.part_number
     body = {
         "part_number": name,
-        "version": found.parent.bom_version,
-        "unreferenced": [line_to_wire(line, name) for line in found.unreferenced],
+        "version": open_lines.parent.bom_version,
+        "unreferenced": [line_to_wire(line, name) for line in open_lines.unreferenced],
         "conflicts": [
             {
                 "child_part_number": conflict.line.child_part_number,
@@ -462,12 +462,12 @@ def get_review(call: Viewer, part_number: str) -> Response:
                 "since": wire(conflict.since),
                 "override": conflict.line.state.override,
             }
-            for conflict in found.conflicts
+            for conflict in open_lines.conflicts
         ],
-        "last_merge": change_to_wire(found.last_merge) if found.last_merge else None,
+        "last_merge": change_to_wire(open_lines.last_merge) if open_lines.last_merge else None,
         "below": dict(open_below),
     }
-    return json_answer(body, headers={"ETag": etag_of(found.parent.bom_version)})
+    return json_answer(body, headers={"ETag": etag_of(open_lines.parent.bom_version)})
 
 
 @review_router.post(
@@ -492,8 +492,8 @@ def list_history(
 ) -> list[dict[str, Any]]:
     """The changes, newest first: who, when, why, from which file."""
     with call.read() as tx:
-        found = history.list_changes(tx, get_item(tx, part_number, include_archived=True), limit, before)
-    return [change_to_wire(change) for change in found]
+        changes = history.list_changes(tx, get_item(tx, part_number, include_archived=True), limit, before)
+    return [change_to_wire(change) for change in changes]
 
 
 @review_router.get("/history/{change_id}", responses=READ_ERRORS)
@@ -619,8 +619,8 @@ def state_to_wire(state: LineState | None) -> dict[str, Any] | None:
     """A line's state; only what is set."""
     if state is None:
         return None
-    told = line_state_to_wire(state)
-    return {name: told[name] for name in state_to_json(state)}
+    state_json = line_state_to_wire(state)
+    return {name: state_json[name] for name in state_to_json(state)}
 
 
 def _changed(change_id: int, version: int) -> Response:
@@ -634,7 +634,8 @@ CHUNK = 64 * 1024
 XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
 
 
-def _content(media_type: str) -> dict[int | str, dict[str, Any]]:
+def content_of(media_type: str) -> dict[int | str, dict[str, Any]]:
+    """The answers of a route that hands out a file."""
     return {**READ_ERRORS, 200: {"content": {media_type: {}}, "description": "The file"}}
 
 
@@ -661,7 +662,7 @@ IMPORT_BODY = {
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExportRequest:
     """What an export shows: the view, for how many pieces, the page's filter (words, a type); and of which
     released revision."""
 
@@ -672,10 +673,10 @@ class Wanted:
     release: Annotated[str, Query(max_length=16)] = ""
 
 
-As = Annotated[Wanted, Depends()]
+As = Annotated[ExportRequest, Depends()]
 
 
-@transfer_router.get("/export.csv", response_class=Response, responses=_content("text/csv"))
+@transfer_router.get("/export.csv", response_class=Response, responses=content_of("text/csv"))
 def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = False) -> Response:
     """The BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text.
 
@@ -692,7 +693,7 @@ def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = Fa
     )
 
 
-@transfer_router.get("/export.xlsx", response_class=Response, responses=_content(XLSX))
+@transfer_router.get("/export.xlsx", response_class=Response, responses=content_of(XLSX))
 def export_xlsx(call: Viewer, part_number: str, wanted: As) -> Response:
     """The BOM as a workbook."""
     return _exported(call, part_number, wanted, transfer.to_xlsx, XLSX, "xlsx")
@@ -713,58 +714,73 @@ Since = Annotated[str, Query(alias="from", min_length=1, max_length=40), WithJso
 def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -> dict[str, Any]:
     """What changed in the product, over all levels: lines, quantities, data and files of its parts.
 
-    ``from`` and ``to`` are a date, a time, or a revision of the item as ``r3``; without ``to`` until now.
+    ``from`` and ``to`` are a date, a time, a revision of the item as ``r3``, or the label of a revision that
+    was frozen for release; without ``to`` until now. Two frozen revisions do not say who changed what, and
+    when.
     """
     with call.server.large_reads.enter(), call.read() as tx:
         item = get_item(tx, part_number)
-        first = history.moment(tx, item, since)
-        last = history.moment(tx, item, to, end=True) if to else tx.stamp
-        found = history.what_changed(tx, item, first, last)
+        first, last, happenings = changes_of(tx, item, since, to)
     return {
         "part_number": item.part_number,
         "from": wire(first),
         "to": wire(last),
-        "changes": [one._asdict() | {"at": wire(one.at)} for one in found],
+        "changes": [change._asdict() | {"at": wire(change.at or None)} for change in happenings],
     }
 
 
-@transfer_router.get("/changes.csv", response_class=Response, responses=_content("text/csv"))
+@transfer_router.get("/changes.csv", response_class=Response, responses=content_of("text/csv"))
 def changes_csv(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
     """What changed, as CSV."""
     make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
-    return _file(call, make, transfer.to_csv, "text/csv; charset=utf-8; header=present", "changes.csv")
+    return file_of(call, make, transfer.to_csv, "text/csv; charset=utf-8; header=present", "changes.csv")
 
 
-@transfer_router.get("/changes.xlsx", response_class=Response, responses=_content(XLSX))
+@transfer_router.get("/changes.xlsx", response_class=Response, responses=content_of(XLSX))
 def changes_xlsx(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
     """What changed, as a workbook."""
     make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
-    return _file(call, make, transfer.to_xlsx, XLSX, "changes.xlsx")
+    return file_of(call, make, transfer.to_xlsx, XLSX, "changes.xlsx")
 
 
 @transfer_router.post("/import", responses=WRITE_ERRORS, openapi_extra=IMPORT_BODY)
 async def import_csv(
-    call: Editor, part_number: str, expected: ExpectedVersion, dry_run: Annotated[bool, Query()] = False
+    call: Editor,
+    part_number: str,
+    expected: ExpectedVersion,
+    dry_run: Annotated[bool, Query()] = False,
+    make: Annotated[str, Query(max_length=32)] = "",
+    add_up: Annotated[bool, Query()] = False,
 ) -> Response:
     """Import a CSV or a workbook: XLSX, ODS, XLS (as the body, or as the form part ``file``).
 
     ``dry_run`` says row by row what would happen; without it everything is imported, or, where a row is
-    wrong, nothing (400 with all problems). ``Idempotency-Key`` makes a repeat give the first answer.
+    wrong, nothing (400 with all problems). ``make``: unknown parts are made in this category; ``add_up``:
+    rows of one part are added up. ``Idempotency-Key`` makes a repeat give the first answer.
     """
-    data, name = await _uploaded(call.request)
+    data, name = await uploaded(call.request)
+    allowed = imports.Allowed(make, add_up)
 
     def work() -> Response:
-        records = transfer.read_csv(transfer.as_csv(data), call.server.settings.max_merge_entries)
+        records = imports.read_csv(imports.as_csv(data), call.server.settings.max_merge_entries)
         if dry_run:
             with call.read() as tx:
-                return json_answer(plan_to_wire(transfer.plan_import(tx, part_number, records), dry_run))
+                return json_answer(
+                    plan_to_wire(imports.plan_import(tx, part_number, records, allowed), dry_run)
+                )
         with call.write() as tx:
             parent = locked_parent(tx, part_number)
             digest = hashlib.sha256(data).hexdigest()
-            request = KeyedRequest.of(f"import {parent.id}", idempotency_key(call.request), digest, name)
+            request = KeyedRequest.of(
+                f"import {parent.id}",
+                idempotency_key(call.request),
+                digest,
+                name,
+                *filter(None, (make, add_up)),
+            )
             answer = earlier_answer(tx, request)
             if answer is None:
-                plan, _, version = transfer.apply_import(tx, part_number, records, name, expected)
+                plan, _, version = imports.apply_import(tx, part_number, records, name, expected, allowed)
                 answer = KeptAnswer(dumps(plan_to_wire(plan, dry_run)), version)
                 keep_answer(tx, request, answer)
             return raw_json(answer.text, headers={"ETag": etag_of(answer.version)})
@@ -772,7 +788,7 @@ async def import_csv(
     return await anyio.to_thread.run_sync(work)
 
 
-def plan_to_wire(plan: transfer.ImportPlan, dry_run: bool) -> dict[str, Any]:
+def plan_to_wire(plan: imports.ImportPlan, dry_run: bool) -> dict[str, Any]:
     """What an import does, or would do."""
     return {
         "dry_run": dry_run,
@@ -783,6 +799,8 @@ def plan_to_wire(plan: transfer.ImportPlan, dry_run: bool) -> dict[str, Any]:
                 "row": row.row,
                 "part_number": row.part_number,
                 "status": row.status,
+                **({"name": row.name} if row.name else {}),
+                **({"new": True} if row.new else {}),
                 "problems": list(row.problems),
                 "before": state_to_wire(row.before),
                 "after": state_to_wire(row.after),
@@ -792,7 +810,8 @@ def plan_to_wire(plan: transfer.ImportPlan, dry_run: bool) -> dict[str, Any]:
     }
 
 
-async def _uploaded(request: Request) -> tuple[bytes, str | None]:
+async def uploaded(request: Request) -> tuple[bytes, str | None]:
+    """Return the table of an import, the body or the form part ``file``, and the name of its file."""
     if not request.headers.get("content-type", "").startswith(FORM_TYPES):
         return await request.body(), None
     async with request.form(max_files=1, max_fields=20) as form:
@@ -800,6 +819,25 @@ async def _uploaded(request: Request) -> tuple[bytes, str | None]:
         if not isinstance(file, UploadFile):
             raise RejectedError("file: wanted a multipart form with the table in a part named 'file'")
         return await file.read(), clean_name(file.filename or "")
+
+
+class _Spool(SpooledTemporaryFile[bytes]):
+    """A file, on the disk if it is large: an export must not take the memory of a whole file.
+
+    Nor the time of a server that ends, which ``check`` reports.
+    """
+
+    check: Callable[[], object]
+
+    def write(self, data: Any) -> int:
+        self.check()
+        return super().write(data)
+
+
+def _while(check: Callable[[], object], rows: Iterable[transfer.Row]) -> Iterator[transfer.Row]:
+    for row in rows:
+        check()
+        yield row
 
 
 def _sent(out: IO[bytes]) -> Iterator[bytes]:
@@ -811,7 +849,7 @@ def _sent(out: IO[bytes]) -> Iterator[bytes]:
 def _exported(
     call: Call,
     part_number: str,
-    wanted: Wanted,
+    wanted: ExportRequest,
     write: Callable[[transfer.Export, IO[bytes]], Callable[[], None] | None],
     media_type: str,
     suffix: str,
@@ -823,23 +861,26 @@ def _exported(
 
     many = f"-{wanted.release}" if wanted.release else ""
     many += f"-for-{pieces}" if pieces > 1 else ""
-    return _file(call, make, write, media_type, f"bom-{view.value}{many}.{suffix}")
+    return file_of(call, make, write, media_type, f"bom-{view.value}{many}.{suffix}")
 
 
-def _file(
+def file_of(
     call: Call,
     make: Callable[[Tx], transfer.Export],
     write: Callable[[transfer.Export, IO[bytes]], Callable[[], None] | None],
     media_type: str,
     name: str,
 ) -> Response:
-    # On the disk where it is large: an export must not take the memory of a whole file.
-    out = cast(IO[bytes], SpooledTemporaryFile(max_size=SPOOL_BYTES))  # noqa: SIM115 - the answer closes it
+    """Make and hand out a file, whose name begins with the part number."""
+    turn = call.server.large_reads
+    spool = _Spool(max_size=SPOOL_BYTES)
+    spool.check = turn.check
+    out = cast(IO[bytes], spool)
     try:
-        with call.server.large_reads.enter():
+        with turn.enter():
             with call.read() as tx:
                 made = make(tx)
-                pack = write(made, out)
+                pack = write(replace(made, rows=_while(turn.check, made.rows)), out)
             if pack:
                 pack()
     except BaseException:

@@ -22,18 +22,22 @@ from fastapi import Depends, Query, Request
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.api.wire import ErrorBody, MergeRequest
+from silo.api.wire import RELEASE_LABEL, ErrorBody, MergeRequest
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
 from silo.bom.numbers import LARGEST_QUANTITY, whole_number
 from silo.bom.resolve import REFUSED_CHARACTERS
-from silo_server.background import Probe
 from silo_server.db.engine import Database, Turnstile, Tx
 from silo_server.events import Hub
+from silo_server.housekeeping import Probe
 from silo_server.http import info_of
-from silo_server.schema.catalog import ITEM_TYPES, find_schema
-from silo_server.services.access.accounts import MAX_PASSWORD, MIN_PASSWORD, USERNAME_FORM
-from silo_server.services.access.credentials import actor_by_token
-from silo_server.services.access.logins import actor_by_session
+from silo_server.schema import ITEM_TYPES, find_schema
+from silo_server.services.access import (
+    MAX_PASSWORD,
+    MIN_PASSWORD,
+    USERNAME_FORM,
+    actor_by_session,
+    actor_by_token,
+)
 from silo_server.services.bom.merge import text_problem
 from silo_server.services.items import NUMBER_FORM, RESERVED
 from silo_server.services.revisions import FileStore
@@ -158,7 +162,7 @@ async def _check_csrf(request: Request, actor: Actor) -> None:
 
 
 async def form_of(request: Request) -> FormData:
-    """The request's form, which whoever asks first reads, and Starlette keeps."""
+    """The request's form, which the first caller reads, and Starlette keeps."""
     return await request.form(max_files=1, max_fields=MOST_FIELDS)
 
 
@@ -330,6 +334,7 @@ MOMENT: Schema = {
         _AT,
         {"type": "string", "format": "date", "pattern": f"^{_DATE}$"},
         {"type": "string", "pattern": "^r[0-9]{1,9}$", "description": "a revision of the item"},
+        {"type": "string", "pattern": f"^({RELEASE_LABEL})$", "description": "a frozen revision's label"},
     ]
 }
 
@@ -409,5 +414,5 @@ def _refer(part: Any) -> None:
     below = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
     if isinstance(part, dict) and part.get("additionalProperties") == _ANY_JSON:
         part["additionalProperties"] = {"$ref": _JSON}
-    for one in below:
-        _refer(one)
+    for reference in below:
+        _refer(reference)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Items, part numbers and schemas.
+"""Items, part numbers and schemas; revisions and their files; documents.
 
-Revisions and their files.
+A document is a file of a project under its own UUID. The file of one item is the item's, with its revisions;
+what is sent to either address arrives at both.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from pydantic import Field, TypeAdapter, ValidationError
 from starlette.datastructures import UploadFile
 from starlette.responses import FileResponse, Response
 
-from silo.api.wire import HeldItem, ItemTexts, LinkedFile
+from silo.api import wire
+from silo.api.wire import FactSource, HeldItem, ItemTexts, LinkedFile
 from silo.bom.errors import NotFoundError, RejectedError
-from silo_server.db.engine import Tx
+from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer
 from silo_server.routes import context
 from silo_server.routes.context import (
     READ_ERRORS,
@@ -36,6 +38,7 @@ from silo_server.routes.context import (
     json_body,
 )
 from silo_server.routes.models import (
+    DocumentsOut,
     ItemChangeBody,
     ItemOut,
     ItemsOut,
@@ -50,10 +53,9 @@ from silo_server.routes.models import (
     Text,
     UuidsBody,
 )
-from silo_server.schema.catalog import describe, describe_form, find_schema, schemas
-from silo_server.services import items, revisions, search
+from silo_server.schema import describe, describe_form, find_schema, schemas
+from silo_server.services import items, revisions, scene, search
 from silo_server.services import items as service
-from silo_server.services.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.services.bom.merge import (
     NEVER,
     LastSync,
@@ -64,6 +66,7 @@ from silo_server.services.bom.merge import (
 )
 from silo_server.services.bom.tree import where_used
 from silo_server.services.items import preview_number
+from silo_server.services.releases import draft_of
 from silo_server.services.revisions import Origin, revision_to_wire
 from silo_server.values import Document, Item, Revision, to_wire
 
@@ -105,8 +108,8 @@ def list_items(
         offset=offset,
     )
     with call.read() as tx:
-        found, total = service.list_items(tx, query)
-    return json_answer([item_to_wire(item) for item in found], headers={"X-Total-Count": str(total)})
+        items_of_page, total = service.list_items(tx, query)
+    return json_answer([item_to_wire(item) for item in items_of_page], headers={"X-Total-Count": str(total)})
 
 
 @router.get("/items/search", response_model=list[ItemOut], responses=READ_ERRORS)
@@ -150,17 +153,17 @@ def get_item_by_uuid(call: Viewer, uuid: Uuid) -> Response:
 def get_items_by_uuid(call: Viewer, body: UuidsBody) -> Response:
     """Many UUIDs in one request; those that are not known are absent. Reads only, so a viewer may."""
     with call.read() as tx:
-        found = service.get_by_uuids(tx, body.uuids)
-        last = last_syncs(tx, [item.id for item in found])
-    return json_answer({"items": [item_to_wire(item, last.get(item.id, NEVER)) for item in found]})
+        items_found = service.get_by_uuids(tx, body.uuids)
+        last = last_syncs(tx, [item.id for item in items_found])
+    return json_answer({"items": [item_to_wire(item, last.get(item.id, NEVER)) for item in items_found]})
 
 
 @router.post("/items/look-alikes", response_model=LookAlikesOut, responses=READ_ERRORS)
 def find_look_alikes(call: Viewer, body: LookAlikesBody) -> Response:
     """The items that have a component's name or its very file, for many components. Reads only."""
     with call.read() as tx:
-        found = search.find_look_alikes(tx, [(one.name, one.sha256) for one in body.wanted])
-    return json_answer({"look_alikes": [[asdict(like) for like in likes] for likes in found]})
+        matches = search.find_look_alikes(tx, [(query.name, query.sha256) for query in body.wanted])
+    return json_answer({"look_alikes": [[asdict(like) for like in likes] for likes in matches]})
 
 
 @router.get("/items/{part_number}", response_model=ItemOut, responses=READ_ERRORS)
@@ -191,16 +194,23 @@ def change_item(call: Editor, part_number: str, body: ItemChangeBody, expected: 
     openapi_extra=PATCH_BODY,
 )
 async def patch_properties(
-    call: Editor, part_number: str, expected: ExpectedVersion, comment: Annotated[Text, Query()] = ""
+    call: Editor,
+    part_number: str,
+    expected: ExpectedVersion,
+    comment: Annotated[Text, Query()] = "",
+    source: FactSource = "hand",
 ) -> Response:
-    """Change some properties by a JSON merge patch (RFC 7386): null removes one, the rest stays."""
+    """Change some properties by a JSON merge patch (RFC 7386): null removes one, the rest stays.
+
+    ``source``: where mass and material come from; what ``cad`` says replaces only what it said before.
+    """
     patch = await json_body(call.request)
     if not isinstance(patch, dict):
         raise RejectedError("body: wanted a JSON object with the properties to change")
 
     def work() -> Response:
         with call.write() as tx:
-            return _answer(service.patch_properties(tx, part_number, patch, comment, expected))
+            return _answer(service.patch_properties(tx, part_number, patch, comment, expected, source))
 
     return await anyio.to_thread.run_sync(work)
 
@@ -215,7 +225,7 @@ def archive_item(call: Editor, part_number: str, expected: ExpectedVersion) -> R
     with call.write() as tx:
         used, uses = where_used(tx, service.get_item(tx, part_number), limit=20)
         service.archive_item(tx, part_number, expected)
-    where = ",".join(quote(one.parent.part_number, safe="") for one in used)
+    where = ",".join(quote(usage.parent.part_number, safe="") for usage in used)
     return Response(status_code=204, headers={"X-Total-Count": str(uses), "X-Used-In": where})
 
 
@@ -254,8 +264,10 @@ def get_schema_form(call: Viewer, name: str) -> dict[str, Any]:
 
 def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any]:
     """An item, under the contract's names; ``last_sync`` where it was looked up."""
-    told = {} if last_sync is None else {"last_sync": last_sync.to_wire()}
-    return told | {"id": item.uuid, **item.texts} | to_wire(item, "id", "uuid", "texts")
+    fields = {} if last_sync is None else {"last_sync": last_sync.to_wire()}
+    empty = (name for name in ("supplier_parts", "origins") if not getattr(item, name))
+    left_out = ("id", "uuid", "texts", *empty)
+    return fields | {"id": item.uuid, **item.texts} | to_wire(item, *left_out)
 
 
 def _answer(item: Item, status: int = 200, last: LastSync | None = None) -> Response:
@@ -332,9 +344,11 @@ def list_revisions(
     """
     with call.read() as tx:
         item = items.get_item(tx, part_number)
-        found, total = revisions.list_revisions(tx, item, limit, before=before, after=after, skip=offset)
-    told = [revision_to_wire(item, revision) for revision in found]
-    return json_answer(told, headers={"X-Total-Count": str(total)})
+        revisions_of_page, total = revisions.list_revisions(
+            tx, item, limit, before=before, after=after, skip=offset
+        )
+    rows = [revision_to_wire(item, revision) for revision in revisions_of_page]
+    return json_answer(rows, headers={"X-Total-Count": str(total)})
 
 
 @revisions_router.get("/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
@@ -396,8 +410,11 @@ async def receive(call: Call, find: Find) -> Response:
         )
         key, text, digest = idempotency_key(call.request), str(comment or ""), sha256 or ""
 
-        def answer(of: Item | Document, revision: Revision) -> Response:
-            return json_answer(revision_to_wire(of, revision, links=True), 201)
+        def answer(tx: Tx, of: Item | Document, revision: Revision) -> Response:
+            answer_json = revision_to_wire(of, revision, links=True)
+            if isinstance(of, Item) and (draft := draft_of(tx, of)):
+                answer_json["draft"] = draft
+            return json_answer(answer_json, 201)
 
         def work() -> Response:
             return store_file(call, find, file, text, answer, properties, key, digest, origin)
@@ -442,7 +459,7 @@ def store_file(
     find: Find,
     file: UploadFile,
     comment: str,
-    answer: Callable[[Item | Document, Revision], Response],
+    answer: Callable[[Tx, Item | Document, Revision], Response],
     properties: Mapping[str, Any] | None = None,
     key: str | None = None,
     sha256: str = "",
@@ -463,15 +480,16 @@ def store_file(
         kind = "upload" if isinstance(of, Item) else "upload document"
         request = KeyedRequest.of(f"{kind} {of.id}", key, said)
         if earlier := earlier_answer(tx, request):
-            return answer(of, revisions.get_revision(tx, of, int(earlier.text)))
+            return answer(tx, of, revisions.get_revision(tx, of, int(earlier.text)))
         if isinstance(of, Document) and properties:
             raise RejectedError("properties: a document without an item has none")
         merged = {**of.properties, **properties} if isinstance(of, Item) and properties is not None else None
         revision = revisions.add_revision(
             tx, of, comment=comment, properties=merged, file=stored, origin=origin
         )
+        scene.fill_in(tx, call.server.files, stored.checksum)
         keep_answer(tx, request, KeptAnswer(str(revision.revision_number)))
-        return answer(of, revision)
+        return answer(tx, of, revision)
 
 
 def _base_revision(raw: object) -> int | None:
@@ -494,16 +512,16 @@ def _list(name: str, kind: TypeAdapter[Any], raw: object) -> list[dict[str, str]
     if raw is None or raw == "":
         return None
     try:
-        found = kind.validate_json(raw if isinstance(raw, str) else "")
+        values = kind.validate_json(raw if isinstance(raw, str) else "")
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"]))
         raise RejectedError(f"{name}: wanted a JSON list as text; {where}: {first['msg']}") from None
-    told: list[dict[str, str]] = [one.model_dump(exclude_defaults=True) for one in found]
-    for text in (text for one in told for text in one.values()):
+    result: list[dict[str, str]] = [value.model_dump(exclude_defaults=True) for value in values]
+    for text in (text for value in result for text in value.values()):
         if problem := text_problem(text, 1000):
             raise RejectedError(f"{name}: {problem}")
-    return told
+    return result
 
 
 def _properties(raw: str | None) -> dict[str, Any] | None:
@@ -533,3 +551,123 @@ def download(call: Call, revision: Revision) -> Response:
         content_disposition_type="attachment",
         headers=headers,
     )
+
+
+by_uuid = APIRouter(prefix="/api", tags=["documents"])
+
+
+def document_at(uuid: str) -> Find:
+    """Give the document with this UUID, or the item whose document it is.
+
+    With a lock, a UUID that is not known becomes a new document: the sender of a file names it.
+    """
+
+    def find(tx: Tx, lock: bool) -> Item | Document:
+        normal = items.normal_uuid(uuid)
+        document = revisions.find_document(tx, normal, lock=lock)
+        if document is None and (of := items.get_by_uuids(tx, [normal], include_archived=True)):
+            return items.get_item(tx, of[0].part_number, lock=lock)
+        if document is not None and document.item_id is not None:
+            (item,) = items.by_ids(tx, [document.item_id]).values()
+            return items.get_item(tx, item.part_number, lock=lock)
+        if document is None:
+            return revisions.make_document(tx, normal) if lock else Document(0, normal, None, 0, "", "")
+        return document
+
+    return find
+
+
+@by_uuid.post("/documents/by-uuid", response_model=DocumentsOut, responses=READ_ERRORS)
+def get_documents(call: Viewer, body: UuidsBody) -> Response:
+    """Many documents in one request; those that are not known are absent. Reads only, so a viewer may."""
+    with call.read() as tx:
+        documents = revisions.shown(tx, revisions.documents_by_uuid(tx, body.uuids))
+    return json_answer({"documents": [to_wire(document) for document in documents]})
+
+
+@by_uuid.get("/items/{part_number}/documents", response_model=DocumentsOut, responses=READ_ERRORS)
+def documents_of(call: Viewer, part_number: str) -> Response:
+    """The documents that hold an item: its own, or the file of several parts in which it is an object."""
+    with call.read() as tx:
+        documents = revisions.shown(tx, revisions.documents_holding(tx, items.get_item(tx, part_number)))
+    return json_answer({"documents": [to_wire(document) for document in documents]})
+
+
+@by_uuid.get("/documents/{uuid}", response_model=wire.Document, responses=READ_ERRORS)
+def get_document(call: Viewer, uuid: Uuid) -> Response:
+    """One document, with what it links to and what links to it."""
+    with call.read() as tx:
+        document_json = told_of(tx, uuid)
+    return json_answer(document_json)
+
+
+def told_of(tx: Tx, uuid: str) -> dict[str, Any]:
+    """All that is known of a document, for the API and the pages. Raises NotFoundError."""
+    document = revisions.get_document(tx, items.normal_uuid(uuid))
+    now = revisions.shown(tx, [document])
+    if not now:
+        raise NotFoundError(f"{document.subject} has no file yet")
+    newest = revisions.get_revision(tx, document, document.current_revision)
+    near = {"linked": revisions.linked_from(tx, document), "used_by": revisions.linking_to(tx, document)}
+    others = {
+        name: [to_wire(shown_document) for shown_document in revisions.shown(tx, some)]
+        for name, some in near.items()
+    }
+    return {**to_wire(now[0]), "links": newest.links, **others}
+
+
+@by_uuid.get("/documents/{uuid}/revisions", response_model=list[RevisionOut], responses=READ_ERRORS)
+def list_document_revisions(
+    call: Viewer,
+    uuid: Uuid,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    before: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
+    after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
+    offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
+) -> Response:
+    """Revisions with a file, newest first, as those of an item."""
+    with call.read() as tx:
+        of = revisions.get_document(tx, items.normal_uuid(uuid))
+        found_revisions, total = revisions.list_revisions(
+            tx, of, limit, before=before, after=after, skip=offset
+        )
+    rows = [revision_to_wire(of, revision) for revision in found_revisions]
+    return json_answer(rows, headers={"X-Total-Count": str(total)})
+
+
+@by_uuid.get("/documents/{uuid}/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
+def get_document_revision(call: Viewer, uuid: Uuid, number: RevisionNumber) -> Response:
+    """One revision, with the files that its file links to."""
+    with call.read() as tx:
+        of = revisions.get_document(tx, items.normal_uuid(uuid))
+        revision = revisions.get_revision(tx, of, number)
+    return json_answer(revision_to_wire(of, revision, links=True))
+
+
+@by_uuid.post(
+    "/documents/{uuid}/file",
+    status_code=201,
+    response_model=RevisionOut,
+    responses=WRITE_ERRORS,
+    openapi_extra=UPLOAD,
+)
+async def upload_document_file(call: Editor, uuid: Uuid) -> Response:
+    """Upload a file as a new revision of a document, which the first upload makes; the form is that of an
+    item's file."""
+    return await receive(call, document_at(uuid))
+
+
+@by_uuid.get("/documents/{uuid}/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
+def download_newest_of_document(call: Viewer, uuid: Uuid) -> Response:
+    """The newest file."""
+    with call.read() as tx:
+        revision = revisions.newest_file(tx, revisions.get_document(tx, items.normal_uuid(uuid)))
+    return download(call, revision)
+
+
+@by_uuid.get("/documents/{uuid}/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
+def download_revision_of_document(call: Viewer, uuid: Uuid, number: RevisionNumber) -> Response:
+    """The file of one revision."""
+    with call.read() as tx:
+        revision = revisions.get_revision(tx, revisions.get_document(tx, items.normal_uuid(uuid)), number)
+    return download(call, revision)

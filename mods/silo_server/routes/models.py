@@ -20,6 +20,7 @@ from silo.api import wire
 from silo.bom.numbers import LARGEST_QUANTITY, read_quantity
 from silo.bom.resolve import character_problem
 from silo_server.routes import context
+from silo_server.schema import text_hints
 from silo_server.services.bom.merge import quantity_problem
 from silo_server.services.bom.review import REL_TYPES, SOURCES
 from silo_server.services.search import LookAlike
@@ -97,16 +98,19 @@ class Body(BaseModel):
 
 if TYPE_CHECKING:
     _ItemTexts = Body
+    _LineTexts = Body
 else:
-    # What silo.api.wire.ItemTexts names, with the server's bounds and characters.
-    _ItemTexts = create_model(
-        "_ItemTexts",
-        __base__=Body,
-        **{
-            name: ((Text if (field.json_schema_extra or {}).get("long") else Short) | None, None)
-            for name, field in wire.ItemTexts.model_fields.items()
-        },
-    )
+
+    def _bounded(of: type[BaseModel]) -> type[Body]:
+        """The texts that a wire model names, with the server's bounds and characters."""
+
+        def kind(hints: dict[str, Any]) -> Any:
+            return Text if hints.get("long") else Brief if "maxLength" in hints else Short
+
+        fields = {name: (kind(text_hints(field)) | None, None) for name, field in of.model_fields.items()}
+        return create_model(f"_{of.__name__}", __base__=Body, **fields)
+
+    _ItemTexts, _LineTexts = map(_bounded, (wire.ItemTexts, wire.LineTexts))
 
 
 class NewItemBody(_ItemTexts):
@@ -142,6 +146,7 @@ class ItemChangeBody(_ItemTexts):
     category: Annotated[Short, WithJsonSchema(context.CATEGORY_OR_EMPTY)] | None = None
     properties: Properties | None = None
     comment: Text = ""
+    source: wire.FactSource = "hand"
 
 
 class UuidsBody(Body):
@@ -150,7 +155,7 @@ class UuidsBody(Body):
     uuids: list[Short] = Field(max_length=10_000)
 
 
-class Wanted(Body):
+class LookAlikeQuery(Body):
     """A component that may be an item already: its name, and the SHA-256 of its file."""
 
     name: Short
@@ -160,7 +165,7 @@ class Wanted(Body):
 class LookAlikesBody(Body):
     """``POST /api/items/look-alikes``."""
 
-    wanted: list[Wanted] = Field(max_length=1000)
+    wanted: list[LookAlikeQuery] = Field(max_length=1000)
 
 
 class NumbersBody(Body):
@@ -246,16 +251,13 @@ class BomsOut(BaseModel):
     boms: dict[str, list[LineOut]]
 
 
-class NewLineBody(Body):
+class NewLineBody(_LineTexts):
     """``POST /api/items/{pn}/bom``."""
 
     child_part_number: Short
     quantity: Amount = 1
     rel_type: RelType = "component"
-    unit: Brief | None = None
     reference_designators: list[Short] = Field(default_factory=list, max_length=10_000)
-    find_number: Brief | None = None
-    notes: Text | None = None
     child_revision: RevisionNumber | None = None
     source: Source = "manual"
     metadata: Properties = Field(default_factory=dict)
@@ -270,7 +272,7 @@ def _without_default(schema: dict[str, Any]) -> None:
     schema.pop("default", None)
 
 
-class LineChangeBody(Body):
+class LineChangeBody(_LineTexts):
     """``PUT /api/items/{pn}/bom/{child}``: only the keys that are there are changed; null clears.
 
     A quantity, a relation type and a source cannot be cleared: null is refused for them.
@@ -278,10 +280,7 @@ class LineChangeBody(Body):
 
     quantity: Amount = _kept(1)
     rel_type: RelType = _kept("component")
-    unit: Brief | None = None
     reference_designators: list[Short] | None = Field(None, max_length=10_000)
-    find_number: Brief | None = None
-    notes: Text | None = None
     child_revision: RevisionNumber | None = None
     source: Source = _kept("manual")
     metadata: Properties | None = None

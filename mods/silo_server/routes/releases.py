@@ -55,15 +55,15 @@ class ReleasesOut(wire.Answer):
 
 def release_to_wire(tx: Tx, release: Release, *, whole: bool = False) -> dict[str, Any]:
     """A revision as it is sent; ``whole``: with the item's revision and all files of the product."""
-    told = {
+    result = {
         **to_wire(release, "id"),
         "blocks": releases.blocks_of(tx, release) if release.status == "review" else release.blocks,
-        "approvals": [to_wire(one) for one in releases.approvals_of(tx, release)],
+        "approvals": [to_wire(approval) for approval in releases.approvals_of(tx, release)],
     }
     if whole:
         record = releases.read_record(tx, release.record)
-        told |= {"revision": record["revision"], "files": record["files"]}
-    return told
+        result |= {"revision": record["revision"], "files": record["files"]}
+    return result
 
 
 @router.get("", response_model=ReleasesOut, responses=READ_ERRORS)
@@ -71,9 +71,9 @@ def list_releases(call: Viewer, part_number: str) -> Response:
     """The revisions of a product: in review, released, obsolete, and those that came to nothing."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
-        found = [release_to_wire(tx, one) for one in releases.list_releases(tx, item)]
-        told = {"draft": releases.coming_label(tx, item), "releases": found}
-    return json_answer(told)
+        releases_json = [release_to_wire(tx, release) for release in releases.list_releases(tx, item)]
+        content = {"draft": releases.coming_label(tx, item), "releases": releases_json}
+    return json_answer(content)
 
 
 @router.post("", status_code=201, response_model=wire.Release, responses=WRITE_ERRORS)
@@ -96,8 +96,8 @@ def get_release(call: Viewer, part_number: str, label: str) -> Response:
     """One revision, with all files of the product as they were frozen."""
     with call.read() as tx:
         release = releases.get_release(tx, get_item(tx, part_number, include_archived=True), label)
-        told = release_to_wire(tx, release, whole=True)
-    return json_answer(told)
+        release_json = release_to_wire(tx, release, whole=True)
+    return json_answer(release_json)
 
 
 @router.post("/{label}/approval", response_model=wire.Release, responses=WRITE_ERRORS)

@@ -18,11 +18,9 @@ from starlette.responses import Response
 from silo.api.wire import ErrorBody
 from silo.bom.errors import RejectedError
 from silo_server import events
-from silo_server.background import HEALTH_SECONDS, READY_SECONDS, State
 from silo_server.db.engine import mode_of
 from silo_server.events import EventStream
-from silo_server.operation.housekeeping import last_run
-from silo_server.operation.metrics import CONTENT_TYPE, standing
+from silo_server.housekeeping import CONTENT_TYPE, HEALTH_SECONDS, READY_SECONDS, State, last_run, standing
 from silo_server.routes import context
 from silo_server.routes.context import (
     READ_ERRORS,
@@ -38,7 +36,7 @@ from silo_server.routes.context import (
     server_of,
 )
 from silo_server.routes.models import Body, Short, Text
-from silo_server.services.access import accounts, audit, credentials, logins
+from silo_server.services import access
 from silo_server.values import Role, Scope, to_wire
 
 router = APIRouter(tags=["system"])
@@ -172,10 +170,10 @@ def set_mode(call: Admin, body: ModeBody) -> dict[str, Any]:
 def _event_id(text: str | None) -> events.Mark | None:
     if text is None or text == "":
         return None
-    found = EVENT_ID.fullmatch(text)
-    if found is None:
+    match = EVENT_ID.fullmatch(text)
+    if match is None:
         raise RejectedError(f"Last-Event-ID: wanted the id of an event (a number), got {text[:40]!r}")
-    return events.Mark(int(found["number"]), found["tag"] or "")
+    return events.Mark(int(match["number"]), match["tag"] or "")
 
 
 auth_router = APIRouter(prefix="/api", tags=["auth"])
@@ -245,7 +243,7 @@ class PasswordBody(Body):
 @auth_router.post("/auth/login", responses=LOGIN_ERRORS)
 def log_in(server: ServerDep, request: Request, body: LoginBody) -> Response:
     """Begin a browser session: sets the cookie, answers with the CSRF secret for later requests."""
-    session = logins.log_in(server.db, body.username, body.password, client_address(request))
+    session = access.log_in(server.db, body.username, body.password, client_address(request))
     response = json_answer({"username": session.username, "csrf_token": session.csrf_token})
     set_session_cookie(response, request, session)
     return response
@@ -254,7 +252,7 @@ def log_in(server: ServerDep, request: Request, body: LoginBody) -> Response:
 @auth_router.post("/auth/logout", status_code=204, responses=READ_ERRORS)
 def log_out(call: Viewer) -> Response:
     """End this browser session."""
-    logins.log_out(call.server.db, call.actor)
+    access.log_out(call.server.db, call.actor)
     response = Response(status_code=204)
     response.delete_cookie(SESSION_COOKIE)
     return response
@@ -274,7 +272,7 @@ def who_am_i(call: Viewer) -> dict[str, Any]:
 @auth_router.put("/auth/password", status_code=204, responses={**LOGIN_ERRORS, **WRITE_ERRORS})
 def set_password(call: Viewer, body: PasswordBody) -> Response:
     """Set the own password; ends all own sessions. Not with a token; asks for the old password."""
-    logins.set_own_password(call.server.db, call.actor, body.password, body.current_password)
+    access.set_own_password(call.server.db, call.actor, body.password, body.current_password)
     return Response(status_code=204)
 
 
@@ -282,7 +280,7 @@ def set_password(call: Viewer, body: PasswordBody) -> Response:
 def list_tokens(call: Viewer) -> list[dict[str, Any]]:
     """The own tokens; never their secrets."""
     with call.read() as tx:
-        return [_token(token) for token in credentials.list_tokens(tx, call.actor.own_id)]
+        return [_token(token) for token in access.list_tokens(tx, call.actor.own_id)]
 
 
 @auth_router.post("/auth/tokens", status_code=201, responses=WRITE_ERRORS)
@@ -291,7 +289,7 @@ def create_token(call: Viewer, body: TokenBody) -> dict[str, Any]:
     forever = "expires_in_days" in body.model_fields_set and body.expires_in_days is None
     scope = max(body.scopes, key=list(Scope).index) if body.scopes else None
     with call.write(even_when_read_only=True) as tx:
-        token, secret = credentials.create_own_token(
+        token, secret = access.create_own_token(
             tx, body.name, days=body.expires_in_days, forever=forever, scope=scope
         )
         return {**_token(token), "token": secret}
@@ -300,10 +298,10 @@ def create_token(call: Viewer, body: TokenBody) -> dict[str, Any]:
 @auth_router.delete("/auth/tokens/{token_id}", status_code=204, responses=WRITE_ERRORS)
 def revoke_token(call: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]) -> Response:
     """Revoke a token: one's own, or anybody's for an admin."""
-    credentials.check_may_change(call.actor)
+    access.check_may_change(call.actor)
     owner = None if call.actor.role is Role.ADMIN else call.actor.own_id
     with call.write(even_when_read_only=True) as tx:
-        credentials.revoke_token(tx, token_id, owner)
+        access.revoke_token(tx, token_id, owner)
     return Response(status_code=204)
 
 
@@ -311,14 +309,14 @@ def revoke_token(call: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]) -
 def list_users(call: Admin) -> list[dict[str, Any]]:
     """All users."""
     with call.read() as tx:
-        return [_user(user) for user in accounts.list_users(tx)]
+        return [_user(user) for user in access.list_users(tx)]
 
 
 @auth_router.post("/users", status_code=201, responses=WRITE_ERRORS)
 def create_user(call: Admin, body: NewUserBody) -> dict[str, Any]:
     """Make a user."""
     with call.write(even_when_read_only=True) as tx:
-        user = accounts.create_user(
+        user = access.create_user(
             tx, body.username, body.role, display_name=body.display_name, password=body.password
         )
         return _user(user)
@@ -328,7 +326,7 @@ def create_user(call: Admin, body: NewUserBody) -> dict[str, Any]:
 def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, Any]:
     """Change a user's role, name, password, right to approve, or let nobody in under this name any more."""
     with call.write(even_when_read_only=True) as tx:
-        user = accounts.change_user(tx, username, **body.model_dump())
+        user = access.change_user(tx, username, **body.model_dump())
         return _user(user)
 
 
@@ -336,8 +334,8 @@ def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, A
 def create_login_link(call: Admin, username: str) -> dict[str, Any]:
     """A link that lets this user in once; for a new colleague or a forgotten password."""
     with call.write(even_when_read_only=True) as tx:
-        secret = logins.create_login_link(tx, username)
-        audit.note(tx, "login_link.created", username)
+        secret = access.create_login_link(tx, username)
+        access.note(tx, "login_link.created", username)
         path = f"/login/link/{secret}"
         public = call.server.settings.public_url
         return {"path": path, "url": f"{public}{path}" if public else None}
@@ -349,11 +347,11 @@ def list_audit(
 ) -> list[dict[str, Any]]:
     """Who did what, newest first."""
     with call.read() as tx:
-        entries = audit.list_entries(tx, limit, before)
+        entries = access.list_entries(tx, limit, before)
     return [to_wire(entry) for entry in entries]
 
 
-def set_session_cookie(response: Response, request: Request, session: logins.NewSession) -> None:
+def set_session_cookie(response: Response, request: Request, session: access.NewSession) -> None:
     """The session's cookie: not for scripts, not for other sites, and only over TLS where there is TLS."""
     settings = server_of(request).settings
     response.set_cookie(
@@ -366,12 +364,12 @@ def set_session_cookie(response: Response, request: Request, session: logins.New
     )
 
 
-def _token(token: credentials.Token) -> dict[str, Any]:
+def _token(token: access.Token) -> dict[str, Any]:
     return {
         **to_wire(token, "username", "scope"),
         "scopes": [scope.value for scope in Scope if token.scope.covers(scope)],
     }
 
 
-def _user(user: accounts.User) -> dict[str, Any]:
+def _user(user: access.User) -> dict[str, Any]:
     return to_wire(user, "id")

@@ -1,1 +1,280 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
+"""The part-number schemas that come with the server."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from silo.api.wire import ItemTexts
+from silo.bom.errors import ConfigError, InputError, NotFoundError, RejectedError
+from silo.bom.numbers import plain, read_number
+from silo.bom.resolve import CategoryRule
+
+DEFAULT_SCHEMA = "kindred-rd"
+_log = logging.getLogger(__name__)
+ITEM_TYPES = ("part", "assembly", "consumable", "tool")
+
+
+@dataclass(frozen=True, slots=True)
+class Category:
+    """A category of a schema: ``F01``, "Screws and bolts", and what its items are by default."""
+
+    code: str
+    name: str
+    item_type: str
+    domain: str
+
+
+@dataclass(frozen=True, slots=True)
+class PropertyField:
+    """A property that the schema knows, with its checks. ``categories`` are prefixes, none = all."""
+
+    name: str
+    type: str
+    label: str
+    unit: str = ""
+    description: str = ""
+    default: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    pattern: str = ""
+    example: str = ""
+    options: tuple[str, ...] = ()
+    categories: tuple[str, ...] = ()
+
+    def fits(self, category: str | None) -> bool:
+        """True where items of this category have the field."""
+        return not self.categories or category is None or category.startswith(self.categories)
+
+    @property
+    def title(self) -> str:
+        """``Mass [kg]``."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+    def read(self, text: str) -> str | int | float:
+        """The value that somebody typed; RejectedError says what was wanted. ``text`` is not empty."""
+        if self.type in ("number", "integer"):
+            return self._number(text)
+        if self.options and text not in self.options:
+            raise RejectedError(f"{self.label}: wanted one of {', '.join(self.options)}, got {text!r}")
+        if self.pattern and not re.fullmatch(self.pattern, text):
+            example = f" such as {self.example}" if self.example else ""
+            raise RejectedError(f"{self.label}: wanted a value{example}, got {text!r}")
+        if self.type == "link" and not re.fullmatch(r"https?://[^\s/]+\S*", text):
+            raise RejectedError(f"{self.label}: wanted a web address (https://…), got {text!r}")
+        return text
+
+    def _number(self, text: str) -> int | float:
+        reading = read_number(text)
+        if reading.value is None:
+            raise RejectedError(f"{self.title}: {reading.problem}")
+        value = plain(reading.value)
+        if self.type == "integer" and not isinstance(value, int):
+            raise RejectedError(f"{self.title}: wanted a whole number, got {text!r}")
+        low, high = self.minimum, self.maximum
+        if (low is not None and value < low) or (high is not None and value > high):
+            ends = [
+                f"at least {low:g}" if low is not None else "",
+                f"at most {high:g}" if high is not None else "",
+            ]
+            raise RejectedError(f"{self.title}: wanted {' and '.join(filter(None, ends))}, got {text!r}")
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class Schema:
+    """A part-number schema: ``<category><separator><serial>``."""
+
+    name: str
+    version: int
+    description: str
+    separator: str
+    serial_digits: int
+    domains: Mapping[str, str]
+    categories: Mapping[str, Category]
+    fields: tuple[PropertyField, ...]
+
+    def number(self, category: str, serial: int) -> str:
+        """``F01-0001``. A serial beyond the digits grows; gaps are tolerated everywhere."""
+        return f"{category}{self.separator}{serial:0{self.serial_digits}d}"
+
+    def category(self, code: str) -> Category:
+        """The category, in whatever case it is asked for."""
+        result = self.categories.get(code.strip().upper())
+        if result is None:
+            raise RejectedError(
+                f"category: wanted one of schema {self.name} (such as A01, F01, M01), got {code!r}; "
+                f"GET /api/schemas/{self.name} lists them"
+            )
+        return result
+
+
+@cache
+def schemas() -> Mapping[str, Schema]:
+    """All schemas by name."""
+    text = resources.files("silo_server.schema").joinpath("kindred_rd.toml").read_text("utf-8")
+    schema = _parse(tomllib.loads(text))
+    return {schema.name: schema}
+
+
+def find_schema(name: str | None) -> Schema:
+    """The schema called ``name``, or the default one; NotFoundError otherwise."""
+    wanted = name or DEFAULT_SCHEMA
+    schema = schemas().get(wanted)
+    if schema is None:
+        raise NotFoundError(f"schema: there is no {wanted!r}; known are {', '.join(schemas())}")
+    return schema
+
+
+def _parse(raw: Mapping[str, Any]) -> Schema:
+    categories = {
+        code: Category(code, entry["name"], entry["item_type"], code[0])
+        for code, entry in raw["categories"].items()
+    }
+    return Schema(
+        name=raw["name"],
+        version=raw["version"],
+        description=raw["description"],
+        separator=raw["separator"],
+        serial_digits=raw["serial_digits"],
+        domains=raw["domains"],
+        categories=categories,
+        fields=tuple(_parse_field(field) for field in raw["fields"]),
+    )
+
+
+def _parse_field(raw: Mapping[str, Any]) -> PropertyField:
+    lists = {name: tuple(raw[name]) for name in ("options", "categories") if name in raw}
+    return PropertyField(**{**raw, **lists})
+
+
+def describe(schema: Schema) -> dict[str, Any]:
+    """The schema as ``GET /api/schemas/{name}`` sends it: the segments with their values."""
+    values = {category.code: category.name for category in schema.categories.values()}
+    return {
+        "name": schema.name,
+        "version": schema.version,
+        "description": schema.description,
+        "separator": schema.separator,
+        "uniqueness": {"scope": "global", "case_sensitive": False},
+        "segments": [
+            {"name": "category", "type": "enum", "required": True, "values": values},
+            {"name": "sequence", "type": "serial", "length": schema.serial_digits, "scope": "category"},
+        ],
+        "domains": dict(schema.domains),
+        **_described_rules(schema),
+    }
+
+
+def _described_rules(schema: Schema) -> dict[str, Any]:
+    """A wrong file costs the proposals, not the schema; those who register parts read what is wrong."""
+    try:
+        return {"category_rules": category_rules(schema)}
+    except ConfigError as error:
+        _log.warning("category rules are not used: %s", error)
+        return {"category_rules": [], "category_rules_problem": str(error)}
+
+
+RULES = "SILO_CATEGORY_RULES"
+"""Names a TOML file with the site's own rules, in place of those beside the schema."""
+
+
+def category_rules(schema: Schema, env: Mapping[str, str] = os.environ) -> list[Mapping[str, Any]]:
+    """Which category a name of a part stands for: of the site's file, else of the one beside the schema.
+
+    Read again each time, so that an edit counts at once. ConfigError where the site's file is wrong, with all
+    that is wrong in it. It names the file without its folder, for every designer reads it.
+    """
+    path = env.get(RULES)
+    name = f"{RULES} ({Path(path).name})" if path else "category_rules.toml"
+    try:
+        source = Path(path) if path else resources.files("silo_server.schema").joinpath(name)
+        text = source.read_text("utf-8")
+        rules = tomllib.loads(text).get("rules", [])
+    except OSError as error:
+        raise ConfigError(f"{name} cannot be read: {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{name}: {error}") from error
+    if not isinstance(rules, list):
+        raise ConfigError(f"{name}: wanted [[rules]] with words and a category, got rules = {rules!r}")
+    wrong = []
+    for rule, where in zip(rules, _places(text, len(rules)), strict=True):
+        try:
+            schema.category(CategoryRule.read(rule).category)
+        except (InputError, RejectedError) as error:
+            wrong.append(f"{where}: {error}")
+    if wrong:
+        raise ConfigError(f"{name}: {'; '.join(wrong)}")
+    return rules
+
+
+def _places(text: str, count: int) -> list[str]:
+    """Where each rule stands in the file."""
+    lines = [number for number, line in enumerate(text.splitlines(), 1) if _RULE.match(line)]
+    if len(lines) != count:
+        return [f"rule {number}" for number in range(1, count + 1)]
+    return [f"line {number}" for number in lines]
+
+
+_RULE = re.compile(r"\s*\[\[\s*[\"']?rules[\"']?\s*\]\]")
+
+
+def describe_form(schema: Schema) -> dict[str, Any]:
+    """The form descriptor: a two-stage category picker, the item's fields, and the property fields."""
+    return {
+        "schema": schema.name,
+        "category_picker": {
+            "stages": [{"name": "domain"}, {"name": "category"}],
+            "domains": [_describe_domain(schema, code, label) for code, label in schema.domains.items()],
+        },
+        "item_fields": _ITEM_FIELDS,
+        "field_groups": [
+            {"name": "properties", "label": "Properties", "fields": [_field(f) for f in schema.fields]}
+        ],
+    }
+
+
+def _describe_domain(schema: Schema, code: str, label: str) -> dict[str, Any]:
+    members = [c for c in schema.categories.values() if c.domain == code]
+    return {
+        "code": code,
+        "label": label,
+        "categories": [{"code": c.code, "label": c.name, "item_type": c.item_type} for c in members],
+    }
+
+
+def _field(field: PropertyField) -> dict[str, Any]:
+    said = {name: value for name, value in asdict(field).items() if value not in ("", None, ())}
+    return {"required": False, **said}
+
+
+def text_hints(field: FieldInfo) -> Mapping[str, Any]:
+    """What :class:`silo.api.wire.ItemTexts` says of a field for its form: ``options``, ``long``."""
+    hints = field.json_schema_extra
+    return hints if isinstance(hints, dict) else {}
+
+
+def _text_field(name: str, field: FieldInfo) -> dict[str, Any]:
+    hints = text_hints(field)
+    kind = "select" if "options" in hints else "text" if hints.get("long") else "string"
+    field_json = {"name": name, "type": kind, "label": field.title, "required": False}
+    return field_json | ({"options": hints["options"]} if "options" in hints else {})
+
+
+_ITEM_FIELDS: list[dict[str, Any]] = [
+    {"name": "name", "type": "string", "label": "Name", "required": True},
+    {"name": "description", "type": "string", "label": "Description", "required": False},
+    {"name": "item_type", "type": "select", "label": "Type", "required": False, "options": list(ITEM_TYPES)},
+    *(_text_field(name, field) for name, field in ItemTexts.model_fields.items()),
+]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 import uuid as uuids
 from collections.abc import Collection, Mapping, Sequence
@@ -18,18 +19,18 @@ from sqlalchemy import ColumnElement, func, insert, select, update
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import IntegrityError
 
-from silo.api.wire import ItemTexts
+from silo.api.wire import FACTS, FactSource, ItemTexts, Stated
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
+from silo.bom.model import as_uuid
 from silo.bom.resolve import REFUSED_CHARACTERS, character_problem
 from silo_server import events
-from silo_server.db.engine import Tx, one_of
+from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer, one_of
 from silo_server.db.tables import items, number_counters
-from silo_server.schema.catalog import ITEM_TYPES, Category, Schema, find_schema
+from silo_server.schema import ITEM_TYPES, Category, Schema, find_schema
 from silo_server.services import revisions
-from silo_server.services.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.services.search import index_item, search_for
 from silo_server.settings import DuplicateError
-from silo_server.values import Item, check_json, from_row, merge_patch
+from silo_server.values import Item, check_json, dumps, from_row, merge_patch
 
 # Words that stand where a part number stands in a path.
 RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
@@ -67,13 +68,13 @@ def check_number(number: str) -> str:
 def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
     """The number the next item of the category would get; consumes nothing."""
     schema = find_schema(schema_name)
-    found = schema.category(category)
+    category_found = schema.category(category)
     last = tx.conn.scalar(
         select(number_counters.c.last_serial).where(
-            number_counters.c.schema_name == schema.name, number_counters.c.category == found.code
+            number_counters.c.schema_name == schema.name, number_counters.c.category == category_found.code
         )
     )
-    return _next_free(tx, schema, found, last or 0)[0]
+    return _next_free(tx, schema, category_found, last or 0)[0]
 
 
 def take_number(tx: Tx, schema: Schema, category: Category) -> str:
@@ -161,7 +162,10 @@ SORTS: Mapping[str, Sequence[ColumnElement[Any]]] = {
 def to_item(row: Any) -> Item:
     """A frozen item from its row."""
     texts = {name: getattr(row, name) for name in ItemTexts.model_fields}
-    return from_row(Item, row, schema=row.schema_name, texts=texts, properties=json.loads(row.properties))
+    offers = json.loads(row.supplier_parts) if row.supplier_parts else ()
+    origins = json.loads(row.origins) if row.origins else {}
+    fields = {"schema": row.schema_name, "texts": texts, "supplier_parts": offers, "origins": origins}
+    return from_row(Item, row, **fields, properties=json.loads(row.properties))
 
 
 def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: bool = False) -> Item:
@@ -192,11 +196,11 @@ def get_by_uuid(tx: Tx, uuid: str) -> Item:
 
 def get_by_uuids(tx: Tx, wanted: Sequence[str], *, include_archived: bool = False) -> list[Item]:
     """The items with these UUIDs, each once, in the order asked; those that are missing are absent."""
-    known = [normal for uuid in wanted if (normal := uuid_or_none(uuid)) is not None]
-    query = select(items).where(one_of(tx, items.c.uuid, known))
+    uuids_asked = [normal for uuid in wanted if (normal := as_uuid(uuid))]
+    query = select(items).where(one_of(tx, items.c.uuid, uuids_asked))
     rows = tx.conn.execute(query if include_archived else query.where(items.c.archived_at.is_(None))).all()
-    found = {row.uuid: to_item(row) for row in rows}
-    return [found[uuid] for uuid in dict.fromkeys(known) if uuid in found]
+    by_uuid = {row.uuid: to_item(row) for row in rows}
+    return [by_uuid[uuid] for uuid in dict.fromkeys(uuids_asked) if uuid in by_uuid]
 
 
 def get_by_numbers(tx: Tx, wanted: Sequence[str]) -> dict[str, Item]:
@@ -207,8 +211,8 @@ def get_by_numbers(tx: Tx, wanted: Sequence[str]) -> dict[str, Item]:
             one_of(tx, items.c.part_number_key, set(keys.values())), items.c.archived_at.is_(None)
         )
     ).all()
-    found = {row.part_number_key: to_item(row) for row in rows}
-    return {number: found[key] for number, key in keys.items() if key in found}
+    by_number = {row.part_number_key: to_item(row) for row in rows}
+    return {number: by_number[key] for number, key in keys.items() if key in by_number}
 
 
 def by_ids(tx: Tx, ids: Collection[int]) -> dict[int, Item]:
@@ -227,9 +231,9 @@ def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
     order: list[ColumnElement[Any]] = list(SORTS.get(query.sort.removeprefix("-"), SORTS["number"]))
     if query.sort.startswith("-"):
         order = [column.desc() for column in order]
-    found = search_for(tx, query.search)
-    if found is not None:
-        condition, rank = found
+    search = search_for(tx, query.search)
+    if search is not None:
+        condition, rank = search
         conditions.append(condition)
         if not query.sort:
             order.insert(0, rank)
@@ -273,6 +277,9 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     if number is None and category is not None:
         number = take_number(tx, schema, category)
     assert number is not None  # given, or of the category
+    # Older programs send the content of its file among the properties.
+    properties = {name: value for name, value in new.properties.items() if name != "file_sha256"}
+    made_from = new.properties.get("file_sha256")
     name, description = new.name.strip(), new.description.strip()
     values = {
         "uuid": uuid or str(uuids.uuid4()),
@@ -283,6 +290,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
         "description": description or name,
         **new.texts,
         "properties": "{}",
+        "made_from": made_from.lower() if isinstance(made_from, str) and len(made_from) <= 64 else None,
         "current_revision": 0,
         "bom_version": 0,
         "version": 1,
@@ -291,8 +299,8 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     }
     _insert(tx, number, values)
     item = get_item(tx, number)
-    if new.properties:
-        revisions.add_revision(tx, item, comment="created", properties=new.properties)
+    if properties:
+        revisions.add_revision(tx, item, comment="created", properties=properties)
         item = get_item(tx, number)
     else:
         index_item(tx, item.id)
@@ -303,7 +311,11 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
 
 @dataclass(frozen=True, kw_only=True)
 class ItemChange:
-    """Fields to change; None leaves a field as it is. ``properties`` make a new revision."""
+    """Fields to change; None leaves a field as it is. ``properties`` make a new revision.
+
+    source
+        where the properties come from (:class:`silo.api.wire.FactOrigin`).
+    """
 
     part_number: str | None = None
     name: str | None = None
@@ -313,6 +325,7 @@ class ItemChange:
     texts: Mapping[str, str | None] = field(default_factory=dict)  # of silo.api.wire.ItemTexts
     properties: Mapping[str, Any] | None = None
     comment: str = ""
+    source: FactSource = "hand"
 
 
 def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | None = None) -> Item:
@@ -323,8 +336,14 @@ def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | No
     item = get_item(tx, part_number, lock=True)
     check_item_version(item, expected)
     values = _changed_values(item, change)
-    if change.properties is not None and dict(change.properties) != dict(item.properties):
-        revisions.add_revision(tx, item, comment=change.comment, properties=change.properties)
+    if "description" in values and "description" in item.origins:  # it was CAD's until now
+        item = replace(item, origins={n: origin for n, origin in item.origins.items() if n != "description"})
+        tx.conn.execute(update(items).where(items.c.id == item.id).values(origins=dumps(item.origins)))
+    given = change.properties
+    if given is not None and change.source == "cad":
+        given = dict(given) | {name: item.properties[name] for name in _kept_from_cad(item)}
+    if given is not None and dict(given) != dict(item.properties):
+        revisions.add_revision(tx, item, comment=change.comment, properties=given, source=change.source)
     elif not values:
         return item
     steps = 1 if values else 0  # a revision has counted itself
@@ -350,6 +369,46 @@ def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | No
     return after
 
 
+def _kept_from_cad(item: Item) -> list[str]:
+    """The facts that a person typed, or read from a scale: CAD does not replace them."""
+    return [n for n in FACTS if n in item.properties and item.origins.get(n, {}).get("source") != "cad"]
+
+
+_FACT_WORDS = {"mass_kg": "mass", "size_m": "size", "volume_m3": "volume", "com_m": "centre of mass"}
+
+
+def fill_in(tx: Tx, part_number: str, stated: Stated, checksum: str) -> None:
+    """Give an item what its file states. What a person typed or a scale said stays. What CAD said before goes
+    if the file does not state it any more; a mass stays with size and material."""
+    item = get_item(tx, part_number, lock=True)
+    mine = set(FACTS) - set(_kept_from_cad(item))
+    before = {name: value for name, value in item.properties.items() if name in mine}
+    stated_fields = stated.model_dump(include=mine, exclude_none=True)
+    changed_fields = {
+        n: before[n] if _about_same(before.get(n), value) else value for n, value in stated_fields.items()
+    }
+    if all(before.get(name) in (None, changed_fields.get(name)) for name in ("size_m", "material")):
+        changed_fields = before | changed_fields
+    properties = {n: value for n, value in item.properties.items() if n not in mine} | changed_fields
+    about, changed = stated.description, {}
+    is_free = item.description in ("", item.name) or "description" in item.origins
+    if about and about != item.description and is_free:
+        changed["description"] = about
+    given = [n for n in FACTS if properties.get(n) != item.properties.get(n)] + [*changed]
+    if given:
+        revisions.complete(tx, item, checksum, properties, changed)
+        words = ", ".join(_FACT_WORDS.get(name, name) for name in given)
+        events.item_updated(tx, get_item(tx, part_number), f"{words} taken from its file")
+
+
+def _about_same(value: Any, other: Any) -> bool:
+    """Report whether two geometry kernels may mean the same number, or the same three."""
+    if isinstance(value, list) and isinstance(other, list):
+        return len(value) == len(other) and all(map(_about_same, value, other))
+    is_number = isinstance(value, int | float) and isinstance(other, float)
+    return is_number and math.isclose(value, other, rel_tol=1e-6, abs_tol=1e-9)
+
+
 def check_item_version(item: Item, expected: int | None) -> None:
     """Raise VersionConflictError unless the item still has the version that the request was made from."""
     if expected is not None and expected != item.version:
@@ -360,12 +419,18 @@ def check_item_version(item: Item, expected: int | None) -> None:
 
 
 def patch_properties(
-    tx: Tx, part_number: str, patch: Mapping[str, Any], comment: str = "", expected: int | None = None
+    tx: Tx,
+    part_number: str,
+    patch: Mapping[str, Any],
+    comment: str = "",
+    expected: int | None = None,
+    source: FactSource = "hand",
 ) -> Item:
     """Change the properties that a JSON merge patch (RFC 7386) names; a new revision where one differs."""
     check_json("properties", patch)
     item = get_item(tx, part_number, lock=True)
-    change = ItemChange(properties=merge_patch(dict(item.properties), dict(patch)), comment=comment)
+    merged = merge_patch(dict(item.properties), dict(patch))
+    change = ItemChange(properties=merged, comment=comment, source=source)
     return change_item(tx, part_number, change, expected)
 
 
@@ -385,26 +450,18 @@ def unarchive_item(tx: Tx, part_number: str) -> Item:
         tx.conn.execute(
             update(items).where(items.c.id == item.id).values(archived_at=None, version=items.c.version + 1)
         )
-        events.item_updated(tx, item)
+        events.item_updated(tx, item, "brought back")
     return get_item(tx, part_number)
 
 
 def normal_uuid(uuid: str, field: str = "uuid") -> str:
     """The UUID in its one written form; RejectedError, naming the field, where it is none."""
-    normal = uuid_or_none(uuid)
-    if normal is None:
+    normal = as_uuid(uuid)
+    if not normal:
         raise RejectedError(
             f"{field}: wanted a UUID such as 6f9619ff-8b86-4011-b42d-00cf4fc964ff, got {uuid!r}"
         )
     return normal
-
-
-def uuid_or_none(uuid: str) -> str | None:
-    """The UUID in its one written form, None where it is none."""
-    try:
-        return str(uuids.UUID(uuid))
-    except ValueError:
-        return None
 
 
 def _made_before(tx: Tx, uuid: str) -> Item:

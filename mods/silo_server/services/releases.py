@@ -6,7 +6,7 @@ record of the product, so nothing that happens later changes it, and no retentio
 approve exactly what was frozen.
 
 **What blocks.** Open questions and incomplete syncs on any level, parts of our own without a file, and parts
-and assemblies whose frozen record is not released. Whoever approves may override that with a reason, unless
+and assemblies whose frozen record is not released. An approver may override that with a reason, unless
 the site forbids it (``SILO_RELEASE_OVERRIDE``), or releases the parts with the product (``with_parts``).
 """
 
@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import insert, select, update
 
-from silo.api.wire import RELEASE_LABEL
+from silo.api.wire import RELEASE_LABEL, ItemTexts
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
 from silo_server import events
 from silo_server.db.engine import Tx, insert_rows, one_of
@@ -32,7 +32,7 @@ from silo_server.db.tables import (
     releases,
     users,
 )
-from silo_server.services.access import audit
+from silo_server.services import access
 from silo_server.services.items import get_item
 from silo_server.settings import TooLargeError
 from silo_server.values import Item, Role, Scope, dumps, from_row
@@ -111,44 +111,52 @@ def next_label(taken: Collection[str], scheme: str) -> str:
 def list_releases(tx: Tx, item: Item) -> list[Release]:
     """Return all that was ever submitted of an item, newest first."""
     row = releases.c
-    found = tx.conn.execute(select(releases).where(row.item_id == item.id).order_by(row.id.desc()))
-    return [_release(one) for one in found]
+    result = tx.conn.execute(select(releases).where(row.item_id == item.id).order_by(row.id.desc()))
+    return [_release(each_row) for each_row in result]
 
 
 def _release(row: Any) -> Release:
     return from_row(Release, row, blocks=tuple(json.loads(row.blocks)))
 
 
-def get_release(tx: Tx, item: Item, label: str) -> Release:
-    """Return the revision with this label. Raises NotFoundError."""
+def find_release(tx: Tx, item: Item, label: str) -> Release | None:
+    """Return the revision with this label; None if there is none."""
     row = releases.c
     of_label = (row.item_id == item.id) & (row.label == label)
     query = select(releases).where(of_label, row.status.in_(NUMBERED))
-    found = tx.conn.execute(query).one_or_none()
-    if found is None:
-        there = ", ".join(one.label for one in list_releases(tx, item) if one.status in NUMBERED)
+    rows = tx.conn.execute(query).one_or_none()
+    return None if rows is None else _release(rows)
+
+
+def get_release(tx: Tx, item: Item, label: str) -> Release:
+    """Return the revision with this label. Raises NotFoundError."""
+    release = find_release(tx, item, label)
+    if release is None:
+        there = ", ".join(
+            each_release.label for each_release in list_releases(tx, item) if each_release.status in NUMBERED
+        )
         raise NotFoundError(f"{item.part_number} has no revision {label!r}; there is {there or 'none yet'}")
-    return _release(found)
+    return release
 
 
 def approvals_of(tx: Tx, release: Release) -> list[Approval]:
     """Return who approved, in order."""
     row = release_approvals.c
     query = select(release_approvals).where(row.release_id == release.id).order_by(row.at)
-    return [from_row(Approval, one) for one in tx.conn.execute(query)]
+    return [from_row(Approval, each_row) for each_row in tx.conn.execute(query)]
 
 
 def newest_release(tx: Tx, item: Item) -> Release | None:
     """Return the revision that is released now; None if none is."""
     row = releases.c
     query = select(releases).where(row.item_id == item.id, row.status == "released")
-    found = tx.conn.execute(query.order_by(row.id.desc()).limit(1)).one_or_none()
-    return None if found is None else _release(found)
+    rows = tx.conn.execute(query.order_by(row.id.desc()).limit(1)).one_or_none()
+    return None if rows is None else _release(rows)
 
 
 def coming_label(tx: Tx, item: Item) -> str:
     """Return the label of the draft that the item is now."""
-    taken = [one.label for one in list_releases(tx, item) if one.status in NUMBERED]
+    taken = [release.label for release in list_releases(tx, item) if release.status in NUMBERED]
     return next_label(taken, tx.settings.release_labels)
 
 
@@ -158,23 +166,44 @@ def draft_of(tx: Tx, item: Item) -> dict[str, str] | None:
     return {"label": coming_label(tx, item), "released": released.label} if released else None
 
 
-def is_bought(of: Mapping[str, Any]) -> bool:
-    """True for an item that is purchased, by its columns or its record: nobody releases such a part."""
-    return of.get("sourcing_type") == "purchased"
+def item_of(made: Mapping[str, Any], number: int = 0, at: str = "", by: str = "") -> Item:
+    """Return an item as it was frozen, from its record."""
+    return Item(
+        id=number,
+        uuid=made["item"],
+        part_number=made["part_number"],
+        name=made.get("name", ""),
+        description=made.get("description", ""),
+        item_type=made.get("item_type", ""),
+        schema=None,
+        category=made.get("category"),
+        texts={name: made.get(name) for name in ItemTexts.model_fields},
+        thumbnail_key=made.get("thumbnail"),
+        properties=made.get("properties", {}),
+        current_revision=made.get("revision", 0),
+        bom_version=0,
+        version=0,
+        created_at=at,
+        created_by=by,
+        updated_at=at,
+        updated_by=by,
+        archived_at=None,
+        supplier_parts=made.get("supplier_parts", ()),
+    )
 
 
 def unreleased_parts(tx: Tx, record: str) -> list[str]:
     """Return the part numbers in a frozen product with a file or lines that are not released like that."""
     records = read_records(tx, record)
     wanted = {
-        one
-        for one, made in records.items()
-        if one != record and (made["lines"] or made["files"]) and not is_bought(made)
+        uuid
+        for uuid, made in records.items()
+        if uuid != record and (made["lines"] or made["files"]) and not item_of(made).is_bought
     }
     row = releases.c
     of_them = one_of(tx, row.record, wanted) & (row.status == "released")
     done = set(tx.conn.scalars(select(row.record).where(of_them)))
-    return sorted(records[one]["part_number"] for one in wanted - done)
+    return sorted(records[uuid]["part_number"] for uuid in wanted - done)
 
 
 def blocks_of(tx: Tx, release: Release) -> list[str]:
@@ -189,12 +218,12 @@ def submit(
     """Put a frozen product up for review. Raises ConflictError if one is in review or the label is taken."""
     item = get_item(tx, part_number, lock=True)
     before = list_releases(tx, item)
-    if waiting := next((one for one in before if one.status == "review"), None):
+    if waiting := next((each_release for each_release in before if each_release.status == "review"), None):
         raise ConflictError(
             f"revision {waiting.label} of {item.part_number} is in review since {waiting.frozen_at[:10]}; "
             "release, reject or withdraw it first"
         )
-    taken = [one.label for one in before if one.status in NUMBERED]
+    taken = [each_release.label for each_release in before if each_release.status in NUMBERED]
     label = label or next_label(taken, tx.settings.release_labels)
     if not re.fullmatch(RELEASE_LABEL, label, re.ASCII):
         raise RejectedError(
@@ -246,7 +275,7 @@ def approve(tx: Tx, part_number: str, label: str, comment: str, override: str = 
     if blocks and not override:
         shown = "; ".join(blocks[:5]) + (f"; and {len(blocks) - 5} more" if len(blocks) > 5 else "")
         way = (
-            "mend that and submit it again, or say why it is released all the same (override)"
+            "mend that and submit it again, or say why it is released anyway (override)"
             if tx.settings.release_override
             else "mend that and submit it again"
         )
@@ -254,8 +283,8 @@ def approve(tx: Tx, part_number: str, label: str, comment: str, override: str = 
     if blocks and not tx.settings.release_override:
         raise ForbiddenError("this server releases nothing that is blocked (SILO_RELEASE_OVERRIDE)")
     given = approvals_of(tx, release)
-    if tx.actor.username in {one.username for one in given}:
-        raise ConflictError(f"you approved revision {label} already; {_wanted(tx, len(given))}")
+    if tx.actor.username in {each_approval.username for each_approval in given}:
+        raise ConflictError(f"you approved revision {label} already; {_approvals_text(tx, len(given))}")
     approval = {"release_id": release.id, "username": tx.actor.username, "at": tx.stamp, "comment": comment}
     tx.conn.execute(insert(release_approvals).values(approval))
     if blocks:
@@ -286,10 +315,6 @@ def _release_parts(tx: Tx, release: Release, comment: str) -> None:
         row = tx.conn.execute(select(items.c.part_number).where(items.c.uuid == made["item"])).one()
         item = get_item(tx, row.part_number, include_archived=True, lock=True)
         frozen = Frozen(record, {}, (), release.frozen_at)
-        if any(one.status == "review" for one in list_releases(tx, item)):
-            raise ConflictError(
-                f"{item.part_number} is in review by itself; release, reject or withdraw that first"
-            )
         part = submit(tx, item.part_number, frozen, comment)
         _make_released(tx, item, part)
 
@@ -311,7 +336,7 @@ def end(tx: Tx, part_number: str, label: str, status: str, note: str) -> Release
     ended = {"ended_at": tx.stamp, "ended_by": tx.actor.username} if status != "obsolete" else {}
     _change(tx, release, status=status, note=note, **ended)
     _announce(tx, item, release, status)
-    return next(one for one in list_releases(tx, item) if one.id == release.id)
+    return next(each_release for each_release in list_releases(tx, item) if each_release.id == release.id)
 
 
 def _in_review(tx: Tx, part_number: str, label: str) -> tuple[Item, Release]:
@@ -333,7 +358,7 @@ def _check_right(tx: Tx) -> None:
         raise ForbiddenError("a token of the scope read cannot approve")
 
 
-def _wanted(tx: Tx, given: int) -> str:
+def _approvals_text(tx: Tx, given: int) -> str:
     wanted = tx.settings.release_approvals
     return f"{given} of {wanted} approvals are given" if wanted > 1 else "it is released"
 
@@ -343,30 +368,34 @@ def _change(tx: Tx, release: Release, **values: Any) -> None:
 
 
 def _announce(tx: Tx, item: Item, release: Release, what: str) -> None:
-    audit.note(tx, f"release.{what}", item.part_number, f"revision {release.label}")
+    access.note(tx, f"release.{what}", item.part_number, f"revision {release.label}")
     events.released(tx, item, release.label, what)
 
 
 def read_record(tx: Tx, record: str) -> dict[str, Any]:
     """Return one frozen item, by its hash."""
     row = tx.conn.execute(select(frozen_items.c.record).where(frozen_items.c.hash == record)).one()
-    found: dict[str, Any] = json.loads(row.record)
-    return found
+    result: dict[str, Any] = json.loads(row.record)
+    return result
 
 
 def read_records(tx: Tx, record: str) -> dict[str, dict[str, Any]]:
     """Return a frozen item and all that is in it, by their hashes, itself first. Raises TooLargeError."""
-    found: dict[str, dict[str, Any]] = {}
+    records: dict[str, dict[str, Any]] = {}
     level, lines = {record}, 0
     while level:
         row = frozen_items.c
         rows = tx.conn.execute(select(frozen_items).where(one_of(tx, row.hash, level)).order_by(row.hash))
-        read = {one.hash: json.loads(one.record) for one in rows}
-        found |= read
-        lines += sum(len(one["lines"]) for one in read.values())
+        read = {each_record.hash: json.loads(each_record.record) for each_record in rows}
+        records |= read
+        lines += sum(len(each_record["lines"]) for each_record in read.values())
         if lines > tx.settings.max_expanded_rows:
             raise TooLargeError(
                 f"this revision has more than {tx.settings.max_expanded_rows} lines; look at one of its parts"
             )
-        level = {line["child"] for one in read.values() for line in one["lines"]} - found.keys() - {None}
-    return found
+        level = (
+            {line["child"] for each_record in read.values() for line in each_record["lines"]}
+            - records.keys()
+            - {None}
+        )
+    return records

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Revisions: append-only snapshots of an item's properties, each with the file that was uploaded, if any.
 
-A file is a document (:mod:`silo_server.services.documents`). A revision with a file is one of its document;
-it is one of an item too if the document is the item's.
+A file is a document, with its revisions, the items that it holds, and what it links to. A file of exactly
+one item is the item's document: it has the item's UUID and the item's revision numbers, and the item's
+routes show it. A file of several items or of none (a part library, a spreadsheet) has a UUID that its first
+upload names, and revision numbers of its own.
 
-Uploaded files, kept by their SHA-256: written once, never changed, never run, never named by a client.
+Uploaded files are kept by their SHA-256: written once, never changed, never run, never named by a client.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import os
 import shutil
 import struct
 import tempfile
+import uuid as uuids
 import zipfile
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,17 +27,169 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from sqlalchemy import ColumnElement, Row, func, insert, select, update
+from sqlalchemy import ColumnElement, Row, delete, func, insert, select, update
 
+from silo.api.wire import FACTS, FactSource
 from silo.bom.compare import base_of, would_undo
 from silo.bom.errors import NewerRevisionError, NotFoundError
 from silo.platform import no_device_name, remove_patiently, replace_patiently, sync_folder
 from silo_server import events
-from silo_server.db.engine import Tx
-from silo_server.db.tables import items, revisions
-from silo_server.services import documents
+from silo_server.db.engine import Tx, insert_rows, one_of
+from silo_server.db.tables import document_items, document_links, documents, items, revisions
 from silo_server.services.search import index_item
+from silo_server.settings import spec_time
 from silo_server.values import Document, Item, Revision, check_json, dumps, from_row, to_wire
+
+
+@dataclass(frozen=True, slots=True)
+class ShownDocument:
+    """A document as it is now, with the name and the place of its newest file.
+
+    part_number
+        of the item whose document it is; "" without one.
+    holds
+        the items in it: UUID, part number, and the object that each one is ("": the file as a whole).
+    """
+
+    id: str
+    part_number: str
+    revision_number: int
+    file_name: str
+    file_path: str | None
+    file_checksum: str
+    file_size: int
+    comment: str
+    created_at: str
+    created_by: str
+    holds: tuple[Mapping[str, str], ...] = ()
+
+
+def find_document(tx: Tx, uuid: str, *, lock: bool = False) -> Document | None:
+    """Return the document with this UUID; None if there is none.
+
+    ``lock`` makes other writers of it wait until this transaction ends.
+    """
+    if lock:
+        tx.lock(int(hashlib.sha256(uuid.encode()).hexdigest()[:15], 16))
+    row = tx.conn.execute(select(documents).where(documents.c.uuid == uuid)).one_or_none()
+    return None if row is None else from_row(Document, row)
+
+
+def get_document(tx: Tx, uuid: str) -> Document:
+    """Return the document with this UUID. Raises NotFoundError."""
+    document = find_document(tx, uuid)
+    if document is None:
+        raise NotFoundError(f"no document has the UUID {uuid}")
+    return document
+
+
+def document_of(tx: Tx, item: Item) -> Document:
+    """Return the document of an item; its first file makes it. The caller holds the item's lock."""
+    row = tx.conn.execute(select(documents).where(documents.c.item_id == item.id)).one_or_none()
+    if row is not None:
+        return from_row(Document, row)
+    # A document without an item may have been given this UUID before; it keeps it.
+    uuid = item.uuid if find_document(tx, item.uuid) is None else str(uuids.uuid4())
+    return make_document(tx, uuid, item.id)
+
+
+def make_document(tx: Tx, uuid: str, item_id: int | None = None) -> Document:
+    """Make a document that has no revision yet."""
+    row = {"uuid": uuid, "item_id": item_id, "current_revision": 0}
+    tx.conn.execute(insert(documents).values(**row, created_at=tx.stamp, created_by=tx.actor.username))
+    return get_document(tx, uuid)
+
+
+def note_revision(
+    tx: Tx,
+    document: Document,
+    number: int,
+    links: Iterable[Mapping[str, str]],
+    held: Iterable[Mapping[str, str]],
+) -> None:
+    """Note a new revision of a document: what it links to and which items are in it. Unknown items are left
+    out: the server may not have them yet."""
+    tx.conn.execute(update(documents).where(documents.c.id == document.id).values(current_revision=number))
+    for table in (document_items, document_links):
+        tx.conn.execute(delete(table).where(table.c.document_id == document.id))
+    targets = dict.fromkeys(link.get("document") or link.get("item") or "" for link in links)
+    rows = [
+        {"document_id": document.id, "target": target} for target in targets if target and len(target) <= 36
+    ]
+    insert_rows(tx, document_links, rows)
+    objects = {(each_document["item"].lower(), each_document.get("object", "")) for each_document in held}
+    where = select(items.c.uuid, items.c.id).where(one_of(tx, items.c.uuid, {uuid for uuid, _ in objects}))
+    ids = {row.uuid: row.id for row in tx.conn.execute(where)}
+    pairs = {(ids[uuid], name) for uuid, name in objects if uuid in ids}
+    if document.item_id is not None and document.item_id not in {item for item, _ in pairs}:
+        pairs.add((document.item_id, ""))
+    rows = [
+        {"document_id": document.id, "item_id": each_document, "object": name}
+        for each_document, name in sorted(pairs)
+    ]
+    insert_rows(tx, document_items, rows)
+
+
+def documents_holding(tx: Tx, item: Item) -> list[Document]:
+    """Return the documents whose newest revision holds an item, its own first."""
+    query = select(documents).where(
+        documents.c.id.in_(select(document_items.c.document_id).where(document_items.c.item_id == item.id))
+    )
+    rows = [from_row(Document, row) for row in tx.conn.execute(query.order_by(documents.c.id))]
+    return sorted(rows, key=lambda document: document.item_id != item.id)
+
+
+def linking_to(tx: Tx, document: Document) -> list[Document]:
+    """Return the documents whose newest revision links to this one."""
+    sources = select(document_links.c.document_id).where(document_links.c.target == document.uuid)
+    query = select(documents).where(documents.c.id.in_(sources)).order_by(documents.c.id)
+    return [from_row(Document, row) for row in tx.conn.execute(query)]
+
+
+def linked_from(tx: Tx, document: Document) -> list[Document]:
+    """Return the documents that the newest revision of this one links to."""
+    targets = select(document_links.c.target).where(document_links.c.document_id == document.id)
+    query = select(documents).where(documents.c.uuid.in_(targets)).order_by(documents.c.id)
+    return [from_row(Document, row) for row in tx.conn.execute(query)]
+
+
+def documents_by_uuid(tx: Tx, wanted: Sequence[str]) -> list[Document]:
+    """Return the documents with these UUIDs; those that are missing are absent."""
+    query = select(documents).where(one_of(tx, documents.c.uuid, {uuid.lower() for uuid in wanted}))
+    return [from_row(Document, row) for row in tx.conn.execute(query.order_by(documents.c.id))]
+
+
+def shown(tx: Tx, several: Sequence[Document]) -> list[ShownDocument]:
+    """Return documents as they are now, in the order given; one without a file yet is left out."""
+    ids = [each_document.id for each_document in several]
+    newest = (
+        select(documents.c.id.label("of"), documents.c.uuid, items.c.part_number, revisions)
+        .join(revisions, revisions.c.document_id == documents.c.id)
+        .outerjoin(items, items.c.id == documents.c.item_id)
+        .where(one_of(tx, documents.c.id, ids))
+        .where(revisions.c.revision_number == documents.c.current_revision)
+    )
+    held: dict[int, list[Mapping[str, str]]] = {}
+    query = (
+        select(document_items, items.c.uuid, items.c.part_number)
+        .join(items, items.c.id == document_items.c.item_id)
+        .where(one_of(tx, document_items.c.document_id, ids))
+    )
+    for each in tx.conn.execute(query.order_by(document_items.c.object, items.c.part_number_key)):
+        document = {"item": each.uuid, "part_number": each.part_number, "object": each.object}
+        held.setdefault(each.document_id, []).append(document)
+    by_item: dict[int, Any] = {each.of: each for each in tx.conn.execute(newest)}
+    return [
+        from_row(
+            ShownDocument,
+            row,
+            id=row.uuid,
+            part_number=row.part_number or "",
+            holds=tuple(held.get(row.of, ())),
+        )
+        for row in map(by_item.get, ids)
+        if row is not None
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +226,13 @@ def add_revision(
     properties: Mapping[str, Any] | None = None,
     file: StoredFile | None = None,
     origin: Origin = Origin(),
+    source: FactSource = "hand",
 ) -> Revision:
     """Append a revision of an item, or of a document without one. Without ``properties`` it carries those of
     the one before on.
+
+    source
+        where mass, material and the like come from, if they differ.
 
     A file that was made from an older revision than the newest is refused (:class:`NewerRevisionError`).
 
@@ -87,7 +246,7 @@ def add_revision(
     number = (last or 0) + 1
     item, document = (of, None) if isinstance(of, Item) else (None, of)
     if item is not None and file is not None:
-        document = documents.of_item(tx, item)
+        document = document_of(tx, item)
     before = item.properties if item is not None else {}
     snapshot = dict(before) if properties is None else dict(properties)
     tx.conn.execute(
@@ -110,20 +269,43 @@ def add_revision(
         )
     )
     if document is not None:
-        documents.revised(tx, document, number, origin.links or (), origin.items or ())
+        note_revision(tx, document, number, origin.links or (), origin.items or ())
     if item is not None:
-        changed: dict[str, Any] = {"current_revision": number, "properties": dumps(snapshot)}
+        changed: dict[str, Any] = {"current_revision": number}
         if file and file.thumbnail_key:
             changed["thumbnail_key"] = file.thumbnail_key
-        tx.conn.execute(
-            update(items)
-            .where(items.c.id == item.id)
-            .values(**changed, version=items.c.version + 1, updated_at=tx.stamp, updated_by=tx.actor.username)
-        )
-        index_item(tx, item.id)
+        _keep(tx, item, snapshot, source, changed)
     revision = get_revision(tx, of, number)
     events.revision_created(tx, of, revision)
     return revision
+
+
+def _keep(
+    tx: Tx, item: Item, properties: Mapping[str, Any], source: FactSource, changed: Mapping[str, Any]
+) -> None:
+    """Give an item its properties, with where they come from, and other values that changed."""
+    now = {**properties, **changed}
+    new = {name for name in FACTS if properties.get(name) != item.properties.get(name)}
+    new |= {"description"} & changed.keys()
+    origins = {name: origin for name, origin in item.origins.items() if name not in new}
+    origins |= {name: {"source": source, "at": spec_time(tx.stamp)} for name in new if name in now}
+    values = {**changed, "properties": dumps(properties), "origins": dumps(origins) if origins else None}
+    stamped = {"version": items.c.version + 1, "updated_at": tx.stamp, "updated_by": tx.actor.username}
+    tx.conn.execute(update(items).where(items.c.id == item.id).values(**values, **stamped))
+    index_item(tx, item.id)
+
+
+def complete(
+    tx: Tx, item: Item, checksum: str, properties: Mapping[str, Any], changed: Mapping[str, Any]
+) -> None:
+    """Give an item what its file states, in the revision of that file; after a later one in a new one."""
+    last = get_revision(tx, item, item.current_revision) if item.current_revision else None
+    if last is not None and last.file_checksum != checksum and properties != item.properties:
+        add_revision(tx, item, comment="as its file states", properties=properties, source="cad")
+    elif last is not None:
+        mine = _of(item) & (revisions.c.revision_number == last.revision_number)
+        tx.conn.execute(update(revisions).where(mine).values(properties=dumps(dict(properties))))
+    _keep(tx, item, properties, "cad", changed)
 
 
 def _check_base(tx: Tx, of: Item | Document, base: int | None, checksum: str | None) -> None:
@@ -180,17 +362,33 @@ def get_revision(tx: Tx, of: Item | Document, number: int) -> Revision:
     return _to_revision(row)
 
 
-def newest_file(tx: Tx, of: Item | Document) -> Revision:
-    """The newest revision with a file: the item's own, else that of the document that holds the item.
+def with_file(tx: Tx, of: Item | Document) -> Item | Document:
+    """Return whose revisions have the file: the item, or the document that holds it. NotFoundError."""
+    holders = documents_holding(tx, of) if isinstance(of, Item) else []
+    for one in (of, *holders):
+        if _newest_file(tx, one) is not None:
+            return one
+    raise NotFoundError(f"{of.subject} has no file yet")
 
-    NotFoundError if there is none.
-    """
-    newest = _newest_file(tx, of)
-    if newest is None and isinstance(of, Item):
-        newest = next(filter(None, (_newest_file(tx, one) for one in documents.holding(tx, of))), None)
-    if newest is None:
-        raise NotFoundError(f"{of.subject} has no file yet")
+
+def newest_file(tx: Tx, of: Item | Document) -> Revision:
+    """Return the newest revision with a file. Raises NotFoundError."""
+    newest = _newest_file(tx, with_file(tx, of))
+    assert newest is not None
     return newest
+
+
+def files_until(tx: Tx, item: Item, until: str, limit: int = 1) -> list[int]:
+    """Return the numbers of the ``limit`` newest revisions with a file that were there at a time."""
+    try:
+        of = with_file(tx, item)
+    except NotFoundError:
+        return []
+    row = revisions.c
+    where = select(row.revision_number).where(
+        _of(of), row.file_checksum.is_not(None), row.created_at <= until
+    )
+    return list(tx.conn.scalars(where.order_by(row.revision_number.desc()).limit(limit)))
 
 
 def _newest_file(tx: Tx, of: Item | Document) -> Revision | None:
@@ -223,6 +421,8 @@ MAX_DIRECTORY = 4 * 1024 * 1024
 END_MARK = b"PK\x05\x06"
 END_SIZE = 22
 PNG = b"\x89PNG\r\n\x1a\n"
+# Width and height in a PNG. Without a 3D view FreeCAD saves its icon, smaller than any picture that it takes.
+ICON = (64).to_bytes(4) * 2
 
 
 class FileStore:
@@ -277,10 +477,10 @@ class FileStore:
         """What came before this time (seconds since 1970), half-written uploads too."""
         if not self.root.is_dir():
             return []
-        found = [path for path in self.root.glob("??/??/*") if _came_before(path, before)]
+        paths = [path for path in self.root.glob("??/??/*") if _came_before(path, before)]
         for pattern in ("upload-*", "restore-*"):
-            found += [path for path in self.root.glob(pattern) if _came_before(path, before)]
-        return found
+            paths += [path for path in self.root.glob(pattern) if _came_before(path, before)]
+        return paths
 
     def remove_old(self, path: Path, before: float) -> bool:
         """Delete what :meth:`older_than` named; False where the same content was uploaded again meanwhile."""
@@ -371,7 +571,7 @@ def clean_name(name: str) -> str:
 
 
 def read_thumbnail(path: Path) -> bytes | None:
-    """The picture inside an FCStd file, None where there is none. The file is not to be trusted."""
+    """Return the picture inside an untrusted FCStd file; None if it has none but FreeCAD's icon."""
     try:
         if _directory_size(path) > MAX_DIRECTORY:
             return None
@@ -382,14 +582,13 @@ def read_thumbnail(path: Path) -> bytes | None:
         KeyError,
         OSError,
         RuntimeError,
-        NotImplementedError,
         EOFError,
         zlib.error,
         lzma.LZMAError,
         ValueError,
     ):
         return None
-    return data if data.startswith(PNG) and len(data) <= MAX_THUMBNAIL else None
+    return data if data.startswith(PNG) and data[16:24] != ICON and len(data) <= MAX_THUMBNAIL else None
 
 
 def _directory_size(path: Path) -> int:

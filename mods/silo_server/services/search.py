@@ -5,8 +5,8 @@ The words are made here and not by the databases, so that both find the same: ca
 everything but letters and digits parts words. A part number is found also without its dashes; in a number and
 a name the middle of a word is enough ("schraube" finds "Zylinderschraube"), elsewhere its beginning is.
 
-What is looked into: number, name, descriptions, texts among the properties (supplier, supplier's number,
-material, …) and the names of the uploaded files.
+What is looked into: number, name, descriptions, suppliers with their numbers, texts among the properties and
+the names of the uploaded files.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ from silo.api.wire import ItemTexts
 from silo.bom.resolve import folded, glued, name_key
 from silo_server.db.engine import Tx, get_state, one_of, put_state
 from silo_server.db.tables import items, revisions
-from silo_server.schema.catalog import text_hints
+from silo_server.schema import text_hints
 
-# Counts up when the rules below change; the next start then makes the index anew.
+# Counts up when the rules below change; the next start then makes the index again.
 RULES = "2"
 STATE = "search_index"
 PAGE = 1000
@@ -49,6 +49,8 @@ PAGE = 1000
 LONGEST_WORD = 64
 MOST_WORDS = 500
 LONGEST_PROPERTY = 200
+# What a filter has read is kept for the next one, in some 10 MB.
+LONGEST_KEPT = 200
 
 _WORD = re.compile(r"[^\W_]+")
 _RUNS = re.compile(r"(?<=[^\W\d_])\d+")
@@ -69,11 +71,18 @@ def fits(asked: str) -> Callable[..., bool]:
     def test(*texts: str | None) -> bool:
         if not wanted:
             return True
-        written = " ".join(words_of(" ".join(text for text in texts if text)))
-        joined = written.replace(" ", "")
+        text = " ".join(text for text in texts if text)
+        written, joined = (_read if len(text) <= LONGEST_KEPT else _read.__wrapped__)(text)
         return all(word in written or word in joined for word in wanted)
 
     return test
+
+
+@lru_cache(maxsize=16384)
+def _read(text: str) -> tuple[str, str]:
+    """The words of a text, with spaces between them and without; the caller filters again."""
+    words = words_of(text)
+    return " ".join(words), "".join(words)
 
 
 def search_for(tx: Tx, written: str) -> tuple[ColumnElement[bool], ColumnElement[int]] | None:
@@ -130,7 +139,7 @@ def ensure_index(tx: Tx) -> int:
 
 
 def rebuild_index(tx: Tx) -> int:
-    """Make the whole index anew."""
+    """Make the whole index again."""
     tx.conn.execute(text("DELETE FROM item_search"))
     count = last = 0
     while True:
@@ -154,7 +163,7 @@ def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
     files = files.where(one_of(tx, revisions.c.item_id, ids), revisions.c.file_name.is_not(None))
     for item_id, name in tx.conn.execute(files):
         names.setdefault(item_id, []).append(name)
-    found = tx.conn.execute(
+    index_rows = tx.conn.execute(
         select(
             items.c.id,
             items.c.part_number,
@@ -162,6 +171,8 @@ def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
             items.c.description,
             *(items.c[name] for name in _TEXTS),
             items.c.properties,
+            items.c.supplier_parts,
+            items.c.made_from,
         ).where(one_of(tx, items.c.id, ids))
     ).all()
     rows = [
@@ -170,11 +181,21 @@ def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
             "number": _inner({*words_of(row.part_number), _joined(row.part_number)}),
             "name": _inner({*words_of(row.name), *words_of(glued(folded(row.name)))}),
             "other": _limited(
-                [row.description, *(getattr(row, name) or "" for name in _TEXTS), *names.get(row.id, ())],
+                [
+                    row.description,
+                    *(getattr(row, name) or "" for name in _TEXTS),
+                    *names.get(row.id, ()),
+                    row.made_from or "",
+                    *(
+                        load[k]
+                        for load in json.loads(row.supplier_parts or "[]")
+                        for k in ("supplier", "number")
+                    ),
+                ],
                 row.properties,
             ),
         }
-        for row in found
+        for row in index_rows
     ]
     if not rows:
         return
@@ -229,10 +250,10 @@ def _joined(number: str) -> str:
 
 def _inner(words: Iterable[str]) -> set[str]:
     """Words and their ends, so that the beginning of an end, which is any part of a word, is found."""
-    found: set[str] = set()
+    result: set[str] = set()
     for word in list(filter(None, words))[:MOST_WORDS]:  # a number of signs alone has no word
-        found |= _ends(word)
-    return found
+        result |= _ends(word)
+    return result
 
 
 @lru_cache(maxsize=4096)
@@ -242,17 +263,17 @@ def _ends(word: str) -> frozenset[str]:
 
 
 def _limited(texts: Iterable[str], properties: str) -> set[str]:
-    found: set[str] = set()
+    words_within: set[str] = set()
     for written in [*texts, *_texts(json.loads(properties))]:
         words = words_of(written)
-        found.update(words, words_of(glued(folded(written))))
+        words_within.update(words, words_of(glued(folded(written))))
         for word in words:  # only the beginnings of these words are found: "iso4762" by its number too
-            found.update(_RUNS.findall(word))
+            words_within.update(_RUNS.findall(word))
         if len(words) > 1 and len(written) <= LONGEST_WORD and any(c.isdigit() for c in written):
-            found.add(_joined(written))  # a supplier's number, without its dashes too
-        if len(found) > MOST_WORDS:
+            words_within.add(_joined(written))  # a supplier's number, without its dashes too
+        if len(words_within) > MOST_WORDS:
             break
-    return set(sorted(found)[:MOST_WORDS])
+    return set(sorted(words_within)[:MOST_WORDS])
 
 
 def _texts(value: Any) -> Iterator[str]:
@@ -296,10 +317,8 @@ def find_look_alikes(tx: Tx, wanted: Sequence[tuple[str, str]]) -> list[list[Loo
             same += islice((row for row in rows if name_key(row.name) == key), MOST_LOOK_ALIKES)
     for digest, having in files.items():
         if _SHA256.fullmatch(digest):
-            near = select(*columns, items.c.properties).where(live, _matches(tx, [digest], ""))
-            for row in tx.conn.execute(near):
-                if str(json.loads(row.properties).get("file_sha256")).lower() == digest:
-                    having[row.id] = row
+            near = select(*columns, items.c.made_from).where(live, _matches(tx, [digest], ""))
+            having.update((row.id, row) for row in tx.conn.execute(near) if row.made_from == digest)
     query = select(*columns, revisions.c.file_checksum).join(items).where(live)
     for row in tx.conn.execute(query.where(one_of(tx, revisions.c.file_checksum, list(files)))):
         files[row.file_checksum][row.id] = row

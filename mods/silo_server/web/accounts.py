@@ -21,8 +21,7 @@ from silo.api.wire import login_code
 from silo.bom.errors import AuthError, ConflictError, ForbiddenError, RejectedError, SiloError
 from silo_server import events
 from silo_server.db.engine import mode_of
-from silo_server.operation.housekeeping import last_run
-from silo_server.operation.metrics import standing
+from silo_server.housekeeping import last_run, standing
 from silo_server.routes.context import (
     FORM_TYPES,
     SAFE_METHODS,
@@ -38,13 +37,13 @@ from silo_server.routes.context import (
     server_of,
 )
 from silo_server.routes.system import set_session_cookie
-from silo_server.services.access import accounts, audit, credentials, logins
+from silo_server.services import access
 from silo_server.settings import TooManyAttemptsError
 from silo_server.values import Actor, Role, Scope
 from silo_server.web.forms import (
     MOST_KEPT,
     Form,
-    Kept,
+    UnsentForm,
     back,
     back_with_secret,
     compared,
@@ -57,7 +56,7 @@ from silo_server.web.forms import (
     text,
     unpacked,
 )
-from silo_server.web.render import page, page_for, part_of, sentence
+from silo_server.web.render import LANGUAGE_COOKIE, LANGUAGES, _, page, page_for, part_of, sentence
 
 router = APIRouter(include_in_schema=False)
 
@@ -65,7 +64,7 @@ router = APIRouter(include_in_schema=False)
 class LoginNeededError(Exception):
     """Nobody is logged in; the login page leads back to ``target``, or to the form that was ``kept``."""
 
-    def __init__(self, target: str, kept: Kept | None = None) -> None:
+    def __init__(self, target: str, kept: UnsentForm | None = None) -> None:
         super().__init__(target)
         self.target, self.kept = target, kept
 
@@ -73,7 +72,7 @@ class LoginNeededError(Exception):
 class OldFormError(Exception):
     """A form of ours that was shown in an earlier session; the person is asked whether to send it now."""
 
-    def __init__(self, actor: Actor, kept: Kept) -> None:
+    def __init__(self, actor: Actor, kept: UnsentForm) -> None:
         super().__init__(kept.path)
         self.actor, self.kept = actor, kept
 
@@ -85,19 +84,19 @@ class PageGuard(Guard):
         try:
             return await super().__call__(request)
         except FormSecretError:
-            kept, actor = await _kept(request), await anyio.to_thread.run_sync(find_actor, request)
+            kept, actor = await _pending_form(request), await anyio.to_thread.run_sync(find_actor, request)
             if kept is None or actor is None or not own_site(request):
                 raise
             raise OldFormError(actor, kept) from None
         except AuthError as error:
-            kept = await _kept(request)
+            kept = await _pending_form(request)
             if error.status_hint != 401:
                 request.state.kept = kept
                 raise
-            raise LoginNeededError(_here(request), kept if own_site(request) else None) from None
+            raise LoginNeededError(_referring_page(request), kept if own_site(request) else None) from None
 
 
-async def _kept(request: Request) -> Kept | None:
+async def _pending_form(request: Request) -> UnsentForm | None:
     """What the request's form holds; None where it is none, or too large to be carried along."""
     length = request.headers.get("content-length", "")
     small = length.isdigit() and int(length) <= MOST_KEPT
@@ -118,10 +117,10 @@ def own_form(request: Request) -> None:
     A browser says where a form comes from; a page elsewhere must not log somebody in under its own name.
     """
     if own_site(request) is False:
-        raise ForbiddenError("this form was sent by another site; log in on the login page itself")
+        raise ForbiddenError(_("this form was sent by another site; log in on the login page itself"))
 
 
-def _here(request: Request) -> str:
+def _referring_page(request: Request) -> str:
     if request.method in SAFE_METHODS:
         query = f"?{request.url.query}" if request.url.query else ""
         return request.url.path + query
@@ -132,7 +131,7 @@ def _here(request: Request) -> str:
 
 
 def _login_page(
-    request: Request, target: str, problem: str = "", status: int = 200, kept: Kept | None = None
+    request: Request, target: str, problem: str = "", status: int = 200, kept: UnsentForm | None = None
 ) -> Response:
     values = {"target": target, "problem": problem, "kept": kept}
     return page_for(request, None, "login.html", status=status, **values)
@@ -156,6 +155,7 @@ async def send_again(request: Request, error: Exception) -> Response:
 
 
 START = "/"
+LANGUAGE_SECONDS = 400 * 86_400  # no browser keeps a cookie for longer
 Next = Annotated[str, Query(max_length=500)]
 
 
@@ -177,17 +177,17 @@ def log_in(request: Request, server: ServerDep, form: Form) -> Response:
     if "already" in form:
         actor = find_actor(request)
         if actor is None:
-            return _login_page(request, target, "You are not logged in yet in this browser.", 401, kept)
+            return _login_page(request, target, _("You are not logged in yet in this browser."), 401, kept)
         return page_for(request, actor, "again.html", kept=kept) if kept else back(target)
     try:
-        session = logins.log_in(
+        session = access.log_in(
             server.db, text(form, "username", 200), password_of(form, "password"), client_address(request)
         )
     except (AuthError, TooManyAttemptsError) as error:
         return _login_page(request, target, str(error), error.status_hint, kept)
     if kept is None:
         return _with_session(request, session, target)
-    actor = logins.actor_by_session(server.db, session.secret, client_address(request))
+    actor = access.actor_by_session(server.db, session.secret, client_address(request))
     shown = page_for(request, actor, "again.html", kept=kept)
     set_session_cookie(shown, request, session)
     return shown
@@ -204,7 +204,7 @@ def use_link(request: Request, server: ServerDep, secret: str, form: Form) -> Re
     """Begin a session by a one-time link; one that was used already leads on where the session lives."""
     target = local_path(text(form, "next"))
     try:
-        session = logins.use_login_link(server.db, secret, client_address(request))
+        session = access.use_login_link(server.db, secret, client_address(request))
     except AuthError as error:
         if find_actor(request) is not None:
             return back(target)
@@ -226,20 +226,31 @@ def ask_for_program(call: Reader, name: ProgramName, proof: Proof) -> Response:
 def let_program_in(call: Reader, name: ProgramName, proof: Proof) -> Response:
     """Make a token whose secret only the program knows: no more than its SHA-256 came here."""
     with call.write(even_when_read_only=True) as tx:
-        credentials.let_program_in(tx, name, proof)
-    return back("/account", f"{name} is logged in. You may close this page.")
+        access.let_program_in(tx, name, proof)
+    return back("/account", _("%(name)s is logged in. You may close this page.", name=name))
 
 
 @router.post("/logout")
 def log_out(call: Reader) -> Response:
     """End the session."""
-    logins.log_out(call.server.db, call.actor)
+    access.log_out(call.server.db, call.actor)
     response = RedirectResponse("/login", 303)
     response.delete_cookie(SESSION_COOKIE)
     return response
 
 
-def _with_session(request: Request, session: logins.NewSession, target: str) -> Response:
+@router.post("/language", dependencies=[Depends(own_form)])
+def choose_language(form: Form) -> Response:
+    """Keep the language that a person chose in this browser."""
+    chosen = text(form, "language")
+    if chosen not in LANGUAGES:
+        raise RejectedError(f"language: wanted one of {', '.join(LANGUAGES)}, got {chosen!r}")
+    response = back(local_path(text(form, "next")))
+    response.set_cookie(LANGUAGE_COOKIE, chosen, max_age=LANGUAGE_SECONDS, httponly=True, samesite="lax")
+    return response
+
+
+def _with_session(request: Request, session: access.NewSession, target: str) -> Response:
     response = back(target)
     set_session_cookie(response, request, session)
     return response
@@ -264,7 +275,7 @@ def create_user(call: Administrator, form: Form) -> Response:
     username = typed["username"]
     try:
         with call.write(even_when_read_only=True) as tx:
-            accounts.create_user(
+            access.create_user(
                 tx,
                 username,
                 _role(typed["role"]),
@@ -273,7 +284,7 @@ def create_user(call: Administrator, form: Form) -> Response:
             )
     except SiloError as error:
         return _show(call, problem=str(error), status=error.status_hint, typed=typed)
-    return back("/users", f"User {username} is made.")
+    return back("/users", _("User %(username)s is made.", username=username))
 
 
 @router.post("/users/{username}")
@@ -283,7 +294,7 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
     seen = {name: text(form, f"was_{name}") for name in typed if f"was_{name}" in form}
     try:
         with call.write(even_when_read_only=True) as tx:
-            user = accounts.get_user(tx, username)
+            user = access.get_user(tx, username)
             now = {
                 "role": user.role.value,
                 "active": "yes" if user.active else "no",
@@ -292,10 +303,14 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
             edit = compared(now, seen, typed)
             if edit.clashes:
                 raise ConflictError(
-                    f"{username} was changed by somebody else meanwhile, and stays as this page shows it now"
+                    _(
+                        "%(username)s was changed by somebody else meanwhile, and stays as this page "
+                        "shows it now",
+                        username=username,
+                    )
                 )
             role, active, approver = map(edit.mine.get, ("role", "active", "approver"))
-            accounts.change_user(
+            access.change_user(
                 tx,
                 username,
                 role=_role(role) if role is not None else None,
@@ -304,15 +319,18 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
             )
     except SiloError as error:
         return _show(call, problem=str(error), status=error.status_hint)
-    return back("/users", f"User {username} is changed." if edit.mine else "Nothing was different.")
+    return back(
+        "/users",
+        _("User %(username)s is changed.", username=username) if edit.mine else _("Nothing was different."),
+    )
 
 
 @router.post("/users/{username}/login-link")
 def create_login_link(call: Administrator, username: str) -> Response:
     """A link that lets this user in once; it is shown once, on the page that this leads to."""
     with call.write(even_when_read_only=True) as tx:
-        secret = logins.create_login_link(tx, username)
-        audit.note(tx, "login_link.created", username)
+        secret = access.create_login_link(tx, username)
+        access.note(tx, "login_link.created", username)
     # Not by the Host header, which the caller chooses: the link is sent on, and lets its holder in.
     link = f"{call.server.settings.public_url or ''}/login/link/{secret}"
     return back_with_secret(call.request, "/users", username, link)
@@ -323,11 +341,12 @@ def set_mode(call: Administrator, form: Form) -> Response:
     """Take changes, or take none until set otherwise."""
     mode = text(form, "mode")
     if mode not in MODES:
-        raise RejectedError("mode: wanted normal or read-only; load the page again")
+        raise RejectedError(_("mode: wanted normal or read-only; load the page again"))
     with call.write(even_when_read_only=True) as tx:
         events.set_mode(tx, mode)
     return back(
-        "/users", "The server takes changes." if mode == "normal" else "The server takes no changes now."
+        "/users",
+        _("The server takes changes.") if mode == "normal" else _("The server takes no changes now."),
     )
 
 
@@ -335,18 +354,18 @@ def set_mode(call: Administrator, form: Form) -> Response:
 def system_page(call: Administrator) -> Response:
     """How the server is, for those who look after it."""
     server = call.server
-    told = standing(server.db, server.hub, server.files, server.large_reads)
+    state = standing(server.db, server.hub, server.files, server.large_reads)
     with call.read() as tx:
-        last = told["backup"]
+        last = state["backup"]
         days = (tx.at - datetime.fromisoformat(last["at"])).days if last else None
-    return page(call, "system.html", told=told, backup_days=days)
+    return page(call, "system.html", told=state, backup_days=days)
 
 
 @router.get("/audit")
 def audit_page(call: Administrator, before: PageFrom = None, after: PageFrom = None) -> Response:
     """Who did what, newest first."""
     with call.read() as tx:
-        part = part_of(partial(audit.list_entries, tx), AUDIT_SIZE, before, after)
+        part = part_of(partial(access.list_entries, tx), AUDIT_SIZE, before, after)
     return page(call, "audit.html", entries=part.rows, part=part)
 
 
@@ -359,8 +378,8 @@ def _show(
     typed: Mapping[str, str] | None = None,
 ) -> Response:
     with call.read() as tx:
-        users = accounts.list_users(tx)
-        tokens = [token for token in credentials.list_tokens(tx) if token.revoked_at is None]
+        users = access.list_users(tx)
+        tokens = [token for token in access.list_tokens(tx) if token.revoked_at is None]
         now, mode = tx.stamp, mode_of(tx)
         run = last_run(tx)
     return page(
@@ -378,7 +397,7 @@ def _show(
         link=link,
         typed=typed or {},
         minutes=int(call.server.settings.login_link_seconds // 60),
-        shortest=accounts.MIN_PASSWORD,
+        shortest=access.MIN_PASSWORD,
     )
 
 
@@ -386,7 +405,9 @@ def _role(name: str) -> Role:
     try:
         return Role(name)
     except ValueError:
-        raise RejectedError(f"role: wanted one of {', '.join(Role)}, got {name!r}") from None
+        raise RejectedError(
+            _("role: wanted one of %(roles)s, got %(name)r", roles=", ".join(Role), name=name)
+        ) from None
 
 
 LIFETIMES = {"30": 30, "90": 90, "365": 365, "": None}
@@ -406,15 +427,15 @@ def create_token(call: Reader, form: Form) -> Response:
     """Make a token. Its secret is shown once, on the page that this leads to."""
     name, ends, wanted = text(form, "name"), text(form, "days"), text(form, "scope") or Scope.WRITE
     if not 0 < len(name) <= 200:
-        return _own_page(call, problem="A token needs a name of at most 200 characters.")
+        return _own_page(call, problem=_("A token needs a name of at most 200 characters."))
     if ends not in LIFETIMES or wanted not in list(Scope):
-        return _own_page(call, problem="Choose one of the lifetimes, and one of the scopes.")
+        return _own_page(call, problem=_("Choose one of the lifetimes, and one of the scopes."))
     days, scope, secret = LIFETIMES[ends], Scope(wanted), None
     if key := text(form, "key"):
-        secret = credentials.secret_of_form(call.actor, key, name, ends, wanted)
+        secret = access.secret_of_form(call.actor, key, name, ends, wanted)
     try:
         with call.write(even_when_read_only=True) as tx:
-            _, secret = credentials.create_own_token(
+            _token, secret = access.create_own_token(
                 tx, name, days=days, forever=days is None, scope=scope, secret=secret
             )
     except ConflictError as error:
@@ -425,11 +446,11 @@ def create_token(call: Reader, form: Form) -> Response:
 @router.post("/account/tokens/{token_id}/revoke")
 def revoke_token(call: Reader, token_id: TokenId, form: Form) -> Response:
     """Revoke a token: one's own, or anybody's for an admin."""
-    credentials.check_may_change(call.actor)
+    access.check_may_change(call.actor)
     owner = None if call.actor.role is Role.ADMIN else call.actor.own_id
     with call.write(even_when_read_only=True) as tx:
-        credentials.revoke_token(tx, token_id, owner)
-    return back("/users" if text(form, "from") == "users" else "/account", "The token is revoked.")
+        access.revoke_token(tx, token_id, owner)
+    return back("/users" if text(form, "from") == "users" else "/account", _("The token is revoked."))
 
 
 @router.post("/account/password")
@@ -438,20 +459,20 @@ def set_password(call: Reader, form: Form) -> Response:
     password, again = password_of(form, "password"), password_of(form, "again")
     try:
         if password != again:
-            raise RejectedError("The two passwords differ.")
-        logins.set_own_password(call.server.db, call.actor, password, password_of(form, "current"))
+            raise RejectedError(_("The two passwords differ."))
+        access.set_own_password(call.server.db, call.actor, password, password_of(form, "current"))
     except (RejectedError, TooManyAttemptsError) as error:
         return _own_page(call, problem=str(error))
-    response = back("/login", "The password is set. Log in with it.")
+    response = back("/login", _("The password is set. Log in with it."))
     response.delete_cookie(SESSION_COOKIE)
     return response
 
 
 def _own_page(call: Call, *, problem: str = "", fresh: tuple[str, str] | None = None) -> Response:
     with call.read() as tx:
-        tokens = credentials.list_tokens(tx, call.actor.own_id)
+        tokens = access.list_tokens(tx, call.actor.own_id)
         now = tx.stamp
-        user = accounts.get_user(tx, call.actor.username)
+        user = access.get_user(tx, call.actor.username)
     return page(
         call,
         "account.html",
@@ -465,5 +486,5 @@ def _own_page(call: Call, *, problem: str = "", fresh: tuple[str, str] | None = 
         asks_password=not call.actor.by_link,
         problem=sentence(problem),
         fresh=fresh,
-        shortest=accounts.MIN_PASSWORD,
+        shortest=access.MIN_PASSWORD,
     )

@@ -7,46 +7,77 @@ What happened to a BOM: every change, any two points side by side, and the way b
 from __future__ import annotations
 
 import json
-from collections import Counter
-from collections.abc import Mapping
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import date, timedelta
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from fastapi import APIRouter, Query
 from starlette.responses import Response
 
-from silo.bom.errors import NotFoundError, RejectedError, VersionConflictError, counted
+from silo.bom.errors import NotFoundError, RejectedError, VersionConflictError
 from silo_server import events
 from silo_server.events import EventQuery, LoggedEvent
 from silo_server.routes.context import Call, PageFrom
 from silo_server.services import revisions
 from silo_server.services.bom import history, tree
-from silo_server.services.bom.summary import last_look
+from silo_server.services.bom.frozen import changes_of
+from silo_server.services.bom.review import last_look
 from silo_server.services.items import get_by_uuids, get_item
+from silo_server.services.releases import NUMBERED, list_releases
 from silo_server.settings import ArchivedPartsError
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.line_form import changes, sentences
 from silo_server.web.merge_page import bom_path
-from silo_server.web.render import Address, Part, isolate, page, part_of, segment, sentence
+from silo_server.web.render import N_, Address, ListPart, _, isolate, page, part_of, plural, segment, sentence
 
 router = APIRouter(include_in_schema=False)
 
 MOST = 100
-# What a person may look for, and the events that it is.
-KINDS = {
-    "syncs": ("bom_merge",),
-    "BOM edits": ("bom.updated",),
-    "items": ("item.created", "item.updated", "item.deleted"),
-    "files and revisions": ("revision.created", "document.revised"),
-    "reviews and releases": ("revision.reviewed", "revision.released"),
-    "the server": ("server.state",),
+
+
+class EventView(NamedTuple):
+    """How the page shows events of a name.
+
+    kind
+        what a person may look for.
+    words
+        with values of the event's data.
+    below
+        the page of the item that it links to.
+    """
+
+    kind: str
+    words: str
+    below: str = ""
+
+
+EVENTS = {
+    "bom_merge": EventView(N_("syncs"), N_("BOM merged from CAD"), "/bom"),
+    "bom.updated": EventView(N_("BOM edits"), N_("BOM: {summary}"), "/bom"),
+    "item.created": EventView(N_("items"), N_("registered")),
+    "item.updated": EventView(N_("items"), "{summary}"),
+    "item.deleted": EventView(N_("items"), N_("archived")),
+    "revision.created": EventView(N_("files and revisions"), N_("revision {revision_number}{comment}")),
+    "document.revised": EventView(N_("files and revisions"), N_("revision {revision_number}{comment}")),
+    "revision.reviewed": EventView(
+        N_("reviews and releases"), N_("revision {revision} {status}"), "/releases"
+    ),
+    "revision.released": EventView(
+        N_("reviews and releases"), N_("revision {revision} {status}"), "/releases"
+    ),
+    "server.state": EventView(N_("the server"), N_("The server takes {changes}")),
 }
-NAMES = tuple(name for names in KINDS.values() for name in names)
+KINDS = {
+    kind: tuple(name for name, shown in EVENTS.items() if shown.kind == kind)
+    for kind in dict.fromkeys(shown.kind for shown in EVENTS.values())
+}
+NAMES = tuple(EVENTS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +123,11 @@ def activity_page(
         else:
             # The newest of them, where there are more than a page holds.
             newest = [event for event in events.newest(tx, asked, MOST) if event.id > newer_than]
-            part = Part(newest, None, None)
+            part = ListPart(newest, None, None)
         last = events.head(tx)
         users = events.usernames(tx)
         uuids = [event.item_uuid for event in part.rows if event.item_uuid]
-        items = {one.uuid: one for one in get_by_uuids(tx, uuids, include_archived=True)}
+        items = {uuid.uuid: uuid for uuid in get_by_uuids(tx, uuids, include_archived=True)}
     entries = [entry_of(event, items.get(event.item_uuid or "")) for event in part.rows]
     view = {"kind": kind if kind in KINDS else "", "user": user, "item": item, **days}
     address = Address("/activity", view | {"inside": "1" if inside else ""})
@@ -126,10 +157,8 @@ def entry_of(event: LoggedEvent, item: Item | None = None) -> Entry:
     data: dict[str, Any] = json.loads(event.data)
     number = item.part_number if item else str(data.get("item") or data.get("part_number") or "")
     path = f"/items/{segment(number)}" if number else ""
-    if event.name in ("bom_merge", "bom.updated"):
-        path += "/bom"
-    if event.name in ("revision.reviewed", "revision.released"):
-        path += "/releases"
+    if event.name in EVENTS:
+        path += EVENTS[event.name].below
     if event.name == "document.revised":
         number, path = str(data.get("file_name") or ""), f"/documents/{segment(str(data.get('document')))}"
     return Entry(
@@ -145,20 +174,16 @@ def entry_of(event: LoggedEvent, item: Item | None = None) -> Entry:
 
 
 def _words(name: str, data: Mapping[str, Any]) -> str:
-    if name == "bom.updated":
-        return f"BOM: {data.get('summary', 'changed')}"
-    if name in ("revision.created", "document.revised"):
-        comment = data.get("comment")
-        return f"revision {data.get('revision_number', '')}" + (
-            f": {isolate(str(comment))}" if comment else ""
-        )
-    if name in ("revision.reviewed", "revision.released"):
-        return f"revision {data.get('revision', '')} {data.get('status', '')}"
-    if name == "server.state":
-        closed = data.get("mode") == "read-only"
-        return "The server takes no changes at the moment" if closed else "The server takes changes again"
-    said = {"bom_merge": "BOM merged from CAD", "item.created": "registered", "item.updated": "changed"}
-    return (said | {"item.deleted": "archived"}).get(name, name)
+    if name not in EVENTS:
+        return name
+    values = {
+        **data,
+        "summary": _(str(data.get("summary") or N_("changed"))),
+        "status": _(str(data.get("status", ""))),
+        "comment": f": {isolate(str(data['comment']))}" if data.get("comment") else "",
+        "changes": _("no changes at the moment") if data.get("mode") == "read-only" else _("changes again"),
+    }
+    return _(EVENTS[name].words).format_map(defaultdict(str, values))
 
 
 def _counts(name: str, data: Mapping[str, Any]) -> tuple[tuple[str, int, str], ...]:
@@ -166,12 +191,12 @@ def _counts(name: str, data: Mapping[str, Any]) -> tuple[tuple[str, int, str], .
         return ()
     diff, warnings = data.get("diff", {}), data.get("warnings", ())
     counts = (
-        ("added", len(diff.get("added", ())), "added"),
-        ("changed", len(diff.get("quantity_changed", ())), "quantity changed"),
-        ("warn", len(diff.get("removed", ())), "unreferenced"),
-        ("conflict", sum(warning.get("type") == "conflict" for warning in warnings), "to decide"),
+        ("added", len(diff.get("added", ())), _("added")),
+        ("changed", len(diff.get("quantity_changed", ())), _("quantity changed")),
+        ("warn", len(diff.get("removed", ())), _("unreferenced")),
+        ("conflict", sum(warning.get("type") == "conflict" for warning in warnings), _("to decide")),
     )
-    return tuple(count for count in counts if count[1]) or (("same", 0, "changed"),)
+    return tuple(count for count in counts if count[1]) or (("same", 0, _("changed")),)
 
 
 PAGE_SIZE = 50
@@ -190,7 +215,7 @@ def history_page(call: Reader, part_number: str, before: PageFrom = None, after:
         part = part_of(partial(history.list_changes, tx, item), PAGE_SIZE, before, after)
         lines = history.lines_of_changes(tx, [change.id for change in part.rows], TOLD_LINES)
         newest = next(iter(history.list_changes(tx, item, 1)), None)
-    told = {
+    texts = {
         change.id: sentences(lines.get(change.id, []), TOLD_LINES, change.line_count) for change in part.rows
     }
     return page(
@@ -198,7 +223,7 @@ def history_page(call: Reader, part_number: str, before: PageFrom = None, after:
         "history.html",
         item=item,
         changes=part.rows,
-        told=told,
+        told=texts,
         newest=newest,
         part=part,
     )
@@ -212,33 +237,40 @@ def changes_page(
     until: Annotated[str, Query(max_length=40)] = "",
 ) -> Response:
     """What changed in a product over all levels: between dates or revisions, or since the person looked."""
-    problem, found, first = "", [], ""
+    problem, first, last, status = "", "", "", 200
+    happenings: Sequence[history.Happened] = ()
+    models: list[list[int]] = [[], []]
     with call.server.large_reads.enter(), call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
-        now, looked = tx.stamp, last_look(tx, call.actor.own_id, item)
+        looked = last_look(tx, call.actor.own_id, item)
         if since in ("", "look"):
             since = looked if looked and since else (tx.at - timedelta(days=USUAL_DAYS)).date().isoformat()
         try:
-            first = history.moment(tx, item, since)
-            last = history.moment(tx, item, until, end=True) if until else now
-            found = history.what_changed(tx, item, first, last)
+            first, last, happenings = changes_of(tx, item, since, until)
+            models = [revisions.files_until(tx, item, point) for point in (first, last)]
         except (NotFoundError, RejectedError) as error:
-            problem = str(error)
-        points, _ = revisions.list_revisions(tx, item)
+            problem, status = str(error), 404 if isinstance(error, NotFoundError) else 400
+        points, _count = revisions.list_revisions(tx, item)
+        frozen = [change for change in list_releases(tx, item) if change.status in NUMBERED]
     return page(
         call,
         "changes.html",
-        status=400 if problem else 200,
+        status=status,
         item=item,
         problem=sentence(problem),
-        found=found[:MOST_CHANGES],
-        more=max(0, len(found) - MOST_CHANGES),
+        found=happenings[:MOST_CHANGES],
+        more=max(0, len(happenings) - MOST_CHANGES),
         first=first,
+        last=last,
+        now=tx.stamp,
         since=since,
         until=until,
         looked=looked,
         points=points,
-        counts=Counter(one.what for one in found),
+        frozen=frozen,
+        by_whom=any(change.at for change in happenings),
+        models=models,
+        counts=Counter(change.what for change in happenings),
         asked=Address("", {"from": since, "to": until}).url().removeprefix("?"),
     )
 
@@ -265,15 +297,17 @@ def _compare(
     old, new = wanted
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
-        known = history.list_changes(tx, item, KNOWN)
-        asked = {point for point in (old, new) if point} - {change.id for change in known}
-        known += [history.get_change(tx, item, point)[0] for point in sorted(asked, reverse=True)]
-        latest = known[0].id if known else 0
+        changes_listed = history.list_changes(tx, item, KNOWN)
+        asked = {point for point in (old, new) if point} - {change.id for change in changes_listed}
+        changes_listed += [history.get_change(tx, item, point)[0] for point in sorted(asked, reverse=True)]
+        latest = changes_listed[0].id if changes_listed else 0
         second = latest if new is None else new
         before = history.list_changes(tx, item, 1, second) if old is None else []
         first = (before[0].id if before else 0) if old is None else old
         first, second = sorted((first, second))
         rows = history.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
+        at = {change.id: change.at for change in changes_listed}
+        models = [revisions.files_until(tx, item, at.get(point, "")) for point in (first, second)]
     counts = {status: sum(row.status == status for row in rows) for status in STATUSES}
     shown = [
         (row, changes(row.before, row.after) if row.before and row.after else [])
@@ -287,10 +321,11 @@ def _compare(
         item=item,
         rows=shown,
         counts=counts,
-        summary=", ".join(f"{count} {status}" for status, count in counts.items() if count),
+        summary=", ".join(f"{count} {_(status)}" for status, count in counts.items() if count),
         old=first,
         new=second,
-        known=known,
+        known=changes_listed,
+        models=models,
         show_all=show_all,
         latest=latest,
         problem=problem,
@@ -299,7 +334,7 @@ def _compare(
     )
 
 
-STATUSES = ("added", "removed", "changed", "unchanged")
+STATUSES = (N_("added"), N_("removed"), N_("changed"), N_("unchanged"))
 
 
 @router.post("/items/{part_number}/restore")
@@ -307,28 +342,30 @@ def restore(call: Writer, part_number: str, form: Form) -> Response:
     """Make the BOM again what it was, where nobody changed it since the page was shown; a new change."""
     change_id, reason = whole(form, "change_id"), text(form, "reason")
     if change_id is None:
-        raise RejectedError("change_id: wanted the number of a change, got none; load the page again")
+        raise RejectedError(_("change_id: wanted the number of a change, got none; load the page again"))
     try:
         with call.write() as tx:
             item = get_item(tx, part_number)
             was = len(history.state_at(tx, item, change_id))
             expected = whole(form, "version")
             sure = bool(text(form, "with_archived"))
-            made, _ = history.restore(
+            made, _lines = history.restore(
                 tx, part_number, change_id, reason or None, expected, with_archived=sure
             )
     except ArchivedPartsError as error:
         numbers = ", ".join(error.part_numbers[:10])
-        problem = f"Nothing was restored yet: archived parts would come back ({numbers})."
+        problem = _(
+            "Nothing was restored yet: archived parts would come back (%(numbers)s).", numbers=numbers
+        )
         return _compare(
             call, part_number, (change_id, None), problem=problem, reason=reason, status=409, archived=True
         )
     except VersionConflictError:
-        problem = (
+        problem = _(
             "Nothing was restored: somebody else changed this BOM meanwhile. Here is what differs now; "
             "restore again if that, too, should be as it was."
         )
         points = (change_id, None)
         return _compare(call, part_number, points, problem=problem, reason=reason, status=412)
-    said = f"Restored: {counted(was, 'line', 'lines')} as of change {change_id}."
+    said = _("Restored: %(lines)s as of change %(change)s.", lines=plural(was, "line"), change=change_id)
     return back(bom_path(part_number), said, undo=[made])

@@ -22,8 +22,8 @@ from silo.bom.errors import RejectedError
 from silo.bom.numbers import parse_number, plain, read_quantity, whole_number
 from silo.bom.resolve import character_problem
 from silo_server.routes.context import form_of, server_of
-from silo_server.services.access.accounts import MAX_PASSWORD
-from silo_server.web.render import NOTICE, NOTICE_COOKIE
+from silo_server.services.access import MAX_PASSWORD
+from silo_server.web.render import NOTICE, NOTICE_COOKIE, _
 
 NOTICE_SECONDS = 60
 SECRET_COOKIE = "silo_shown_once"
@@ -54,7 +54,14 @@ def text(form: FormData, name: str, most: int = 500) -> str:
         raise RejectedError(f"{name}: {problem}")
     trimmed = value.replace("\r\n", "\n").strip()
     if len(trimmed) > most:
-        raise RejectedError(f"{name}: wanted at most {most} characters, got {len(trimmed)}")
+        raise RejectedError(
+            _(
+                "%(name)s: wanted at most %(most)s characters, got %(count)s",
+                name=name,
+                most=most,
+                count=len(trimmed),
+            )
+        )
     return trimmed
 
 
@@ -85,7 +92,7 @@ MOST_KEPT = 4 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class UnsentForm:
     """A form that was not carried out, to be sent again by the person who filled it in.
 
     files
@@ -99,10 +106,12 @@ class Kept:
     @property
     def typed(self) -> list[tuple[str, str]]:
         """(field, text) of what a person typed or chose, in words."""
-        told = [(name, value) for name, value in self.fields if value and not _MACHINE.fullmatch(name)]
-        lines = [value for name, value in told if name == "chosen"]
-        shown = [(_label(name), value) for name, value in told if name != "chosen"]
-        return shown + ([("Chosen lines", str(len(lines)))] if lines else [])
+        typed_fields = [
+            (name, value) for name, value in self.fields if value and not _MACHINE.fullmatch(name)
+        ]
+        lines = [value for name, value in typed_fields if name == "chosen"]
+        shown = [(_label(name), value) for name, value in typed_fields if name != "chosen"]
+        return shown + ([(_("Chosen lines"), str(len(lines)))] if lines else [])
 
     @property
     def packed(self) -> str:
@@ -114,30 +123,30 @@ class Kept:
 
 
 def _label(name: str) -> str:
-    known = {"child": "Part number", "why": "Reason for the change"}
+    labels = {"child": _("Part number"), "why": _("Reason for the change")}
     # "p.mass_kg", and "o.1.name" with "o.1.value", are properties in the form of an item.
     plain = re.sub(r"^p\.|^o\.\d+\.(?=value$)", "", re.sub(r"^o\.\d+\.name$", "property", name))
-    return known.get(name, plain.replace("_", " ").capitalize())
+    return labels.get(name, _(plain.replace("_", " ").capitalize()))
 
 
-def kept_form(path: str, form: FormData) -> Kept | None:
+def kept_form(path: str, form: FormData) -> UnsentForm | None:
     """What a form holds but its secret; None where it holds a password."""
     if _PASSWORDS & form.keys():
         return None
     pairs = form.multi_items()
     fields = [(name, value) for name, value in pairs if isinstance(value, str) and name != "csrf_token"]
-    files = [(name, one.filename) for name, one in pairs if not isinstance(one, str) and one.filename]
-    return Kept(path, fields, files)
+    files = [(name, file.filename) for name, file in pairs if not isinstance(file, str) and file.filename]
+    return UnsentForm(path, fields, files)
 
 
-def unpacked(packed: str) -> Kept | None:
+def unpacked(packed: str) -> UnsentForm | None:
     """What :attr:`Kept.packed` was made of; None where it was not, or leads elsewhere."""
     unpacker = zlib.decompressobj()
     try:
         data = unpacker.decompress(base64.b64decode(packed, validate=True), MOST_KEPT * 4)
         path, fields, files = json.loads(data.decode("utf-8", "surrogatepass"))
         pairs = [(str(name), str(value)) for name, value in fields]
-        return Kept(local_path(path), pairs, [(str(name), str(file)) for name, file in files])
+        return UnsentForm(local_path(path), pairs, [(str(name), str(file)) for name, file in files])
     except (binascii.Error, ValueError, TypeError, AttributeError, RecursionError, zlib.error):
         return None
 

@@ -22,8 +22,9 @@ from silo.bom.errors import RejectedError, SiloError, VersionConflictError
 from silo.bom.headers import Role
 from silo.bom.numbers import Mark
 from silo_server.routes.context import Call
-from silo_server.services.bom import transfer
-from silo_server.services.bom.transfer import Layout
+from silo_server.schema import find_schema
+from silo_server.services.bom import imports
+from silo_server.services.bom.imports import NOTHING, Allowed, Layout
 from silo_server.services.items import get_item
 from silo_server.services.revisions import clean_name
 from silo_server.settings import TooLargeError
@@ -31,7 +32,7 @@ from silo_server.web.accounts import Writer
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.line_form import changes
 from silo_server.web.merge_page import bom_path
-from silo_server.web.render import isolate, page, sentence
+from silo_server.web.render import N_, _, isolate, page, plural, sentence
 
 router = APIRouter(include_in_schema=False)
 
@@ -62,9 +63,9 @@ def check(call: Writer, part_number: str, form: Form) -> Response:
     """Say what the file would do; nothing is written. The same file again, with other columns, comes back."""
     upload, layout = None, None
     try:
-        upload = _carried(form) if "packed" in form else _uploaded(form)
+        upload = carried(form) if "packed" in form else uploaded(form)
         layout = layout_of(form)
-        return _show(call, part_number, upload, layout)
+        return _show(call, part_number, upload, layout, allowed=_allowed(form))
     except (RejectedError, TooLargeError) as error:
         shown = replace(Problem.of(error), upload=upload, layout=layout)
         return _show(call, part_number, None, problem=shown)
@@ -73,20 +74,34 @@ def check(call: Writer, part_number: str, form: Form) -> Response:
 @router.post("/items/{part_number}/import")
 def apply(call: Writer, part_number: str, form: Form) -> Response:
     """Write it; where the BOM changed since the check, check again instead."""
-    upload, layout = _carried(form), layout_of(form)
+    upload, layout, allowed = carried(form), layout_of(form), _allowed(form)
     try:
-        records = transfer.read_csv(upload.data, call.server.settings.max_merge_entries, layout)
+        records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout)
         with call.write() as tx:
-            plan, change, _ = transfer.apply_import(
-                tx, part_number, records, upload.name, whole(form, "version")
+            plan, change, _item = imports.apply_import(
+                tx, part_number, records, upload.name, whole(form, "version"), allowed
             )
     except VersionConflictError:
-        problem = Problem("The BOM was changed by somebody else since the file was checked; look again.", 412)
-        return _show(call, part_number, upload, layout, problem)
+        problem = Problem(
+            _("The BOM was changed by somebody else since the file was checked; look again."), 412
+        )
+        return _show(call, part_number, upload, layout, problem, allowed)
     except SiloError as error:
-        return _show(call, part_number, upload, layout, Problem.of(error))
-    said = f"Imported {isolate(upload.name)}: {plan.count('add')} added, {plan.count('change')} changed."
+        return _show(call, part_number, upload, layout, Problem.of(error), allowed)
+    said = _(
+        "Imported %(file)s: %(added)s added, %(changed)s changed, %(parts)s made."
+        if plan.new
+        else "Imported %(file)s: %(added)s added, %(changed)s changed.",
+        file=isolate(upload.name),
+        added=plan.count("add"),
+        changed=plan.count("change"),
+        parts=plural(len(plan.new), "part"),
+    )
     return back(bom_path(part_number), said, undo=[change])
+
+
+def _allowed(form: FormData) -> Allowed:
+    return Allowed(text(form, "category", 32), bool(text(form, "add_up")))
 
 
 @dataclass(frozen=True)
@@ -103,17 +118,17 @@ class Problem:
         return cls(sentence(str(error).removeprefix("file: ")), error.status_hint)
 
 
-def layout_of(form: FormData) -> Layout | None:
+def layout_of(form: FormData, of: imports.Table = imports.BOM) -> Layout | None:
     """How the person wants the file to be read; None where that was not chosen."""
     if "header" not in form:
         return None
     marks = {mark.value: mark for mark in Mark}
-    columns = {role: whole(form, f"column_{role}") for role in transfer.ROLES}
+    columns = {role: whole(form, f"column_{role}") for role in of.roles}
     delimiter = form.get("delimiter")
     return Layout(
-        delimiter if isinstance(delimiter, str) and delimiter in transfer.DELIMITERS else ",",
-        min(whole(form, "header") or 0, transfer.HEADER_WITHIN - 1),
-        {role: at for role, at in columns.items() if at is not None and at < transfer.MAX_COLUMNS},
+        delimiter if isinstance(delimiter, str) and delimiter in imports.DELIMITERS else ",",
+        min(whole(form, "header") or 0, imports.HEADER_WITHIN - 1),
+        {role: at for role, at in columns.items() if at is not None and at < imports.MAX_COLUMNS},
         marks.get(text(form, "mark")),
     )
 
@@ -124,11 +139,12 @@ def _show(
     upload: Upload | None,
     layout: Layout | None = None,
     problem: Problem = Problem(),
+    allowed: Allowed = NOTHING,
 ) -> Response:
-    records = transfer.read_csv(upload.data, call.server.settings.max_merge_entries, layout) if upload else ()
+    records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout) if upload else ()
     with call.read() as tx:
         item = get_item(tx, part_number)
-        plan = transfer.plan_import(tx, part_number, records) if upload else None
+        plan = imports.plan_import(tx, part_number, records, allowed) if upload else None
     rows = plan.rows if plan else ()
     said = {row.row: changes(row.before, row.after) for row in rows if row.before and row.after}
     # What is wrong, and what would change, is worth reading; rows that are as they were are not.
@@ -141,30 +157,40 @@ def _show(
         item=item,
         upload=upload,
         plan=plan,
+        allowed=allowed,
+        categories=find_schema(None).categories.values(),
         rows=sorted(rows, key=lambda row: (order[row.status], row.row))[:MOST_ROWS],
         said=said,
         problem=problem.words,
         file=file,
-        reading=_reading(file, layout or problem.layout) if file else None,
+        reading=reading(file, layout or problem.layout) if file else None,
     )
 
 
-_LABELS = {Role.TYPE: "Type", Role.REVISION: "Revision"}
+_LABELS = {
+    Role.TYPE: N_("Type"),
+    Role.REVISION: N_("Revision"),
+    Role.SUPPLIER_NUMBER: N_("Supplier’s part number"),
+    Role.PRICE: N_("Price"),
+    Role.FROM_QUANTITY: N_("Price from quantity"),
+    Role.LEAD_TIME: N_("Lead time [days]"),
+}
 
 
-def _reading(file: Upload, layout: Layout | None) -> dict[str, Any]:
+def reading(file: Upload, layout: Layout | None, of: imports.Table = imports.BOM) -> dict[str, Any]:
     """How the file is read, for the form in which a person changes that."""
-    known = layout or transfer.guess_of(file.data) or Layout(transfer.likely_delimiter(file.data), 0)
-    lines = transfer.first_lines(file.data, known.delimiter, known.header + 6)
-    header = lines[known.header] if known.header < len(lines) else []
+    layout_read = layout or imports.guess_of(file.data, of) or Layout(imports.likely_delimiter(file.data), 0)
+    lines = imports.first_lines(file.data, layout_read.delimiter, layout_read.header + 6)
+    header = lines[layout_read.header] if layout_read.header < len(lines) else []
     width = max(map(len, lines), default=0)
-    samples = lines[known.header + 1 :]
+    samples = lines[layout_read.header + 1 :]
     return {
-        "layout": known,
+        "layout": layout_read,
         "chosen": layout is not None,
         "lines": [" | ".join(cells)[:60] for cells in lines],
-        "delimiters": transfer.DELIMITERS,
-        "roles": [(role, _LABELS.get(role, role.replace("_", " ").capitalize())) for role in transfer.ROLES],
+        "delimiters": imports.DELIMITERS,
+        "roles": [(role, _(_LABELS.get(role, role.replace("_", " ").capitalize()))) for role in of.roles],
+        "needed": of.needed,
         "columns": [_name_of(index, header, samples) for index in range(width)],
     }
 
@@ -172,28 +198,34 @@ def _reading(file: Upload, layout: Layout | None) -> dict[str, Any]:
 def _name_of(index: int, header: Sequence[str], samples: Sequence[Sequence[str]]) -> str:
     name = header[index].strip() if index < len(header) else ""
     example = next((row[index].strip() for row in samples if index < len(row) and row[index].strip()), "")
-    return f"{index + 1}: {name[:40]}" + (f" (such as {example[:20]})" if example else "")
+    return f"{index + 1}: {name[:40]}" + (
+        _(" (such as %(example)s)", example=example[:20]) if example else ""
+    )
 
 
-def _uploaded(form: FormData) -> Upload:
+def uploaded(form: FormData, of: imports.Table = imports.BOM) -> Upload:
     file = form.get("file")
     if not isinstance(file, UploadFile) or not file.filename:
-        raise RejectedError("No file was chosen.")
+        raise RejectedError(_("No file was chosen."))
     data = file.file.read(MOST_BYTES + 1)
     if len(data) <= MOST_BYTES:
-        data = transfer.as_csv(data)
+        data = imports.as_csv(data, of)
     if len(data) > MOST_BYTES:
-        raise TooLargeError(f"The file is larger than {MOST_BYTES // 2**20} MiB; this cannot be a BOM.")
+        raise TooLargeError(
+            _("The file is larger than %(size)s MiB; this cannot be a BOM.", size=MOST_BYTES // 2**20)
+        )
     return Upload(clean_name(file.filename), data)
 
 
-def _carried(form: FormData) -> Upload:
+def carried(form: FormData) -> Upload:
     packed = text(form, "packed", MOST_BYTES * 2)
     unpacker = zlib.decompressobj()
     try:
         data = unpacker.decompress(base64.b64decode(packed, validate=True), MOST_BYTES)
     except (binascii.Error, ValueError, zlib.error):
-        raise RejectedError("the file did not come back whole; choose it again") from None
+        raise RejectedError(_("the file did not come back whole; choose it again")) from None
     if not unpacker.eof:
-        raise TooLargeError(f"The file is larger than {MOST_BYTES // 2**20} MiB; this cannot be a BOM.")
+        raise TooLargeError(
+            _("The file is larger than %(size)s MiB; this cannot be a BOM.", size=MOST_BYTES // 2**20)
+        )
     return Upload(text(form, "name", 200) or "file.csv", data)

@@ -18,21 +18,22 @@ from fastapi import APIRouter
 from starlette.datastructures import FormData, UploadFile
 from starlette.responses import Response
 
-from silo.api.wire import ItemTexts
+from silo.api.wire import FactSource, ItemTexts
 from silo.bom.errors import NewerRevisionError, RejectedError, SiloError
 from silo.bom.numbers import plain, read_number
 from silo_server.db.engine import Tx
 from silo_server.routes.context import Call
 from silo_server.routes.items import numbered, store_file
-from silo_server.schema.catalog import ITEM_TYPES, Category, find_schema, text_hints
+from silo_server.schema import ITEM_TYPES, Category, find_schema, text_hints
 from silo_server.services import items as service
 from silo_server.services.bom.tree import where_used
 from silo_server.services.items import ItemChange, NewItem, get_item
+from silo_server.services.releases import draft_of
 from silo_server.services.revisions import Origin
-from silo_server.values import Item, Revision
+from silo_server.values import Document, Item, Revision
 from silo_server.web.accounts import Writer
-from silo_server.web.forms import Form, Kept, back, compared, same_text, text, whole
-from silo_server.web.render import isolate, page, segment
+from silo_server.web.forms import Form, UnsentForm, back, compared, same_text, text, whole
+from silo_server.web.render import N_, _, isolate, page, segment
 
 router = APIRouter(include_in_schema=False)
 
@@ -40,11 +41,11 @@ router = APIRouter(include_in_schema=False)
 TEXTS = ItemTexts.model_fields
 OWN = ("part_number", "name", "description", "category", "item_type", *TEXTS)
 LABELS = {
-    "part_number": "Part number",
-    "name": "Name",
-    "description": "Description",
-    "category": "Category",
-    "item_type": "Type",
+    "part_number": N_("Part number"),
+    "name": N_("Name"),
+    "description": N_("Description"),
+    "category": N_("Category"),
+    "item_type": N_("Type"),
     **{name: field.title or name for name, field in TEXTS.items()},
 }
 EMPTY_ROWS = 2
@@ -52,7 +53,7 @@ SHORT, LONGEST = 200, 10_000
 
 
 @dataclass(frozen=True)
-class Shown:
+class FormState:
     """A form as it stands: what is typed, what it was made from, what is wrong, and what others changed."""
 
     typed: Mapping[str, str]
@@ -66,8 +67,12 @@ class Shown:
 def new_page(call: Writer, category: str = "") -> Response:
     """An empty form."""
     typed = {"category": category, "id": str(uuid.uuid4())}
-    typed |= {f"p.{one.name}": one.default for one in find_schema(None).fields if one.default}
-    return _page(call, None, Shown(typed))
+    typed |= {
+        f"p.{property_field.name}": property_field.default
+        for property_field in find_schema(None).fields
+        if property_field.default
+    }
+    return _page(call, None, FormState(typed))
 
 
 @router.post("/items/new")
@@ -80,9 +85,9 @@ def make(call: Writer, form: Form) -> Response:
         if "standard_cost" not in properties:
             properties.pop("currency", None)
         if not typed["name"]:
-            problems.insert(0, "Name: wanted a name, got nothing")
+            problems.insert(0, _("Name: wanted a name, got nothing"))
         if not typed["category"] and not typed["part_number"]:
-            problems.insert(0, "Category: choose one, or give a part number of your own")
+            problems.insert(0, _("Category: choose one, or give a part number of your own"))
         if problems:
             raise RejectedError("; ".join(problems), problems)
         new = NewItem(
@@ -98,8 +103,8 @@ def make(call: Writer, form: Form) -> Response:
         with call.write() as tx:
             item, made = service.create_item(tx, new)
     except SiloError as error:
-        return _page(call, None, Shown(typed, {}, _problems(error), {}, error.status_hint))
-    said = f"{isolate(item.part_number)} made." if made else f"{isolate(item.part_number)} was made already."
+        return _page(call, None, FormState(typed, {}, _problems(error), {}, error.status_hint))
+    said = _("%(number)s made." if made else "%(number)s was made already.", number=isolate(item.part_number))
     return back(f"/items/{segment(item.part_number)}", said)
 
 
@@ -110,13 +115,14 @@ def edit_page(call: Writer, part_number: str) -> Response:
         item = get_item(tx, part_number)
         uses = where_used(tx, item, limit=1)[1]
     now = texts_of(item)
-    return _page(call, item, Shown(now, now), uses)
+    return _page(call, item, FormState(now, now), uses)
 
 
 @router.post("/items/{part_number}/edit")
 def change(call: Writer, part_number: str, form: Form) -> Response:
     """Change what the person changed in the form."""
     typed, was = _typed(form), _typed(form, "was.")
+    weighed = text(form, "weighed")
     try:
         with call.write() as tx:
             item = get_item(tx, part_number, lock=True)
@@ -124,20 +130,25 @@ def change(call: Writer, part_number: str, form: Form) -> Response:
             empty = dict.fromkeys([*now, *was, *typed], "")
             edit = compared({**empty, **now}, {**empty, **was}, {**empty, **typed}, same=_same)
             clashes = {name: now.get(name, "") for name in edit.clashes}
-            after = item if clashes else _change(tx, item, typed, set(edit.mine), text(form, "comment"))
+            after = (
+                item
+                if clashes
+                else _change(tx, item, {**typed, "weighed": weighed}, set(edit.mine), text(form, "comment"))
+            )
     except SiloError as error:
-        return _again(call, part_number, Shown(typed, was, _problems(error), {}, error.status_hint))
+        return _again(call, part_number, FormState(typed, was, _problems(error), {}, error.status_hint))
     if clashes:
         # What others changed and this person did not is taken over; the rest is asked about.
         merged = {**now, **{name: typed.get(name, "") for name in [*edit.mine, *clashes]}}
-        problem = (
-            f"{isolate(item.updated_by)} changed this item while you were editing, so nothing was saved yet."
+        problem = _(
+            "%(user)s changed this item while you were editing, so nothing was saved yet.",
+            user=isolate(item.updated_by),
         )
-        return _again(call, part_number, Shown(merged, now, [problem], clashes, 412))
+        return _again(call, part_number, FormState(merged, now, [problem], clashes, 412))
     said = (
-        f"{isolate(after.part_number)} changed."
+        _("%(number)s changed.", number=isolate(after.part_number))
         if after.version != item.version
-        else "Nothing was different."
+        else _("Nothing was different.")
     )
     return back(f"/items/{segment(after.part_number)}", said)
 
@@ -148,10 +159,16 @@ def upload(call: Writer, part_number: str, form: Form) -> Response:
     file = form.get("file")
     path = f"/items/{segment(part_number)}"
     if not isinstance(file, UploadFile) or not file.filename:
-        raise RejectedError("no file was chosen, so nothing was uploaded")
+        raise RejectedError(_("no file was chosen, so nothing was uploaded"))
 
-    def answer(_of: object, revision: Revision) -> Response:
-        said = f"{isolate(revision.file_name or '')} is revision {revision.revision_number}."
+    def answer(tx: Tx, of: Item | Document, revision: Revision) -> Response:
+        said = _(
+            "%(file)s is revision %(number)s.",
+            file=isolate(revision.file_name or ""),
+            number=revision.revision_number,
+        )
+        if isinstance(of, Item) and (draft := draft_of(tx, of)):
+            said += _(" It is part of draft %(label)s; revision %(released)s stays as it is.", **draft)
         return back(f"{path}#revisions", said)
 
     comment, key = text(form, "comment", LONGEST), text(form, "key", 128) or None
@@ -162,10 +179,12 @@ def upload(call: Writer, part_number: str, form: Form) -> Response:
         # Who sends the form of that page has read of the newer revision: the file goes on top of it.
         newest = str(error.revision["revision_number"])
         fields = {"comment": comment, "key": secrets.token_urlsafe(16), "base_revision": newest}
-        call.request.state.kept = Kept(f"{path}/file", list(fields.items()), [("file", file.filename)])
-        again = (
-            f"{error.revision['created_by']} made revision {newest} after you opened this page. Look at that "
-            "file first; to put yours on top of it, choose it again and send it"
+        call.request.state.kept = UnsentForm(f"{path}/file", list(fields.items()), [("file", file.filename)])
+        again = _(
+            "%(user)s made revision %(newest)s after you opened this page. Look at that file first; to put "
+            "yours on top of it, choose it again and send it",
+            user=error.revision["created_by"],
+            newest=newest,
         )
         raise NewerRevisionError(again, error.revision) from None
 
@@ -177,11 +196,12 @@ def archive(call: Writer, part_number: str, form: Form) -> Response:
         item = service.get_item(tx, part_number)
         used, uses = where_used(tx, item, limit=5)
         service.archive_item(tx, part_number, whole(form, "version"))
-    said = f"{isolate(part_number)} is in the archive. Its number stays taken"
+    said = _("%(number)s is in the archive. Its number stays taken.", number=isolate(part_number))
     if uses:
-        more = f" and {uses - len(used)} more" if uses > len(used) else ""
-        said += f"; it stays in the BOM of {', '.join(isolate(one.parent.part_number) for one in used)}{more}"
-    return back(f"/items/{segment(part_number)}", f"{said}.")
+        numbers = ", ".join(isolate(usage.parent.part_number) for usage in used)
+        more = _(" and %(used)s more", used=uses - len(used)) if uses > len(used) else ""
+        said += _(" It stays in the BOM of %(numbers)s.", numbers=numbers + more)
+    return back(f"/items/{segment(part_number)}", said)
 
 
 @router.post("/items/{part_number}/unarchive")
@@ -189,15 +209,17 @@ def unarchive(call: Writer, part_number: str, form: Form) -> Response:
     """Bring an item back."""
     with call.write() as tx:
         item = service.unarchive_item(tx, part_number)
-    return back(f"/items/{segment(item.part_number)}", f"{isolate(item.part_number)} is back.")
+    return back(
+        f"/items/{segment(item.part_number)}", _("%(number)s is back.", number=isolate(item.part_number))
+    )
 
 
 def texts_of(item: Item) -> dict[str, str]:
     """An item as the texts of its form."""
     shown = {name: str((item.texts[name] if name in TEXTS else getattr(item, name)) or "") for name in OWN}
-    known = {one.name for one in find_schema(item.schema).fields}
+    names = {property_field.name for property_field in find_schema(item.schema).fields}
     for name, value in item.properties.items():
-        if name in known and not (isinstance(value, str) and len(value) > LONGEST):
+        if name in names and not (isinstance(value, str) and len(value) > LONGEST):
             shown[f"p.{name}"] = property_text(value)
         elif _is_plain(value):
             shown[f"o.{name}"] = property_text(value)
@@ -215,25 +237,49 @@ def property_text(value: Any) -> str:
 
 def shown_properties(item: Item) -> list[tuple[str, str, str]]:
     """(label, text, unit) of an item's properties: those of the schema first, in its order."""
-    fields = {one.name: one for one in find_schema(item.schema).fields}
+    fields = {each_field.name: each_field for each_field in find_schema(item.schema).fields}
     order = [name for name in fields if name in item.properties]
     order += sorted(name for name in item.properties if name not in fields)
+    if item.supplier_parts:  # they have a page of their own, which counts
+        order = [name for name in order if name not in ("supplier", "supplier_part_number", "lead_time_days")]
     hinted = {name: text_hints(field) for name, field in TEXTS.items()}
     # The page has places of its own for choices and long texts.
     plain_texts = [name for name, hints in hinted.items() if item.texts[name] and not hints]
-    found = [(LABELS[name], item.texts[name] or "", "") for name in plain_texts]
+    properties = [(_(LABELS[name]), item.texts[name] or "", "") for name in plain_texts]
     for name in order:
-        known = fields.get(name)
-        text_ = property_text(item.properties[name])
-        found.append((known.label if known else name, text_, known.unit if known else ""))
-    return found
+        property_field = fields.get(name)
+        value = item.properties[name]
+        label, text_, unit = name, property_text(value), ""
+        if property_field:
+            label, unit = _(property_field.label), property_field.unit
+        elif name in _MEASURED and all(isinstance(each_field, int | float) for each_field in _listed(value)):
+            label, factor, digits, unit = _MEASURED[name]
+            label = _(label)
+            text_ = " × ".join(f"{each_field * factor:.{digits}g}" for each_field in _listed(value))
+        if from_where := item.origins.get(name):
+            word = {"cad": _("from CAD"), "scale": _("weighed"), "hand": _("by hand")}[from_where["source"]]
+            unit = f"{unit} ({word}, {from_where['at'][:10]})".strip()
+        properties.append((label, text_, unit))
+    return properties
+
+
+# What files state besides the fields of the schema: label, factor, unit.
+_MEASURED = {
+    "size_m": (N_("Outer dimensions"), 1e3, 6, "mm"),
+    "volume_m3": (N_("Volume"), 1e6, 6, "cm³"),
+    "com_m": (N_("Centre of mass"), 1e3, 4, "mm"),
+}
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]
 
 
 def _change(tx: Tx, item: Item, typed: Mapping[str, str], mine: set[str], comment: str) -> Item:
     own = {name: typed.get(name, "") for name in OWN if name in mine}
     problems: list[str] = []
     if own.get("name") == "":
-        problems.append("Name: wanted a name, got nothing")
+        problems.append(_("Name: wanted a name, got nothing"))
     changed = {name for name in mine if name.startswith(("p.", "o."))}
     properties: dict[str, Any] | None = None
     if changed:
@@ -242,7 +288,8 @@ def _change(tx: Tx, item: Item, typed: Mapping[str, str], mine: set[str], commen
     if problems:
         raise RejectedError("; ".join(problems), problems)
     texts = {name: own.pop(name) for name in TEXTS if name in own}
-    given = ItemChange(**own, texts=texts, properties=properties, comment=comment)
+    source: FactSource = "scale" if typed.get("weighed") and mine >= {"p.mass_kg"} else "hand"
+    given = ItemChange(**own, texts=texts, properties=properties, comment=comment, source=source)
     return service.change_item(tx, item.part_number, given)
 
 
@@ -250,23 +297,29 @@ def _properties(
     typed: Mapping[str, str], before: Mapping[str, Any], changed: set[str] | Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
     """The properties behind a form, and what is wrong with it; ``changed`` empty: all that is typed."""
-    fields = {one.name: one for one in find_schema(None).fields}
-    found, problems = dict(before), []
+    fields = {property_field.name: property_field for property_field in find_schema(None).fields}
+    properties, problems = dict(before), []
     for key in changed or [key for key in typed if key.startswith(("p.", "o."))]:
-        kind, _, name = key.partition(".")
+        kind, _point, name = key.partition(".")
         written = typed.get(key, "")
         if not written:
-            found.pop(name, None)
+            properties.pop(name, None)
         elif kind == "p" and name in fields:
             try:
-                found[name] = fields[name].read(written)
+                properties[name] = fields[name].read(written)
             except RejectedError as error:
                 problems.append(str(error))
         elif name in fields:
-            problems.append(f"{name}: the schema has a field for it, “{fields[name].label}”; put it there")
+            problems.append(
+                _(
+                    "%(name)s: the schema has a field for it, “%(label)s”; put it there",
+                    name=name,
+                    label=_(fields[name].label),
+                )
+            )
         else:
-            found[name] = _as_before(written, before.get(name))
-    return found, problems
+            properties[name] = _as_before(written, before.get(name))
+    return properties, problems
 
 
 def _as_before(written: str, before: Any) -> Any:
@@ -281,17 +334,17 @@ def _as_before(written: str, before: Any) -> Any:
 
 def _typed(form: FormData, prefix: str = "") -> dict[str, str]:
     """The texts of a form by field; properties without a field come as pairs of name and value."""
-    found = {name: _text(form, prefix + name) for name in OWN if prefix + name in form}
+    result = {name: _text(form, prefix + name) for name in OWN if prefix + name in form}
     if not prefix:
-        found = dict.fromkeys(OWN, "") | found
+        result = dict.fromkeys(OWN, "") | result
     for key in form:
         if key.startswith(f"{prefix}p.") or (prefix and key.startswith(f"{prefix}o.")):
-            found[key[len(prefix) :]] = _text(form, key)
+            result[key[len(prefix) :]] = _text(form, key)
         elif not prefix and key.startswith("o.") and key.endswith(".name"):
             name = text(form, key, 200)
             if name:
-                found[f"o.{name}"] = _text(form, f"{key[:-5]}.value")
-    return found
+                result[f"o.{name}"] = _text(form, f"{key[:-5]}.value")
+    return result
 
 
 def _same(name: str, a: str, b: str) -> bool:
@@ -306,22 +359,29 @@ def _is_plain(value: Any) -> bool:
     return isinstance(value, bool | int | float) or (isinstance(value, str) and len(value) <= LONGEST)
 
 
-def _again(call: Call, part_number: str, shown: Shown) -> Response:
+def _again(call: Call, part_number: str, shown: FormState) -> Response:
     with call.read() as tx:
         item = get_item(tx, part_number)
         uses = where_used(tx, item, limit=1)[1]
     return _page(call, item, shown, uses)
 
 
-def _page(call: Call, item: Item | None, shown: Shown, uses: int = 0) -> Response:
+def _page(call: Call, item: Item | None, shown: FormState, uses: int = 0) -> Response:
     schema = find_schema(item.schema if item else None)
-    fields = [(one, shown.typed.get(f"p.{one.name}", "")) for one in schema.fields]
+    fields = [
+        (property_field, shown.typed.get(f"p.{property_field.name}", "")) for property_field in schema.fields
+    ]
     others = {name[2:]: value for name, value in shown.typed.items() if name.startswith("o.")}
-    nested = {n: property_text(v) for n, v in item.properties.items() if not _is_plain(v)} if item else {}
+    nested = (
+        {n: property_text(v) for n, v in item.properties.items() if not (_is_plain(v) or n in _MEASURED)}
+        if item
+        else {}
+    )
     groups: dict[str, list[Category]] = {}
-    for one in schema.categories.values():
-        groups.setdefault(schema.domains[one.domain], []).append(one)
-    labels = LABELS | {f"p.{one.name}": one.title for one in schema.fields}
+    for category in schema.categories.values():
+        groups.setdefault(schema.domains[category.domain], []).append(category)
+    labels = {name: _(label) for name, label in LABELS.items()}
+    labels |= {f"p.{property_field.name}": _(property_field.title) for property_field in schema.fields}
     return page(
         call,
         "item_edit.html",

@@ -20,34 +20,35 @@ from typing import Annotated, Any, NamedTuple
 from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
-from silo.bom.errors import BusyError, ConflictError
+from silo.bom.errors import BusyError, ConflictError, NotFoundError
 from silo.bom.numbers import as_decimal
 from silo_server.db.engine import Tx
-from silo_server.routes.documents import told_of
-from silo_server.schema.catalog import ITEM_TYPES, find_schema
-from silo_server.services import documents, revisions
+from silo_server.routes.items import told_of
+from silo_server.schema import ITEM_TYPES, find_schema
+from silo_server.services import revisions
 from silo_server.services.bom import tree
 from silo_server.services.bom.lines import lines_of_many
 from silo_server.services.bom.merge import in_sentences, last_sync
+from silo_server.services.bom.review import is_followed, last_look
 from silo_server.services.bom.summary import (
     MOST_NAMED,
+    MassAndCost,
     Summary,
-    Worth,
-    last_look,
+    at_once,
     marks_of,
     own_worth,
     standing_alone,
     summaries,
     summary_of,
 )
-from silo_server.services.bom.tree import Part
+from silo_server.services.bom.tree import RolledItem
 from silo_server.services.items import ItemQuery, get_item, list_items
 from silo_server.settings import TooLargeError
 from silo_server.values import Item, Line, names_of
 from silo_server.web.accounts import Reader
 from silo_server.web.item_edit_page import shown_properties
 from silo_server.web.releases_page import state_of
-from silo_server.web.render import PAGE_ROWS, Address, Page, arranged, page, page_of, segment
+from silo_server.web.render import PAGE_ROWS, Address, Page, _, arranged, page, page_of, segment
 
 # More open rows than this nobody pages through; a filter or fewer levels bring them down.
 MOST_OPEN = 20_000
@@ -64,6 +65,8 @@ class Look:
         levels that are open (0: as many as fit on a page); ``flip`` names the branches that are not so.
     pieces
         for how many of the assembly the quantities are.
+    beside
+        the part number of an item that is shown beside the table.
     """
 
     view: Annotated[str, Query(max_length=10)] = "tree"
@@ -74,6 +77,7 @@ class Look:
     depth: Annotated[int, Query(ge=0, le=tree.MAX_DEPTH)] = 0
     flip: Annotated[str, Query(max_length=20_000)] = ""
     pieces: Annotated[int, Query(ge=1, le=MOST_PIECES)] = 1
+    beside: Annotated[str, Query(max_length=64)] = ""
 
     @property
     def is_flat(self) -> bool:
@@ -91,14 +95,18 @@ class Look:
     def address(self, path: str) -> Address:
         """The page with this view."""
         usual = {"view": "tree", "page": 1, "depth": 0, "pieces": 1}
-        names = ("view", "q", "type", "sort", "page", "depth", "flip", "pieces")
+        names = ("view", "q", "type", "sort", "page", "depth", "flip", "pieces", "beside")
         values = {name: getattr(self, name) for name in names}
         return Address(path, {n: str(v) for n, v in values.items() if v not in ("", usual.get(n))})
 
     def flipped(self, key: str) -> str:
         """``flip`` where this branch is the other way round."""
         keys = self.flips
-        return ",".join(one for one in keys if one != key) if key in keys else ",".join([*keys, key])
+        return (
+            ",".join(each_key for each_key in keys if each_key != key)
+            if key in keys
+            else ",".join([*keys, key])
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,10 +118,10 @@ class Branch:
     """
 
     line: Line
-    part: Part
+    part: RolledItem
     depth: int
     total: tree.Exact
-    worth: Worth
+    worth: MassAndCost
     marks: Sequence[str] = ()
     key: str = ""
     is_open: bool = False
@@ -152,10 +160,10 @@ class Structure:
         self.look = look
         self.page_rows = page_rows
         self._lines = dict(graph.lines)
-        self._worths: dict[int, Worth] = {}
+        self._worths: dict[int, MassAndCost] = {}
 
     @cached_property
-    def parts(self) -> Mapping[int, Part]:
+    def parts(self) -> Mapping[int, RolledItem]:
         """What a filter looks in, for all of the graph."""
         return tree.parts_of(self._tx, self.graph)
 
@@ -170,39 +178,34 @@ class Structure:
         """The flat list, unfiltered."""
         return tree.flatten(self.graph)
 
-    def lines_of(self, item_id: int) -> Sequence[Line]:
-        """The lines of a BOM; a branch below the open levels is read when it is asked for."""
-        if item_id not in self._lines:
+    def lines_of(self, item_id: int, level: int) -> Sequence[Line]:
+        """The lines of what a row of this level shows; below the open levels they are read when asked for."""
+        if item_id not in self._lines and level >= self.look.depth and not self.look.is_filtered:
             self._lines[item_id] = lines_of_many(self._tx, [item_id]).get(item_id, [])
-        return self._lines[item_id]
+        return self._lines.get(item_id, ())
 
-    def worth(self, line: Line) -> Worth:
+    def worth(self, line: Line) -> MassAndCost:
         """What the child of a line is worth, to sort by it."""
         if line.child_id not in self._worths:
-            children = {one.child_id for one in self.lines_of(line.parent_id)}
-            found = summaries(self._tx, children)
-            self._worths |= {child: found[child].as_part for child in children}
+            children = {each_line.child_id for each_line in self._lines[line.parent_id]}
+            by_item = summaries(self._tx, children)
+            self._worths |= {child: by_item[child].as_part for child in children}
         return self._worths[line.child_id]
 
     def dressed(self, rows: Sequence[tuple[Row, Sequence[str]]]) -> list[Branch]:
         """Return the rows with everything that they show; beside each stand the doubts of its line."""
         children = {row.line.child_id for row, _ in rows}
         parts = tree.some_parts(self._tx, children)
-        found = summaries(self._tx, children)
+        by_item = summaries(self._tx, {child for child in children if parts[child].has_bom})
 
         def dress(row: Row, doubts: Sequence[str]) -> Branch:
             child = row.line.child_id
-            known = found[child]
-            return Branch(
-                row.line,
-                parts[child],
-                row.depth,
-                row.total,
-                known.as_part,
-                [*known.inside(child, is_open=row.is_open), *doubts],
-                row.key if row.is_open or known.levels else "",
-                row.is_open,
-            )
+            part, summary = parts[child], by_item.get(child)
+            if summary is None:  # without a BOM it is worth what it states
+                return Branch(row.line, part, row.depth, row.total, own_worth(part.properties), doubts)
+            marks = [*summary.inside(child, is_open=row.is_open), *doubts]
+            key = row.key if row.is_open or summary.levels else ""
+            return Branch(row.line, part, row.depth, row.total, summary.as_part, marks, key, row.is_open)
 
         return [dress(*row) for row in rows]
 
@@ -221,16 +224,20 @@ def tree_page(shown: Structure, total: int) -> tuple[Page[Branch], Sequence[Bran
     rows = list(islice(_walk(shown), MOST_OPEN + 1))
     if len(rows) > MOST_OPEN:
         raise TooLargeError(
-            f"more than {MOST_OPEN} of the {total} rows of this tree are open; show fewer levels or take an "
-            "export"
+            _(
+                "more than %(most)s of the %(total)s rows of this tree are open; show fewer levels or "
+                "take an export",
+                most=MOST_OPEN,
+                total=total,
+            )
         )
-    found = page_of(rows, total if look.is_filtered else len(rows), look.page, shown.page_rows)
+    rows_of_page = page_of(rows, total if look.is_filtered else len(rows), look.page, shown.page_rows)
     above: list[Row] = []
-    for row in reversed(rows[: found.start]):
-        if row.depth < (above[-1] if above else rows[found.start]).depth:
+    for row in reversed(rows[: rows_of_page.start]):
+        if row.depth < (above[-1] if above else rows[rows_of_page.start]).depth:
             above.append(row)
-    here = shown.dressed([(row, shown.graph.doubts(row.line)) for row in found.rows])
-    page = Page(here, found.total, found.found, found.number, found.size)
+    here = shown.dressed([(row, shown.graph.doubts(row.line)) for row in rows_of_page.rows])
+    page = Page(here, rows_of_page.total, rows_of_page.found, rows_of_page.number, rows_of_page.size)
     return page, shown.dressed([(row, ()) for row in above[::-1]])
 
 
@@ -240,18 +247,23 @@ def _walk(shown: Structure) -> Iterator[Row]:
     hit = tree.leading_to(graph, shown.fitting) if filtered else lambda _line: True
 
     @cache
-    def lines_of(item_id: int) -> Sequence[Line]:
-        return arranged([line for line in shown.lines_of(item_id) if hit(line)], look.sort, _tree_keys(shown))
+    def lines_of(item_id: int, level: int) -> Sequence[Line]:
+        below = shown.lines_of(item_id, level)
+        return arranged([line for line in below if hit(line)], look.sort, _tree_keys(shown))
 
-    one: tree.Exact = look.pieces
-    stack = [(1, one, "", iter(lines_of(graph.root.id)))]
+    exact: tree.Exact = look.pieces
+    stack = [(1, exact, "", iter(lines_of(graph.root.id, 0)))]
     while stack:
         level, factor, above, lines = stack[-1]
         for line in lines:
             total = tree.multiplied(factor, line)
-            key = _key(above, line) if line.state.rel_type == "component" and level < tree.MAX_DEPTH else ""
+            key = (
+                hashlib.blake2b(f"{above} {line.id}".encode(), digest_size=4).hexdigest()
+                if line.state.rel_type == "component" and level < tree.MAX_DEPTH
+                else ""
+            )
             is_open = bool(key) and (filtered or (level < look.depth) != (key in flipped))
-            inner = lines_of(line.child_id) if is_open else ()
+            inner = lines_of(line.child_id, level) if is_open else ()
             yield Row(line, level, total, key, bool(inner))
             if inner:
                 stack.append((level + 1, total, key, iter(inner)))
@@ -281,15 +293,11 @@ def _cost_key(costs: Mapping[str, Decimal]) -> Decimal | None:
     return max(costs.values(), default=None)
 
 
-def _key(above: str, line: Line) -> str:
-    return hashlib.blake2b(f"{above} {line.id}".encode(), digest_size=4).hexdigest()
-
-
 def flat_page(shown: Structure) -> Page[Branch]:
     """A page of the leaf parts, each with its total over the whole tree."""
     look = shown.look
-    found = arranged([row for row in shown.leaves if shown.fitting(row.line)], look.sort, _flat_keys(shown))
-    table = page_of(found, len(shown.leaves), look.page, shown.page_rows)
+    rows = arranged([row for row in shown.leaves if shown.fitting(row.line)], look.sort, _flat_keys(shown))
+    table = page_of(rows, len(shown.leaves), look.page, shown.page_rows)
     here = shown.dressed(
         [
             (Row(row.line, 1, row.total * look.pieces, "", False), row.doubts(look.pieces))
@@ -300,7 +308,7 @@ def flat_page(shown: Structure) -> Page[Branch]:
 
 
 def _flat_keys(shown: Structure) -> Mapping[str, Callable[[tree.FlatRow], Any]]:
-    def worth(row: tree.FlatRow) -> Worth:
+    def worth(row: tree.FlatRow) -> MassAndCost:
         return own_worth(shown.parts[row.line.child_id].properties)
 
     def times(row: tree.FlatRow, value: Decimal | None) -> Decimal | None:
@@ -348,15 +356,18 @@ def item_page(
         shown = structure_of(tx, item, look)
         history, revision_count = revisions.list_revisions(tx, item, before=revisions_before)
         used, uses = tree.where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
-        files = documents.shown(tx, documents.holding(tx, item))
+        files = revisions.shown(tx, revisions.documents_holding(tx, item))
         looked, now = last_look(tx, call.actor.own_id, item), tx.stamp
-        release = state_of(tx, item)
+        release, following = state_of(tx, item), is_followed(tx, call.actor.own_id, item)
+        beside = _beside(tx, look.beside)
     call.server.db.looks[call.actor.own_id, item.id] = now
     return page(
         call,
         "item.html",
         looked=looked,
         release=release,
+        following=following,
+        beside=beside,
         item=item,
         look=look,
         at=look.address(f"/items/{segment(item.part_number)}"),
@@ -374,25 +385,39 @@ def item_page(
     )
 
 
+def _beside(tx: Tx, part_number: str) -> dict[str, Any] | None:
+    """What stands beside the table of a chosen row: its item."""
+    try:
+        item = get_item(tx, part_number, include_archived=True)
+    except NotFoundError:
+        return None
+    used, uses = tree.where_used(tx, item, limit=5)
+    summary = at_once(tx, {item.id}).get(item.id)
+    files = revisions.shown(tx, revisions.documents_holding(tx, item))
+    values = {"item": item, "properties": shown_properties(item), "summary": summary, "files": files}
+    return values | {"used": used, "uses": uses, "release": state_of(tx, item)}
+
+
 @router.get("/documents/{uuid}")
 def document_page(call: Reader, uuid: str) -> Response:
     """A file: which items are in it, what it links to, what uses it, and its revisions."""
     with call.read() as tx:
-        told = told_of(tx, uuid)
-        history, _ = revisions.list_revisions(tx, documents.get(tx, told["id"]), PAGE_SIZE)
-    return page(call, "document.html", file=told, revisions=history)
+        document_json = told_of(tx, uuid)
+        history, _ = revisions.list_revisions(tx, revisions.get_document(tx, document_json["id"]), PAGE_SIZE)
+    return page(call, "document.html", file=document_json, revisions=history)
 
 
 @router.get("/items/{part_number}/print")
 def print_page(call: Reader, part_number: str, look: Asked) -> Response:
     """The BOM for paper: all rows of the view on one page, with what a reader must know on top."""
-    with call.read() as tx:
-        item = get_item(tx, part_number, include_archived=True)
-        shown = structure_of(tx, item, look, MOST_PRINTED)
-        now = tx.stamp
-    path = f"/items/{segment(item.part_number)}"
-    values = {"item": item, "look": look, "at": look.address(path), "now": now, **shown}
-    return page(call, "print.html", **values)
+    with call.server.large_reads.enter():
+        with call.read() as tx:
+            item = get_item(tx, part_number, include_archived=True)
+            shown = structure_of(tx, item, look, MOST_PRINTED)
+            now = tx.stamp
+        path = f"/items/{segment(item.part_number)}"
+        values = {"item": item, "look": look, "at": look.address(path), "now": now, **shown}
+        return page(call, "print.html", **values)
 
 
 def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[str, Any]:
@@ -414,8 +439,12 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
         whole = look.is_flat or look.is_filtered
         if whole and summary.lines > MOST_READ:
             raise TooLargeError(
-                f"this product has {summary.lines} lines over all levels, and a page finds in, or adds up, "
-                f"at most {MOST_READ}; look at one of its sub-assemblies, or take an export"
+                _(
+                    "this product has %(lines)s lines over all levels, and a page finds in, or adds up, "
+                    "at most %(most)s; look at one of its sub-assemblies, or take an export",
+                    lines=summary.lines,
+                    most=MOST_READ,
+                )
             )
         shown = Structure(tx, tree.load_graph(tx, item, None if whole else depth), look, size)
         if look.is_filtered:
@@ -450,7 +479,7 @@ class Totals:
         return cls(summary.worth.mass, summary.worth.costs, **same)
 
     @classmethod
-    def narrow(cls, tx: Tx, graph: tree.Graph, parts: Mapping[int, Part]) -> Totals:
+    def narrow(cls, tx: Tx, graph: tree.Graph, parts: Mapping[int, RolledItem]) -> Totals:
         """Return those of what a filter has found."""
         cost = tree.roll_up_cost(graph, parts)
         weighed = tree.roll_up_mass(graph, parts, standing_alone(tx, graph))
@@ -490,15 +519,15 @@ def items_page(
         sort=sort,
     )
     with call.read() as tx:
-        found, total = list_items(tx, query)
-        used = tree.use_counts(tx, [item.id for item in found])
-        marks = marks_of(tx, found)
+        items, total = list_items(tx, query)
+        used = tree.use_counts(tx, [item.id for item in items])
+        marks = marks_of(tx, items)
     asked = {"q": q, "type": type, "category": category, "archived": "1" if archived else "", "sort": sort}
     return page(
         call,
         "items.html",
         at=Address("/items", {name: value for name, value in asked.items() if value}),
-        table=Page(found, total, total, number, PAGE_SIZE),
+        table=Page(items, total, total, number, PAGE_SIZE),
         used=used,
         marks=marks,
         q=q,

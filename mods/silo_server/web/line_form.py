@@ -14,45 +14,45 @@ from typing import Any
 
 from starlette.datastructures import FormData
 
+from silo.api.wire import LineTexts
 from silo.bom.compare import same_quantity
-from silo.bom.errors import RejectedError, counted
+from silo.bom.errors import RejectedError
 from silo.bom.headers import designators
 from silo.bom.numbers import counts_pieces, read_quantity
 from silo_server.db.engine import Tx
+from silo_server.schema import text_hints
 from silo_server.services.bom import history
 from silo_server.services.bom.history import Change, ChangedLine
 from silo_server.services.bom.lines import ChangeKind
 from silo_server.services.bom.review import Action, Decision, Review, told_quantities
 from silo_server.values import Item, Line, LineState
 from silo_server.web.forms import Edit, amount, compared, same_text, text, texts, whole
-from silo_server.web.render import isolate, quantity
+from silo_server.web.render import N_, _, isolate, plural, quantity
 
+TEXTS = LineTexts.model_fields
 # What a person fills in on a line, with its label.
 FIELDS = {
-    "quantity": "Quantity",
-    "unit": "Unit",
-    "reference_designators": "Reference designators",
-    "find_number": "Find number",
-    "notes": "Notes",
+    "quantity": N_("Quantity"),
+    "reference_designators": N_("Reference designators"),
+    **{name: field.title or name for name, field in TEXTS.items()},
 }
 _NAMES = {
-    "reference_designators": "reference designators",
-    "find_number": "find number",
-    "notes": "notes",
-    "child_revision": "revision",
-    "rel_type": "type",
+    **{name: label.lower() for name, label in FIELDS.items() if name not in ("quantity", "unit")},
+    "child_revision": N_("revision"),
+    "rel_type": N_("type"),
 }
-MOST = {"quantity": 100, "unit": 32, "find_number": 32}
 MOST_TEXT = 10_000
+MOST = {name: text_hints(field).get("maxLength", MOST_TEXT) for name, field in TEXTS.items()}
+MOST["quantity"] = 100
 # "6" and "m" mean something only together.
 TOGETHER = (("quantity", "unit"),)
 MINE, THEIRS = "mine", "theirs"
 KEPT = "kept on purpose, not in the CAD model"
 DONE = {
-    Action.REMOVE: "removed",
-    Action.KEEP: "kept as intentional",
-    Action.TAKE_CAD: "set to what CAD says",
-    Action.KEEP_SILO: "left as Silo says",
+    Action.REMOVE: N_("removed"),
+    Action.KEEP: N_("kept as intentional"),
+    Action.TAKE_CAD: N_("set to what CAD says"),
+    Action.KEEP_SILO: N_("left as Silo says"),
 }
 
 
@@ -82,10 +82,8 @@ def shown(state: LineState) -> dict[str, str]:
     """The fields of a line as its form shows them."""
     return {
         "quantity": quantity(state.quantity),
-        "unit": state.unit or "",
         "reference_designators": " ".join(state.reference_designators),
-        "find_number": state.find_number or "",
-        "notes": state.notes or "",
+        **{name: getattr(state, name) or "" for name in TEXTS},
     }
 
 
@@ -107,7 +105,8 @@ def read(form: FormData) -> LineForm:
 def edit_of(sent: LineForm, now: LineState) -> Edit:
     """What the form changes on the line as it is now; RejectedError where a choice was not made."""
     if unmade(sent):
-        raise RejectedError(f"{', '.join(FIELDS[name] for name in unmade(sent))}: choose yours or theirs")
+        names = ", ".join(_(FIELDS[name]) for name in unmade(sent))
+        raise RejectedError(_("%(names)s: choose yours or theirs", names=names))
     typed = dict(sent.typed)
     for name, pick in sent.picked.items():
         if pick == THEIRS:
@@ -148,9 +147,16 @@ def values_of(texts: Mapping[str, str]) -> dict[str, Any]:
     for name, written in texts.items():
         most = MOST.get(name, MOST_TEXT)
         if len(written) > most:
-            raise RejectedError(f"{FIELDS[name]}: wanted at most {most} characters, got {len(written)}")
+            raise RejectedError(
+                _(
+                    "%(name)s: wanted at most %(most)s characters, got %(count)s",
+                    name=_(FIELDS[name]),
+                    most=most,
+                    count=len(written),
+                )
+            )
         if name == "quantity":
-            values[name] = amount(written, FIELDS[name])
+            values[name] = amount(written, _(FIELDS[name]))
         elif name == "reference_designators":
             values[name] = designators(written)
         else:
@@ -163,7 +169,7 @@ def decision_of(form: FormData) -> tuple[Action, str | None]:
     try:
         action = Action(text(form, "action"))
     except ValueError:
-        raise RejectedError("action: wanted one of the buttons, got none; load the page again") from None
+        raise RejectedError(_("action: wanted one of the buttons, got none; load the page again")) from None
     return action, text(form, "reason") or (KEPT if action is Action.KEEP else None)
 
 
@@ -176,7 +182,7 @@ def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
     action, reason = decision_of(form)
     decisions = []
     for value in texts(form, "chosen"):
-        which, _, seen = value.partition(" ")
+        which, _space, seen = value.partition(" ")
         if seen:
             decisions.append(Decision(names.get(which, ""), action, reason, which, seen))
         else:
@@ -194,17 +200,20 @@ def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict
 
 
 def disputed(
-    tx: Tx, parent: Item, lines: Sequence[Line], found: Review
+    tx: Tx, parent: Item, lines: Sequence[Line], review: Review
 ) -> tuple[dict[str, str], dict[str, str]]:
     """Line id → who set its quantity here, and line id → what CAD says of it; both in words."""
-    told = told_quantities(tx, [parent.id]).get(parent.id, {})
+    told_quantity = told_quantities(tx, [parent.id]).get(parent.id, {})
     overrides = [line for line in lines if line.state.override]
-    asked = {*(line.id for line in overrides), *(conflict.line.id for conflict in found.conflicts)}
+    asked = {*(line.id for line in overrides), *(conflict.line.id for conflict in review.conflicts)}
     stories = history.stories(tx, parent, asked)
     by_hand = {line_id: who for line_id, story in stories.items() if (who := _quantity_by(story))}
     return (
         {line_id: by_whom(change) for line_id, change in by_hand.items()},
-        {line.id: _cad_words(line, told, by_hand.get(line.id), found.last_merge) for line in overrides},
+        {
+            line.id: _cad_words(line, told_quantity, by_hand.get(line.id), review.last_merge)
+            for line in overrides
+        },
     )
 
 
@@ -217,36 +226,42 @@ def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
     return None
 
 
-def _cad_words(line: Line, told: Mapping[int, float], by_hand: Change | None, merge: Change | None) -> str:
+def _cad_words(
+    line: Line, quantities: Mapping[int, float], by_hand: Change | None, merge: Change | None
+) -> str:
     """What CAD says of a line whose quantity a person changed: the same as the conflict above it says."""
-    if line.child_id in told:
-        said = told[line.child_id]
-        return f"CAD says {of_cad(said, line.state.unit)}" if said else "CAD has it no more"
+    if line.child_id in quantities:
+        said = quantities[line.child_id]
+        return (
+            _("CAD says %(quantity)s", quantity=of_cad(said, line.state.unit))
+            if said
+            else _("CAD has it no more")
+        )
     if merge is not None and by_hand is not None and merge.id > by_hand.id:
-        return "CAD says the same"
-    return f"CAD said {of_cad(line.state.cad_quantity, line.state.unit)} before"
+        return _("CAD says the same")
+    return _("CAD said %(quantity)s before", quantity=of_cad(line.state.cad_quantity, line.state.unit))
 
 
 def of_cad(said: float | None, unit: str | None) -> str:
     """Return a quantity of CAD's beside a line with this unit: ``6``, or ``6 pieces`` beside ``0.5 m``."""
-    return quantity(said, unit if counts_pieces(unit) else "piece" if said == 1 else "pieces")
+    return quantity(said, unit if counts_pieces(unit) else _("piece") if said == 1 else _("pieces"))
 
 
 def _became(line: ChangedLine) -> str:
     if line.before is None or line.after is None:
-        return "removed" if line.after is None else "added"
-    return ", ".join(changes(line.before, line.after)) or "changed"
+        return _("removed") if line.after is None else _("added")
+    return ", ".join(changes(line.before, line.after)) or _("changed")
 
 
 def _same(name: str, a: str, b: str) -> bool:
     if a == b:
         return True
     if name == "quantity":
-        one, other = read_quantity(a).value, read_quantity(b).value
-        return one is not None and other is not None and same_quantity(one, other)
+        number, other = read_quantity(a).value, read_quantity(b).value
+        return number is not None and other is not None and same_quantity(number, other)
     if name == "reference_designators":
         return designators(a) == designators(b)
-    return same_text(a, b, lines=name == "notes")
+    return same_text(a, b, lines=name in TEXTS and bool(text_hints(TEXTS[name]).get("long")))
 
 
 def _text(form: FormData, name: str) -> str:
@@ -256,22 +271,26 @@ def _text(form: FormData, name: str) -> str:
 
 def by_whom(change: Change) -> str:
     """``by ann, 2026-02-08 22:15: one spare``; a sync names its file."""
-    from_file = f", from {isolate(change.document_file)}" if change.document_file else ""
-    what = "sync " if change.kind == ChangeKind.MERGE else ""
-    why = f": {isolate(change.reason)}" if change.reason else ""
-    return f"{what}by {isolate(change.username)}, {change.at[:16].replace('T', ' ')}{from_file}{why}"
+    values = {"user": isolate(change.username), "at": change.at[:16].replace("T", " ")}
+    said = _(
+        "sync by %(user)s, %(at)s" if change.kind == ChangeKind.MERGE else "by %(user)s, %(at)s", **values
+    )
+    if change.document_file:
+        said += _(", from %(document_file)s", document_file=isolate(change.document_file))
+    return f"{said}: {isolate(change.reason)}" if change.reason else said
 
 
 def sentence(line: ChangedLine) -> tuple[str, str]:
     """(mark, words) of what one change made of one line: ``~``, ``F01-0001 M8x20 Bolt: quantity 8 → 12``."""
     who = f"{isolate(line.child.part_number)} {isolate(line.child.name)}".strip()
     if line.before is None and line.after is not None:
-        return "added", f"{who}: added, quantity {quantity(line.after.quantity, line.after.unit)}"
+        shown = quantity(line.after.quantity, line.after.unit)
+        return "added", _("%(who)s: added, quantity %(quantity)s", who=who, quantity=shown)
     if line.after is None:
-        return "removed", f"{who}: removed"
+        return "removed", _("%(who)s: removed", who=who)
     assert line.before is not None  # a changed line has both states
     gone = line.after.unreferenced_since is not None and line.before.unreferenced_since is None
-    said = ", ".join(changes(line.before, line.after)) or "no visible change"
+    said = ", ".join(changes(line.before, line.after)) or _("no visible change")
     return ("warn" if gone else "changed"), f"{who}: {said}"
 
 
@@ -280,20 +299,21 @@ def changes(before: LineState, after: LineState) -> list[str]:
     said: list[str] = []
     if (before.quantity, before.unit) != (after.quantity, after.unit):
         old, new = quantity(before.quantity, before.unit), quantity(after.quantity, after.unit)
-        said.append(f"quantity {old} → {new}")
+        said.append(_("quantity %(old)s → %(new)s", old=old, new=new))
     if before.unreferenced_since is None and after.unreferenced_since is not None:
-        said.append("no longer referenced by the assembly")
+        said.append(_("no longer referenced by the assembly"))
     back = before.unreferenced_since is not None and after.unreferenced_since is None
     if back and after.source == "assembly":
-        said.append("referenced again")
+        said.append(_("referenced again"))
     if before.source != after.source:
-        said.append("now a manual line" if after.source == "manual" else "owned by the assembly again")
+        manual = after.source == "manual"
+        said.append(_("now a manual line") if manual else _("owned by the assembly again"))
     if before.reason != after.reason and after.reason:
-        said.append(f"reason: {isolate(after.reason)}")
+        said.append(_("reason: %(reason)s", reason=isolate(after.reason)))
     for name, words in _NAMES.items():
-        old, new = (_shown(getattr(state, name)) for state in (before, after))
+        old, new = (_quoted(getattr(state, name)) for state in (before, after))
         if old != new:
-            said.append(f"{words} {old} → {new}")
+            said.append(f"{_(words)} {old} → {new}")
     return said
 
 
@@ -301,12 +321,16 @@ def sentences(
     lines: Sequence[ChangedLine], most: int = 30, count: int | None = None
 ) -> list[tuple[str, str]]:
     """The lines of a change, which has ``count`` of them; beyond ``most`` only how many more."""
-    told = [sentence(line) for line in lines[:most]]
+    line_sentences = [sentence(line) for line in lines[:most]]
     rest = (len(lines) if count is None else count) - most
-    return [*told, ("", f"and {counted(rest, 'more line', 'more lines')}")] if rest > 0 else told
+    return (
+        [*line_sentences, ("", _("and %(lines)s", lines=plural(rest, "more line", "more lines")))]
+        if rest > 0
+        else line_sentences
+    )
 
 
-def _shown(value: object) -> str:
+def _quoted(value: object) -> str:
     if isinstance(value, tuple):
-        return isolate(" ".join(map(str, value))) or "none"
-    return "none" if value is None or value == "" else f"“{isolate(str(value))}”"
+        return isolate(" ".join(map(str, value))) or _("none")
+    return _("none") if value is None or value == "" else f"“{isolate(str(value))}”"

@@ -21,12 +21,12 @@ from silo.bom.errors import (
     NotFoundError,
     RejectedError,
     SiloError,
-    counted,
 )
 from silo.bom.numbers import whole_number
 from silo_server import events
 from silo_server.db.engine import Tx
 from silo_server.routes.context import Call
+from silo_server.schema import text_hints
 from silo_server.services.bom import history, review
 from silo_server.services.bom import review as service
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
@@ -34,6 +34,7 @@ from silo_server.services.bom.merge import in_sentences, last_sync
 from silo_server.services.bom.review import Decision
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
+from silo_server.services.revisions import files_until
 from silo_server.services.search import fits
 from silo_server.settings import DuplicateError, LinesChangedError
 from silo_server.values import Line, LineState
@@ -42,13 +43,16 @@ from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
 from silo_server.web.line_form import FIELDS, LineForm, by_whom, sentences
 from silo_server.web.render import (
+    N_,
     NOTICE,
     Address,
     Page,
+    _,
     arranged,
     isolate,
     page,
     page_of,
+    plural,
     segment,
     sentence,
 )
@@ -61,7 +65,7 @@ MOST_SHOWN, MOST_FORMS = 1000, 100
 
 
 @dataclass(frozen=True)
-class Asked:
+class PageState:
     """What the page is asked to show besides the BOM: a problem, and the form that is being filled in.
 
     edit
@@ -93,7 +97,7 @@ class Asked:
 class Refused(Exception):
     """A form that was not carried out: how the page shows it again."""
 
-    def __init__(self, asked: Asked, status: int = 409) -> None:
+    def __init__(self, asked: PageState, status: int = 409) -> None:
         super().__init__(asked.problem)
         self.asked, self.status = asked, status
 
@@ -109,7 +113,7 @@ def merge_page(call: Reader, part_number: str, edit: Annotated[str, Query(max_le
 
     ``q``, ``show``, ``sort`` and ``page`` say which lines the table has (:func:`table_of`).
     """
-    return _show(call, part_number, Asked(edit=edit, view=view_of(call.request.url.query)))
+    return _show(call, part_number, PageState(edit=edit, view=view_of(call.request.url.query)))
 
 
 @router.post("/items/{part_number}/bom/decide")
@@ -117,25 +121,30 @@ def decide(call: Writer, part_number: str, form: Form) -> Response:
     """Carry a decision out, for one line or for all chosen ones, if they are as the person saw them."""
     chosen = [value.partition(" ")[0] for value in texts(form, "chosen")]
     reasons = {chosen[0] if chosen and "bulk" not in form else "": text(form, "reason")}
-    asked = Asked(chosen=chosen, reasons=reasons)
+    asked = PageState(chosen=chosen, reasons=reasons)
 
     def work(tx: Tx) -> tuple[str, int]:
         parent = get_item(tx, part_number)
         names = {line.id: line.child_part_number for line in lines_of(tx, parent)}
         decisions = line_form.decisions_of(form, names)
         if not decisions:
-            return "No line was chosen, so nothing was changed.", 0
+            return _("No line was chosen, so nothing was changed."), 0
         try:
-            change, _ = service.resolve(tx, part_number, decisions)
+            change, _lines = service.resolve(tx, part_number, decisions)
         except LinesChangedError as error:
             story = line_form.meanwhile(tx, parent, error.line_ids, whole(form, "at") or 0)
-            gone = [names.get(one, "a line that is gone") for one in error.line_ids]
-            count = counted(len(gone), "line was", "lines were")
-            problem = f"Nothing was done: {count} changed while you were deciding. Look again, then decide."
-            told = [f"{names.get(one, 'A line')}: {said}" for one in story for said in story[one]] or gone
-            left = [one for one in chosen if one not in error.line_ids]
-            raise Refused(replace(asked, problem=problem, story=told, chosen=left), 412) from None
-        return _done(decisions), change
+            gone = [names.get(line_id, _("a line that is gone")) for line_id in error.line_ids]
+            count = plural(len(gone), "line was", "lines were")
+            problem = _(
+                "Nothing was done: %(count)s changed while you were deciding. Look again, then decide.",
+                count=count,
+            )
+            refusals = [
+                f"{names.get(line_id, _('A line'))}: {said}" for line_id in story for said in story[line_id]
+            ] or gone
+            left = [line_id for line_id in chosen if line_id not in error.line_ids]
+            raise Refused(replace(asked, problem=problem, story=refusals, chosen=left), 412) from None
+        return _decided_text(decisions), change
 
     return _do(call, part_number, form, work, asked)
 
@@ -147,8 +156,8 @@ def undo(call: Writer, part_number: str, form: Form) -> Response:
     def work(tx: Tx) -> tuple[str, int]:
         change_id = whole(form, "change_id")
         if change_id is None:
-            raise RejectedError("change_id: wanted the number of a change, got none; load the page again")
-        return "Undone.", history.undo(tx, part_number, change_id, None)[0]
+            raise RejectedError(_("change_id: wanted the number of a change, got none; load the page again"))
+        return _("Undone."), history.undo(tx, part_number, change_id, None)[0]
 
     return _do(call, part_number, form, work)
 
@@ -158,11 +167,11 @@ def add_line(call: Writer, part_number: str, form: Form) -> Response:
     """Add a manual line. Where the part has one already, that one is opened with what was typed."""
     sent = line_form.read(form)
     child = text(form, "child")
-    asked = Asked(typed={**sent.typed, "child": child}, why=sent.why)
+    asked = PageState(typed={**sent.typed, "child": child}, why=sent.why)
 
     def work(tx: Tx) -> tuple[str, int]:
         if not child:
-            raise RejectedError("part number: wanted the number of an item, got nothing")
+            raise RejectedError(_("part number: wanted the number of an item, got nothing"))
         new = LineState(**{"quantity": 1.0, "source": "manual", **line_form.values_of(sent.typed)})
         try:
             added = review.add_line(tx, part_number, child, new, why=sent.why or None)
@@ -171,9 +180,9 @@ def add_line(call: Writer, part_number: str, form: Form) -> Response:
             line = component_of(lines_of(tx, parent), child, parent)
             # Fields that were left empty keep what the line has.
             typed = {**line_form.shown(line.state), **{k: v for k, v in sent.typed.items() if v}}
-            problem = f"{_sentence(error)} Its line is open here with what you typed."
+            problem = f"{_sentence(error)} {_('Its line is open here with what you typed.')}"
             raise Refused(replace(asked, problem=problem, edit=line.id, typed=typed)) from None
-        return f"{isolate(added.child_part_number)} added.", added.change_id
+        return _("%(number)s added.", number=isolate(added.child_part_number)), added.change_id
 
     return _do(call, part_number, form, work, asked)
 
@@ -182,22 +191,26 @@ def add_line(call: Writer, part_number: str, form: Form) -> Response:
 def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Response:
     """Change what the person changed in the form of a line; what two people changed is asked about."""
 
-    def change(tx: Tx, line: Line, sent: LineForm, asked: Asked, told: list[str]) -> tuple[str, int]:
+    def change(tx: Tx, line: Line, sent: LineForm, asked: PageState, news: list[str]) -> tuple[str, int]:
         if clashes := line_form.unmade(sent):
-            raise Refused(replace(asked, problem="Choose yours or theirs, then save.", clashes=clashes), 400)
+            raise Refused(
+                replace(asked, problem=_("Choose yours or theirs, then save."), clashes=clashes), 400
+            )
         edit = line_form.edit_of(sent, line.state)
         if edit.clashes:
-            problem = (
-                f"Nothing was saved yet: somebody else changed {line.child_part_number} while you edited it. "
-                "Choose whose value stays."
+            problem = _(
+                "Nothing was saved yet: somebody else changed %(number)s while you edited it. "
+                "Choose whose value stays.",
+                number=line.child_part_number,
             )
-            raise Refused(replace(asked, problem=problem, story=told, clashes=edit.clashes), 412)
+            raise Refused(replace(asked, problem=problem, story=news, clashes=edit.clashes), 412)
         why = sent.why or None
         edited = review.change_line(tx, part_number, LineId(line.id), line_form.values_of(edit.mine), why=why)
-        also = f" Meanwhile: {'; '.join(told)}." if edit.theirs and told else ""
+        also = _(" Meanwhile: %(told)s.", told="; ".join(news)) if edit.theirs and news else ""
         if not edited.change_id or edited.line is None:
-            return f"Nothing was different, so nothing was changed.{also}", 0
-        return f"{isolate(edited.child_part_number)} changed.{also}", edited.change_id
+            return _("Nothing was different, so nothing was changed.") + also, 0
+        said = _("%(number)s changed.", number=isolate(edited.child_part_number))
+        return said + also, edited.change_id
 
     return _do_line(call, part_number, line_id, form, change)
 
@@ -206,14 +219,17 @@ def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
 def remove_line(call: Writer, part_number: str, line_id: str, form: Form) -> Response:
     """Take a line out of the BOM, if it is as the person saw it."""
 
-    def remove(tx: Tx, line: Line, sent: LineForm, asked: Asked, told: list[str]) -> tuple[str, int]:
+    def remove(tx: Tx, line: Line, sent: LineForm, asked: PageState, news: list[str]) -> tuple[str, int]:
         seen, why = text(form, "mark") or None, sent.why or None
         try:
             edited = review.remove_line(tx, part_number, LineId(line.id), seen=seen, why=why)
         except LinesChangedError:
-            problem = f"Nothing was removed: {line.child_part_number} was changed by somebody else meanwhile."
-            raise Refused(replace(asked, problem=problem, story=told), 412) from None
-        return f"{isolate(edited.child_part_number)} removed.", edited.change_id
+            problem = _(
+                "Nothing was removed: %(number)s was changed by somebody else meanwhile.",
+                number=line.child_part_number,
+            )
+            raise Refused(replace(asked, problem=problem, story=news), 412) from None
+        return _("%(number)s removed.", number=isolate(edited.child_part_number)), edited.change_id
 
     return _do_line(call, part_number, line_id, form, remove)
 
@@ -223,7 +239,7 @@ def _do_line(
     part_number: str,
     line_id: str,
     form: FormData,
-    act: Callable[[Tx, Line, LineForm, Asked, list[str]], tuple[str, int]],
+    act: Callable[[Tx, Line, LineForm, PageState, list[str]], tuple[str, int]],
 ) -> Response:
     """Do ``act`` to the line of a form. Where it is gone, what was typed stays in the form for a new one.
 
@@ -232,18 +248,20 @@ def _do_line(
         meanwhile.
     """
     sent = line_form.read(form)
-    asked = Asked(edit=line_id, typed=sent.typed, seen=sent.seen, why=sent.why)
+    asked = PageState(edit=line_id, typed=sent.typed, seen=sent.seen, why=sent.why)
 
     def work(tx: Tx) -> tuple[str, int]:
         parent = get_item(tx, part_number, lock=True)
-        told = line_form.meanwhile(tx, parent, [line_id], sent.at).get(line_id, [])
+        news = line_form.meanwhile(tx, parent, [line_id], sent.at).get(line_id, [])
         try:
             line = line_of(lines_of(tx, parent), LineId(line_id), parent)
         except NotFoundError:
-            problem = "This line is no longer in the BOM. What you typed stands below, as a line to be added."
+            problem = _(
+                "This line is no longer in the BOM. What you typed stands below, as a line to be added."
+            )
             typed = {**sent.typed, "child": text(form, "child")}
-            raise Refused(replace(asked, problem=problem, story=told, edit="", typed=typed), 404) from None
-        return act(tx, line, sent, asked, told)
+            raise Refused(replace(asked, problem=problem, story=news, edit="", typed=typed), 404) from None
+        return act(tx, line, sent, asked, news)
 
     return _do(call, part_number, form, work, asked)
 
@@ -259,11 +277,11 @@ def _do(
     part_number: str,
     form: FormData,
     work: Callable[[Tx], tuple[str, int]],
-    asked: Asked | None = None,
+    asked: PageState | None = None,
 ) -> Response:
     """Do ``work`` and go back; where it cannot be done, the page says why and keeps what was typed."""
     view = view_of(text(form, "view", 1000))
-    given = replace(asked or Asked(), view=view)
+    given = replace(asked or PageState(), view=view)
     try:
         with call.write() as tx:
             notice, change_id = work(tx)
@@ -277,13 +295,13 @@ def _do(
     return back(bom_path(part_number) + (f"?{view}" if view else ""), notice, undo=[change_id])
 
 
-def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Response:
+def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> Response:
     with call.read() as tx:
         item = get_item(tx, part_number)
-        found = service.review(tx, item.part_number)
+        review_of = service.review(tx, item.part_number)
         lines = lines_of(tx, item)
         last = last_sync(tx, item)
-        merge = found.last_merge
+        merge = review_of.last_merge
         merged = history.get_change(tx, item, merge.id)[1] if merge else []
         recent = history.list_changes(tx, item, LATER_CHANGES)
         seen = events.head(tx)
@@ -291,12 +309,18 @@ def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Resp
             below = summary_of(tx, item).told(item.id)
         except (BusyError, CycleError) as error:
             below, asked = [], replace(asked, problem=asked.problem or _sentence(error))
-        by_hand, cad_words = line_form.disputed(tx, item, lines, found)
-    conflicts = {conflict.line.id: conflict for conflict in found.conflicts}
+        by_hand, cad_words = line_form.disputed(tx, item, lines, review_of)
+        # The model is compared with the file before the one that the oldest question came with.
+        since = [line.state.unreferenced_since for line in review_of.unreferenced]
+        since += [conflict.since for conflict in review_of.conflicts]
+        asked_at = min(filter(None, since), default=merge.at if merge else "")
+        before = files_until(tx, item, asked_at, 2)[1:]
+        assignee, people = review.assignee_of(tx, item), review.editors(tx)
+    conflicts = {conflict.line.id: conflict for conflict in review_of.conflicts}
     editing = _editing(lines, asked, item)
     problem = asked.problem
     if asked.edit and editing is None and not problem:
-        problem = "The line that you wanted to edit is not in this BOM any more."
+        problem = _("The line that you wanted to edit is not in this BOM any more.")
     now = line_form.shown(editing.state) if editing else {}
     table, table_at = table_of(lines, bom_path(item.part_number), asked.view)
     return page(
@@ -315,22 +339,26 @@ def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Resp
         now=now,
         kept=line_form.still_typed(asked.typed, asked.seen, now),
         mark=mark_of(editing.state) if editing else "",
-        marks=service.marks_of([*found.unreferenced, *(c.line for c in found.conflicts)], conflicts),
+        marks=service.marks_of([*review_of.unreferenced, *(c.line for c in review_of.conflicts)], conflicts),
         asked=replace(asked, problem=problem),
-        labels=FIELDS,
+        labels={name: _(label) for name, label in FIELDS.items()},
+        texts={name: text_hints(field) for name, field in line_form.TEXTS.items()},
         group_of=line_form.group_of,
         at=recent[0].id if recent else 0,
         by_hand=by_hand,
+        assignee=assignee,
+        people=people,
         cad_words=cad_words,
         below=below,
         of_cad=line_form.of_cad,
         by_sync=by_whom(merge) if merge else "",
+        before=before,
         last=last,
         gaps=in_sentences(last.gaps),
-        unreferenced=found.unreferenced,
+        unreferenced=review_of.unreferenced,
         most_shown=MOST_SHOWN,
         most_forms=MOST_FORMS,
-        conflicts=found.conflicts,
+        conflicts=review_of.conflicts,
         merge=merge,
         merged=sentences(merged),
         later=[change for change in recent if merge is None or change.id > merge.id],
@@ -340,11 +368,11 @@ def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Resp
 
 
 SHOWS: Mapping[str, tuple[str, Callable[[Line], bool]]] = {
-    "cad": ("from CAD", lambda line: line.state.source == "assembly"),
-    "hand": ("by hand", lambda line: line.state.source == "manual"),
-    "override": ("overridden here", lambda line: line.state.override),
-    "unreferenced": ("unreferenced", lambda line: line.state.unreferenced_since is not None),
-    "archived": ("archived items", lambda line: line.child_archived),
+    "cad": (N_("from CAD"), lambda line: line.state.source == "assembly"),
+    "hand": (N_("by hand"), lambda line: line.state.source == "manual"),
+    "override": (N_("overridden here"), lambda line: line.state.override),
+    "unreferenced": (N_("unreferenced"), lambda line: line.state.unreferenced_since is not None),
+    "archived": (N_("archived items"), lambda line: line.child_archived),
 }
 _SORTS: Mapping[str, Callable[[Line], Any]] = {
     "number": lambda line: line.child_part_number.casefold(),
@@ -354,26 +382,30 @@ _SORTS: Mapping[str, Callable[[Line], Any]] = {
 }
 
 
-def _remarks(state: LineState) -> tuple[str | None, ...]:
-    return state.notes, state.reason, state.find_number, *state.reference_designators
-
-
 def table_of(lines: Sequence[Line], path: str, view: str) -> tuple[Page[Line], Address]:
     """The lines that the query ``view`` asks for, and the address with it."""
     asked = {name: value[:200] for name, value in parse_qsl(view) if name in ("q", "show", "sort", "page")}
     test, shown = fits(asked.get("q", "")), SHOWS.get(asked.get("show", ""))
-    found = [
+    shown_lines = [
         line
         for line in lines
         if (shown is None or shown[1](line))
-        and test(line.child_part_number, line.child_name, *_remarks(line.state))
+        and test(
+            line.child_part_number,
+            line.child_name,
+            *(
+                line.state.reason,
+                *line.state.reference_designators,
+                *(getattr(line.state, name) for name in line_form.TEXTS),
+            ),
+        )
     ]
     wanted = whole_number(asked.pop("page", "")) or 1
-    table = page_of(arranged(found, asked.get("sort", ""), _SORTS), len(lines), wanted)
+    table = page_of(arranged(shown_lines, asked.get("sort", ""), _SORTS), len(lines), wanted)
     return table, Address(path, asked | ({"page": str(table.number)} if table.number > 1 else {}))
 
 
-def _editing(lines: list[Line], asked: Asked, item: Any) -> Line | None:
+def _editing(lines: list[Line], asked: PageState, item: Any) -> Line | None:
     if not asked.edit:
         return None
     for which in (LineId(asked.edit), asked.edit):
@@ -382,10 +414,10 @@ def _editing(lines: list[Line], asked: Asked, item: Any) -> Line | None:
     return None
 
 
-def _done(decisions: list[Decision]) -> str:
+def _decided_text(decisions: list[Decision]) -> str:
     who = isolate(decisions[0].child_part_number)
-    lines = who if len(decisions) == 1 else counted(len(decisions), "line", "lines")
-    return f"{lines} {line_form.DONE[decisions[0].action]}."
+    lines = who if len(decisions) == 1 else plural(len(decisions), "line")
+    return f"{lines} {_(line_form.DONE[decisions[0].action])}."
 
 
 def _sentence(error: SiloError) -> str:

@@ -17,7 +17,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import RedirectResponse, Response
 from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
-from starlette.types import Scope
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from silo_server.http import SECURITY_HEADERS
 from silo_server.routes.context import SAFE_METHODS, find_actor
@@ -29,11 +29,12 @@ from silo_server.web import (
     item_edit_page,
     item_page,
     merge_page,
+    orders_page,
     releases_page,
     waiting_page,
 )
 from silo_server.web.accounts import LoginNeededError, OldFormError, send_again, to_login
-from silo_server.web.render import page_for, sentence
+from silo_server.web.render import LANGUAGE, LANGUAGE_COOKIE, N_, _, language_for, page_for, sentence
 
 ROUTERS = (
     accounts.router,
@@ -41,14 +42,32 @@ ROUTERS = (
     item_page.router,
     merge_page.router,
     releases_page.router,
+    orders_page.router,
     activity_page.router,
     import_page.router,
     waiting_page.router,
 )
 
 
+class Spoken:
+    """Says in which language a page is; what the API answers never depends on it."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and not scope["path"].startswith("/api/"):
+            request = Request(scope)
+            chosen = request.cookies.get(LANGUAGE_COOKIE, "")
+            LANGUAGE.set(language_for(chosen, request.headers.get("accept-language", "")))
+        await self.app(scope, receive, send)
+
+
 class OwnFiles(StaticFiles):
-    """Our style sheet and scripts; a browser asks each time whether they are new, so that none gets old."""
+    """Our style sheets and scripts, and the viewer, which reports of masses have as well.
+
+    A browser asks each time whether they are new, so that none gets old.
+    """
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
@@ -57,8 +76,11 @@ class OwnFiles(StaticFiles):
 
 
 def install(app: FastAPI) -> None:
-    """Add what is no route: static files, the way to the login page, errors as pages."""
-    app.mount("/static", OwnFiles(packages=[("silo_server.web", "static")]), name="static")
+    """Add what is no route: static files, the language, the way to the login page, errors as pages."""
+    app.add_middleware(Spoken)
+    app.mount(
+        "/static", OwnFiles(packages=[("silo_server.web", "static"), ("silo", "viewer")]), name="static"
+    )
     # Browsers get pages where the handlers that ``app`` has give JSON.
     for kind, handler in list(app.exception_handlers.items()):
         app.add_exception_handler(kind, _for_browsers(cast(Handler, handler)))
@@ -69,16 +91,16 @@ def install(app: FastAPI) -> None:
 Handler = Callable[[Request, Exception], Awaitable[Response]]
 
 TITLES = {
-    400: "That did not work",
-    401: "Please log in",
-    403: "Not allowed",
-    404: "Not found",
-    405: "Not found",
-    409: "Something else is in the way",
-    412: "The BOM changed in between",
-    413: "Too large",
-    429: "Too many attempts",
-    503: "Not possible at the moment",
+    400: N_("That did not work"),
+    401: N_("Please log in"),
+    403: N_("Not allowed"),
+    404: N_("Not found"),
+    405: N_("Not found"),
+    409: N_("Something else is in the way"),
+    412: N_("The BOM changed in between"),
+    413: N_("Too large"),
+    429: N_("Too many attempts"),
+    503: N_("Not possible at the moment"),
 }
 
 
@@ -99,7 +121,7 @@ def _for_browsers(handler: Handler) -> Handler:
 
 async def error_page(request: Request, plain: Response) -> Response:
     """The page for an error that was answered as JSON."""
-    told: dict[str, Any] = json.loads(bytes(plain.body))
+    values: dict[str, Any] = json.loads(bytes(plain.body))
 
     kept = getattr(request.state, "kept", None)
 
@@ -109,10 +131,10 @@ async def error_page(request: Request, plain: Response) -> Response:
             _actor(request),
             "error.html",
             status=plain.status_code,
-            title=TITLES.get(plain.status_code, "The server made a mistake"),
-            message=_sentence(plain.status_code, told["message"], request),
-            problems=told.get("problems", [])[:50],
-            path=told.get("path", []),
+            title=_(TITLES.get(plain.status_code, N_("The server made a mistake"))),
+            message=_sentence(plain.status_code, values["message"], request),
+            problems=values.get("problems", [])[:50],
+            path=values.get("path", []),
             kept=kept,
         )
 
@@ -137,7 +159,7 @@ def _page_above(request: Request) -> str:
 
 def _sentence(status: int, message: str, request: Request) -> str:
     if message.startswith(("Not Found:", "Method Not Allowed:")):
-        return f"There is no page {request.url.path}."
+        return _("There is no page %(path)s.", path=request.url.path)
     return sentence(message)
 
 

@@ -17,7 +17,7 @@ from silo_server.db.engine import Tx
 from silo_server.routes.context import Call
 from silo_server.routes.releases import frozen_now
 from silo_server.services import releases
-from silo_server.services.access.accounts import get_user
+from silo_server.services.access import get_user
 from silo_server.services.bom import tree
 from silo_server.services.bom.frozen import Product, frozen_product
 from silo_server.services.bom.summary import summary_of
@@ -27,13 +27,13 @@ from silo_server.settings import TooLargeError
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import Form, back, text
-from silo_server.web.render import Address, page, page_of, segment
+from silo_server.web.render import N_, Address, _, page, page_of, segment
 
 router = APIRouter(include_in_schema=False)
 
 # More rows of a frozen tree nobody pages through; an export has all of them.
 MOST_ROWS = 20_000
-ENDS = ("rejected", "withdrawn", "obsolete")
+ENDS = (N_("rejected"), N_("withdrawn"), N_("obsolete"))
 
 
 def _path(part_number: str) -> str:
@@ -51,25 +51,25 @@ def _show(
 ) -> Response:
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
-        found = releases.list_releases(tx, item)
+        list_of_releases = releases.list_releases(tx, item)
         values: dict[str, Any] = {
-            "rows": [(one, releases.approvals_of(tx, one)) for one in found],
+            "rows": [(release, releases.approvals_of(tx, release)) for release in list_of_releases],
             "draft": releases.coming_label(tx, item),
-            "state": state_of(tx, item, found),
+            "state": state_of(tx, item, list_of_releases),
             "approver": get_user(tx, call.actor.username).approver,
             "wanted": tx.settings.release_approvals,
             "may_override": tx.settings.release_override,
         }
-        waiting = next((one for one in found if one.status == "review"), None)
+        waiting = next((release for release in list_of_releases if release.status == "review"), None)
         values |= {"in_review": waiting, "blocks": releases.blocks_of(tx, waiting) if waiting else []}
     return page(call, "releases.html", status=status, item=item, problem=problem, typed=typed or {}, **values)
 
 
-def state_of(tx: Tx, item: Item, found: list[Release] | None = None) -> dict[str, Any]:
+def state_of(tx: Tx, item: Item, list_of_releases: list[Release] | None = None) -> dict[str, Any]:
     """What pages say of a product: the revision that is released, and whether something changed since."""
-    found = releases.list_releases(tx, item) if found is None else found
-    released = next((one for one in found if one.status == "released"), None)
-    waiting = next((one for one in found if one.status == "review"), None)
+    list_of_releases = releases.list_releases(tx, item) if list_of_releases is None else list_of_releases
+    released = next((release for release in list_of_releases if release.status == "released"), None)
+    waiting = next((release for release in list_of_releases if release.status == "review"), None)
     newest = waiting or released
     changed = False
     if newest is not None:
@@ -91,7 +91,7 @@ def submit(call: Writer, part_number: str, form: Form) -> Response:
             )
     except SiloError as error:
         return _show(call, part_number, str(error), error.status_hint, typed)
-    return back(_path(part_number), f"Revision {release.label} is in review.")
+    return back(_path(part_number), _("Revision %(label)s is in review.", label=release.label))
 
 
 @router.post("/items/{part_number}/releases/{label}/approval")
@@ -103,8 +103,9 @@ def approve(call: Reader, part_number: str, label: str, form: Form) -> Response:
             done = releases.approve(tx, part_number, label, typed["approval"], typed["override"])
     except SiloError as error:
         return _show(call, part_number, str(error), error.status_hint, typed)
-    said = "is released" if done.status == "released" else "has your approval, and waits for another"
-    return back(_path(part_number), f"Revision {label} {said}.")
+    released = N_("Revision %(label)s is released.")
+    waits = N_("Revision %(label)s has your approval, and waits for another.")
+    return back(_path(part_number), _(released if done.status == "released" else waits, label=label))
 
 
 @router.post("/items/{part_number}/releases/{label}/end")
@@ -112,13 +113,13 @@ def end(call: Reader, part_number: str, label: str, form: Form) -> Response:
     """Reject, withdraw, or call obsolete."""
     status = text(form, "status")
     if status not in ENDS:
-        return _show(call, part_number, "Load the page again: the form has another state.", 400)
+        return _show(call, part_number, _("Load the page again: the form has another state."), 400)
     try:
         with call.write() as tx:
             releases.end(tx, part_number, label, status, text(form, "note", 2000))
     except SiloError as error:
         return _show(call, part_number, str(error), error.status_hint)
-    return back(_path(part_number), f"Revision {label} is {status}.")
+    return back(_path(part_number), _("Revision %(label)s is %(status)s.", label=label, status=_(status)))
 
 
 @router.get("/items/{part_number}/releases/{label}")
@@ -136,6 +137,14 @@ def release_page(
         product = frozen_product(tx, item, release)
         record = releases.read_record(tx, release.record)
         approvals = releases.approvals_of(tx, release)
+        numbered = [
+            each_release
+            for each_release in releases.list_releases(tx, item)
+            if each_release.status in releases.NUMBERED
+        ]
+    before = next(
+        (each_release for each_release in numbered if each_release.frozen_at < release.frozen_at), None
+    )
     rows = list(islice(_rows(product, flat=view == "flat"), MOST_ROWS))
     table = page_of(rows, len(rows), number)
     at = Address(f"{_path(item.part_number)}/{segment(label)}", {"view": view} if view != "tree" else {})
@@ -145,11 +154,14 @@ def release_page(
         item=product.graph.root,
         release=release,
         approvals=approvals,
+        before=before,
         table=table,
         at=at,
         flat=view == "flat",
         worth=product.worths[product.graph.root.id],
-        files=record["files"],
+        files=sorted(
+            record["files"], key=lambda each_release: each_release["file_path"] or each_release["file_name"]
+        ),
         cut=len(rows) == MOST_ROWS,
     )
 
@@ -160,5 +172,10 @@ def _rows(product: Product, *, flat: bool) -> Any:
         for row in tree.flatten(product.graph):
             yield row.line, 1, row.total, product.worths[row.line.child_id]
         return
-    for one in tree.expand(product.graph, tree.MAX_DEPTH, MOST_ROWS):
-        yield one.line, one.depth, as_decimal(one.total), product.worths[one.line.child_id]
+    for occurrence in tree.expand(product.graph, tree.MAX_DEPTH, MOST_ROWS):
+        yield (
+            occurrence.line,
+            occurrence.depth,
+            as_decimal(occurrence.total),
+            product.worths[occurrence.line.child_id],
+        )

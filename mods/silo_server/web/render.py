@@ -5,37 +5,229 @@ Tables that sort, filter and page. What is shown is in the address: a view can b
 
 All of it is done here, on the server, so that a page works without a script; with one (``view.js``) the same
 address is fetched and only the table is replaced.
+
+Languages: a template holds its texts in English, and is translated as a whole when it is compiled for a
+language (:func:`translated`). ``_`` and ``plural`` translate what stands in Python, in scripts and in
+expressions. The catalogues are ``silo_server/locale/*/LC_MESSAGES/silo_server.mo``.
 """
 
 from __future__ import annotations
 
+import gettext
+import json
 import re
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from decimal import ROUND_HALF_EVEN, Context, Decimal
+from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 from urllib.parse import quote, unquote, urlencode
 
 from fastapi import Request
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2.ext import Extension
 from markupsafe import Markup, escape
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import HTMLResponse, Response
 
-from silo.bom.errors import counted
+import silo
 from silo.bom.numbers import as_decimal, whole_number
 from silo_server.db.engine import mode_of
 from silo_server.routes.context import Call, masked, server_of
-from silo_server.services.bom.review import waiting_count
+from silo_server.services.bom.review import badge, waiting_count
 from silo_server.settings import wire
 from silo_server.values import Actor, Role
 
 # The key of a notice in the address of the page that shows it, and the cookies (one for each key) it is in.
 NOTICE, NOTICE_COOKIE = "said", "silo_notice"
 
+LANGUAGES = {"en": "English", "de": "Deutsch"}
+LANGUAGE_COOKIE = "silo_language"
+_CATALOGUES = {
+    name: gettext.translation("silo_server", Path(__file__).parents[1] / "locale", [name], fallback=True)
+    for name in LANGUAGES
+}
+# Of the request that is answered; what is no page is English.
+LANGUAGE: ContextVar[str] = ContextVar("LANGUAGE", default="en")
+
+
+def language_for(chosen: str, accepted: str) -> str:
+    """The language of a page: what a person chose, else the best of an ``Accept-Language``, else English."""
+    if chosen in LANGUAGES:
+        return chosen
+    best, weight = "en", 0.0
+    for part in accepted.split(","):
+        tag, _semicolon, rest = part.partition(";")
+        name = tag.strip().partition("-")[0].lower()
+        quality = re.fullmatch(r"\s*q\s*=\s*(0(?:\.\d{0,3})?|1(?:\.0{0,3})?)\s*", rest)
+        worth = float(quality[1]) if quality else 0.0 if rest else 1.0
+        if name in LANGUAGES and worth > weight:
+            best, weight = name, worth
+    return best
+
+
+def _(text: str, **values: object) -> str:
+    """``text`` in the language of the page, with ``values`` in the place of ``%(name)s``."""
+    translation = _CATALOGUES[LANGUAGE.get()].gettext(text) if text else ""
+    return translation % values if values else translation
+
+
+def plural(number: int, one: str, many: str = "") -> str:
+    """As :func:`silo.bom.errors.counted`, in the language of the page."""
+    return f"{number} {_CATALOGUES[LANGUAGE.get()].ngettext(one, many or one + 's', number)}"
+
+
+SCRIPTS = sorted(Path(__file__).with_name("static").glob("*.js"))
+SCRIPTS += [Path(silo.__file__).with_name("viewer") / "viewer.js"]
+
+
+def script_words() -> dict[str, str]:
+    """Text → translation, for the scripts of a page."""
+    return {text: _(text) for path in SCRIPTS for text in texts_of_script(path)}
+
+
+def texts_of_script(path: Path) -> list[str]:
+    """The texts of a script that are translated: ``_("Page %(n)s", { n })``."""
+    return [json.loads(text) for text in re.findall(r'\b_\(("(?:[^"\\]|\\.)*")', path.read_text("utf-8"))]
+
+
+_EXPRESSION = r"\{\{(?:\"[^\"]*\"|'[^']*'|\}(?!\})|[^\"'}])*\}\}"
+_STATEMENT = r"\{%(?:\"[^\"]*\"|'[^']*'|%(?!\})|[^\"'%])*%\}"
+_VALUE = rf"\"(?:{_EXPRESSION}|{_STATEMENT}|[^\"])*\""
+_PIECE = re.compile(
+    rf"(?P<comment>\{{\#.*?\#\}})|(?P<statement>{_STATEMENT})|(?P<expression>{_EXPRESSION})"
+    rf"|(?P<tag></?(?P<name>!?[a-zA-Z][\w-]*)(?:{_EXPRESSION}|{_STATEMENT}|{_VALUE}|[^<>\"])*>)|(?P<text>[^<{{]+|.)",
+    re.DOTALL,
+)
+_ATTRIBUTE = re.compile(
+    rf"( (?:title|aria-label|placeholder|alt|data-label|data-question)=\")((?:{_EXPRESSION}|[^\"])*)(?=\")"
+)
+# What may stand within a sentence.
+_WITHIN = frozenset(("a", "b", "code", "em", "small", "span", "strong"))
+# Between sentences; a path such as "Items › F01 › BOM" is several of them.
+_BETWEEN = re.compile(r"(\s*[›·]\s*)")
+_WORD = re.compile(r"[^\W\d_]{2}|\b[aI]\b")
+
+
+def translated(template: str, translate: Callable[[str], str]) -> str:
+    """A template in another language: each text and each attribute that is read, as ``translate`` has it.
+
+    A text is a sentence with the elements in it; its expressions and the tags with attributes are
+    placeholders: ``Suppliers of %(part_number)s``. Statements and all other elements end it.
+    """
+    made: list[str] = []
+    run: list[str] = []
+    for match in _PIECE.finditer(template):
+        source = match[0]
+        if match["tag"]:
+            source = _ATTRIBUTE.sub(
+                lambda each_match: each_match[1] + _value(each_match[2], translate), source
+            )
+        if match["text"] or match["expression"] or match["name"] in _WITHIN:
+            run += _BETWEEN.split(source) if match["text"] else [source]
+        else:
+            made += [_sentence(run, translate), source]
+            run = []
+    return "".join([*made, _sentence(run, translate)])
+
+
+def _value(source: str, translate: Callable[[str], str]) -> str:
+    pieces = re.split(f"({_EXPRESSION})", source)
+    return source if "{%" in source else _sentence(pieces, translate)
+
+
+def _has_words(pieces: Sequence[str]) -> bool:
+    return any(piece[:1] not in "<{" and _WORD.search(piece) for piece in pieces if piece)
+
+
+def _is_apart(pieces: Sequence[str]) -> bool:
+    """True for space or an element with a sign in it, at an end of a sentence."""
+    element = len(pieces) > 1 and not _has_words(pieces) and not any(piece[:1] == "{" for piece in pieces)
+    return element or (len(pieces) == 1 and not pieces[0].strip())
+
+
+def _sentence(run: Sequence[str], translate: Callable[[str], str]) -> str:
+    """A run of texts, expressions and tags, translated in its largest parts that are sentences."""
+    if not _has_words(run):
+        return "".join(run)
+    ends: dict[int, int] = {}
+    opened: list[int] = []
+    breaks = []
+    for number, piece in enumerate(run):
+        if piece.startswith("</"):
+            if opened:
+                ends[opened.pop()] = number
+            else:
+                breaks.append(number)
+        elif piece.startswith("<"):
+            opened.append(number)
+        elif _BETWEEN.fullmatch(piece) and not opened:
+            breaks.append(number)
+    if breaks := sorted([*breaks, *opened]):
+        at = breaks[0]
+        return _sentence(run[:at], translate) + run[at] + _sentence(run[at + 1 :], translate)
+    begins = {end: begin for begin, end in ends.items()}
+    first, last = 0, len(run)
+    while _is_apart(run[first : ends.get(first, first) + 1]):
+        first = ends.get(first, first) + 1
+    while _is_apart(run[begins.get(last - 1, last - 1) : last]):
+        last = begins.get(last - 1, last - 1)
+    around, run = (run[:first], run[last:]), run[first:last]
+    ends = {begin - first: end - first for begin, end in ends.items() if first <= begin < last}
+    outer, number = [], 0
+    while number < len(run):
+        outer.append(number)
+        number = ends.get(number, number) + 1
+    if _has_words([run[number] for number in outer]):
+        done = _message(run, translate)
+    else:
+        # No sentence holds the elements together: each is one. What stands in <code> is no language.
+        done = "".join(
+            run[number] + _sentence(run[number + 1 : ends[number]], translate) + run[ends[number]]
+            if number in ends and not run[number].startswith("<code")
+            else "".join(run[number : ends.get(number, number) + 1])
+            for number in outer
+        )
+    return "".join([*around[0], done, *around[1]])
+
+
+def _message(run: Sequence[str], translate: Callable[[str], str]) -> str:
+    places: dict[str, str] = {}
+    words = ""
+    for piece in run:
+        if piece.startswith("{{") or re.match(r"<\w+ ", piece):
+            name = wanted = _name_of(piece)
+            while places.get(name, piece) != piece:
+                name = f"{wanted}{len(places)}"
+            places[name] = piece
+            piece = f"%({name})s"
+        words += piece
+    core = " ".join(words.split())
+    start, end = words[: len(words) - len(words.lstrip())], words[len(words.rstrip()) :]
+    return start + re.sub(r"%\((\w+)\)s", lambda place: places[place[1]], translate(core)) + end
+
+
+def _name_of(piece: str) -> str:
+    """``part_number`` for ``{{ item.part_number | bdi }}``, ``count`` for ``{{ plural(…) }}``, ``link``."""
+    if piece.startswith("<"):
+        tag = piece[1:].partition(" ")[0]
+        return "link" if tag == "a" else tag
+    if "plural(" in piece:
+        return "count"
+    plain = re.sub(r"\"[^\"]*\"|\|.*", "", piece[2:-2].strip("-() ").partition(" if ")[0])
+    names = re.findall(r"[A-Za-z_]\w*", plain)
+    return names[-1] if names else "value"
+
+
+def N_(text: str) -> str:
+    """Mark a text that is translated where it is shown."""
+    return text
+
+
 # For controls that change an item or a BOM: they are shown, switched off, with the reason.
-SWITCHED_OFF = Markup(' disabled aria-describedby="closed" title="Not now: the server takes no changes"')
+SWITCHED_OFF = ' disabled aria-describedby="closed" title="{}"'
 
 
 def quantity(value: float | None, unit: str | None = None) -> str:
@@ -58,7 +250,7 @@ def size(count: int | None) -> str:
     if count is None:
         return ""
     if count < 1000:
-        return f"{count} bytes"
+        return plural(count, "byte")
     if count < 1e6:
         return f"{count / 1e3:.0f} kB"
     return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
@@ -147,35 +339,44 @@ def segment(text: str) -> str:
     return quote(text, safe="")
 
 
-def _environment() -> Environment:
-    environment = Environment(
+class _Translated(Extension):
+    def preprocess(self, source: str, name: str | None, filename: str | None = None) -> str:
+        return translated(source, _)
+
+
+def environment(language: str) -> Environment:
+    """What compiles the templates of a language."""
+    made = Environment(
         loader=PackageLoader("silo_server.web", "templates"),
+        extensions=[] if language == "en" else [_Translated],
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(
+    made.filters.update(
         quantity=quantity, when=when, segment=segment, size=size, bdi=bdi, mass=mass, money=money
     )
-    environment.globals.update(plural=counted)
-    return environment
+    made.globals.update(plural=plural, _=_, languages=LANGUAGES, script_words=script_words)
+    return made
 
 
-_TEMPLATES = _environment()
+_TEMPLATES = {language: environment(language) for language in LANGUAGES}
 _LINK = re.compile(r'(\s(?:href|src|action|formaction|data-events)=")/(?!/)')
 
 
-def _state(request: Request, waiting: int | None) -> tuple[bool, int]:
-    """Whether the server takes no changes, and how many BOMs wait for a person, if the page does not say.
+def _state(request: Request, waiting: int | None, actor: Actor | None) -> tuple[bool, int, int]:
+    """Whether the server takes no changes, how many BOMs wait, if the page does not say, and how much waits
+    for this person.
 
-    Without its database both are unknown; the page says so.
+    Without its database these are unknown; the page says so.
     """
     try:
         with server_of(request).db.read() as tx:
-            return mode_of(tx) != "normal", waiting_count(tx) if waiting is None else waiting
+            count = waiting_count(tx) if waiting is None else waiting
+            return mode_of(tx) != "normal", count, badge(tx, actor) if actor else 0
     except SQLAlchemyError:
-        return False, 0
+        return False, 0, 0
 
 
 def page(call: Call, template: str, *, status: int = 200, **values: Any) -> Response:
@@ -190,25 +391,35 @@ def page_for(
 
     Looks into the database for the server's mode, so not to be called on the event loop.
     """
-    closed, waiting = _state(request, values.pop("waiting", None))
+    closed, waiting, for_me = _state(request, values.pop("waiting", None), actor)
     cookie = f"{NOTICE_COOKIE}_{request.query_params.get(NOTICE, '')}"
-    undo, _, notice = unquote(request.cookies.get(cookie, "")).partition(" ")
-    html = _TEMPLATES.get_template(template).render(
-        actor=actor,
-        may_edit=actor is not None and actor.role.covers(Role.EDITOR),
-        is_admin=actor is not None and actor.role.covers(Role.ADMIN),
-        closed=closed,
-        waiting=waiting,
-        off=SWITCHED_OFF if closed else "",
-        csrf=masked(actor.csrf_token) if actor is not None and actor.csrf_token else "",
-        here=request.url.path,
-        notice=notice,
-        undo=[change for one in undo.split(",") if (change := whole_number(one, 18))],
-        **values,
+    undo, _space, notice = unquote(request.cookies.get(cookie, "")).partition(" ")
+    language = LANGUAGE.get()
+    html = (
+        _TEMPLATES[language]
+        .get_template(template)
+        .render(
+            language=language,
+            actor=actor,
+            may_edit=actor is not None and actor.role.covers(Role.EDITOR),
+            is_admin=actor is not None and actor.role.covers(Role.ADMIN),
+            closed=closed,
+            waiting=waiting,
+            for_me=for_me,
+            off=Markup(SWITCHED_OFF).format(_("Not now: the server takes no changes")) if closed else "",
+            csrf=masked(actor.csrf_token) if actor is not None and actor.csrf_token else "",
+            here=request.url.path,
+            address_here=f"{request.url.path}?{request.url.query}",
+            notice=notice,
+            undo=[change for part in undo.split(",") if (change := whole_number(part, 18))],
+            **values,
+        )
     )
     # The one place that puts links below the sub-path. What people typed has no bare quote, so is no link.
     root = server_of(request).settings.root_path
     response = HTMLResponse(_LINK.sub(rf"\g<1>{root}/", html) if root else html, status)
+    response.headers["Content-Language"] = language
+    response.headers["Vary"] = "Accept-Language, Cookie"
     if notice:
         response.delete_cookie(cookie)
     return response
@@ -217,7 +428,7 @@ def page_for(
 T = TypeVar("T")
 
 # A browser shows a table of so many rows at once.
-PAGE_ROWS = 1000
+PAGE_ROWS = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,9 +477,12 @@ class Page(Generic[T]):
     def words(self) -> str:
         """``12 of 340 lines`` in numbers only: ``12 of 340``, ``1 to 100 of 340``."""
         if self.found > self.size:
-            shown = f"{self.start + 1} to {self.start + len(self.rows)} of {self.found}"
-            return shown if self.found == self.total else f"{shown} found among {self.total}"
-        return f"{self.found}" if self.found == self.total else f"{self.found} of {self.total}"
+            first, last = self.start + 1, self.start + len(self.rows)
+            shown = _("%(first)s to %(last)s of %(found)s", first=first, last=last, found=self.found)
+            among = _("%(shown)s found among %(total)s", shown=shown, total=self.total)
+            return shown if self.found == self.total else among
+        part = _("%(found)s of %(total)s", found=self.found, total=self.total)
+        return f"{self.found}" if self.found == self.total else part
 
 
 def page_of(rows: Sequence[T], total: int, number: int, size: int = PAGE_ROWS) -> Page[T]:
@@ -287,10 +501,10 @@ def arranged(rows: Sequence[T], sort: str, keys: Mapping[str, Callable[[T], Any]
     key = keys.get(sort.removeprefix("-"))
     if key is None:
         return rows
-    known = [(value, row) for row in rows if (value := key(row)) not in (None, "")]
+    with_value = [(value, row) for row in rows if (value := key(row)) not in (None, "")]
     unknown = [row for row in rows if key(row) in (None, "")]
-    known.sort(key=lambda pair: _natural(pair[0]), reverse=sort.startswith("-"))
-    return [*(row for _, row in known), *unknown]
+    with_value.sort(key=lambda pair: _natural(pair[0]), reverse=sort.startswith("-"))
+    return [*(row for _value, row in with_value), *unknown]
 
 
 def _natural(value: Any) -> Any:
@@ -312,7 +526,7 @@ N = TypeVar("N", bound=Numbered)
 
 
 @dataclass(frozen=True, slots=True)
-class Part(Generic[N]):
+class ListPart(Generic[N]):
     """A part of a list that is newest first; the ids to page on from, None at its ends."""
 
     rows: Sequence[N]
@@ -325,16 +539,16 @@ def part_of(
     size: int,
     before: int | None,
     after: int | None,
-) -> Part[N]:
+) -> ListPart[N]:
     """The part before an id, or the nearest one after an id; the newest where neither is given.
 
     read
         (limit, before, after) → rows, newest first.
     """
-    if after is not None and (found := read(size + 1, None, after)):
-        rows = found[-size:]
-        return Part(rows, rows[-1].id, rows[0].id if len(found) > size else None)
-    found = read(size + 1, before if after is None else None, None)
-    rows = found[:size]
+    if after is not None and (rows_read := read(size + 1, None, after)):
+        rows = rows_read[-size:]
+        return ListPart(rows, rows[-1].id, rows[0].id if len(rows_read) > size else None)
+    rows_read = read(size + 1, before if after is None else None, None)
+    rows = rows_read[:size]
     newer = rows[0].id if before is not None and after is None and rows else None
-    return Part(rows, rows[-1].id if len(found) > size else None, newer)
+    return ListPart(rows, rows[-1].id if len(rows_read) > size else None, newer)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""All BOMs that wait for a person, by project folder, with one decision for many of them."""
+"""All BOMs that wait for a person, by project folder, with one decision for many of them.
+
+What waits for the person who looks: the open BOMs that are theirs, and the news of what they follow.
+"""
 
 from __future__ import annotations
 
@@ -12,27 +15,27 @@ from fastapi import APIRouter, Query
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.bom.errors import SiloError, VersionConflictError, counted
+from silo.bom.errors import SiloError, VersionConflictError
 from silo.bom.numbers import whole_number
 from silo_server.db.engine import Tx
 from silo_server.routes.context import Call
-from silo_server.services.bom import history
+from silo_server.services.bom import history, review
 from silo_server.services.bom.review import Action, Waiting, decide_all, lines_for, waiting
 from silo_server.services.search import fits
 from silo_server.values import Line
 from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import Form, back, text, texts
 from silo_server.web.line_form import DONE, decision_of
-from silo_server.web.render import Address, arranged, isolate, page, page_of
+from silo_server.web.render import N_, Address, _, arranged, isolate, page, page_of, plural
 
 router = APIRouter(include_in_schema=False)
 
 # What may wait, and what the filter calls it.
 KINDS: Mapping[str, tuple[str, Callable[[Waiting], int]]] = {
-    "unreferenced": ("unreferenced lines", lambda row: row.unreferenced),
-    "conflicts": ("conflicts", lambda row: row.conflicts),
-    "incomplete": ("incomplete syncs", lambda row: row.left_out),
-    "unregistered": ("unregistered parts", lambda row: row.unregistered),
+    "unreferenced": (N_("unreferenced lines"), lambda row: row.unreferenced),
+    "conflicts": (N_("conflicts"), lambda row: row.conflicts),
+    "incomplete": (N_("incomplete syncs"), lambda row: row.left_out),
+    "unregistered": (N_("unregistered parts"), lambda row: row.unregistered),
 }
 _SORTS: Mapping[str, Callable[[Waiting], Any]] = {
     "number": lambda row: row.part_number.casefold(),
@@ -42,6 +45,7 @@ _SORTS: Mapping[str, Callable[[Waiting], Any]] = {
     "conflicts": lambda row: row.conflicts,
     "incomplete": lambda row: row.left_out,
     "unregistered": lambda row: row.unregistered,
+    "assignee": lambda row: row.assignee.casefold(),
     "synced": lambda row: row.synced_at,
 }
 MOST_TOLD = 20
@@ -54,11 +58,13 @@ def waiting_page(
     q: Annotated[str, Query(max_length=200)] = "",
     folder: Annotated[str, Query(max_length=1024)] = "",
     kind: Annotated[str, Query(max_length=20)] = "",
+    who: Annotated[str, Query(max_length=64)] = "",
     sort: Annotated[str, Query(max_length=20)] = "",
     number: Annotated[int, Query(ge=1, le=10**7, alias="page")] = 1,
 ) -> Response:
-    """The table; ``folder`` is a project's folder or one in it."""
-    view = {"q": q, "folder": folder, "kind": kind, "sort": sort, "page": str(number) if number > 1 else ""}
+    """The table; ``folder`` is a project's folder or one in it, ``who`` settles the BOM (``-``: nobody)."""
+    view = {"q": q, "folder": folder, "kind": kind, "who": who, "sort": sort}
+    view |= {"page": str(number) if number > 1 else ""}
     return _show(call, {name: value for name, value in view.items() if value})
 
 
@@ -78,16 +84,21 @@ def decide(call: Writer, form: Form) -> Response:
 
     def work(tx: Tx, value: str) -> int | None:
         nonlocal lines
-        part_number, _, seen = value.rpartition(" ")
+        part_number, _space, seen = value.rpartition(" ")
         count, change = decide_all(tx, part_number, action, reason, seen)
         lines += count
         return change
 
     changes, problems = _each(call, chosen, lambda value: value.rpartition(" ")[0], work)
     if lines:
-        said = f"{counted(lines, 'line')} in {counted(len(changes), 'BOM')} {DONE[action]}."
+        said = _(
+            "%(lines)s in %(boms)s %(done)s.",
+            lines=plural(lines, "line"),
+            boms=plural(len(changes), "BOM"),
+            done=_(DONE[action]),
+        )
     else:
-        said = "Nothing of this kind was open in what was chosen, so nothing was changed."
+        said = _("Nothing of this kind was open in what was chosen, so nothing was changed.")
     if problems:
         return _show(call, view, said, problems, text(form, "reason"), 409, changes)
     return back(Address("/waiting", view).url(), said, undo=changes)
@@ -102,27 +113,89 @@ def undo(call: Writer, form: Form) -> Response:
         number = whole_number(change, 18) or 0
         return history.undo(tx, history.item_changed_by(tx, number), number, None)[0]
 
-    changes, problems = _each(call, made, lambda change: f"change {change}", work)
-    said, view = f"Undone in {counted(len(changes), 'BOM')}.", _view_of(form)
+    changes, problems = _each(call, made, lambda change: _("change %(id)s", id=change), work)
+    said, view = _("Undone in %(boms)s.", boms=plural(len(changes), "BOM")), _view_of(form)
     if problems:
         return _show(call, view, said, problems, status=409)
     return back(Address("/waiting", view).url(), said)
 
 
+@router.post("/waiting/assign")
+def assign(call: Writer, form: Form) -> Response:
+    """Give the chosen BOMs to a person, or to nobody in particular."""
+    chosen = list(dict.fromkeys(value.rpartition(" ")[0] for value in texts(form, "chosen")))
+    who, view = text(form, "assignee", 64), _view_of(form)
+    if not chosen:
+        return _show(call, view, _("Nothing was changed."), [_("No BOM was chosen.")], status=400)
+    with call.write() as tx:
+        for part_number in chosen:
+            review.assign(tx, part_number, who)
+    name = isolate(who) if who else _("nobody in particular")
+    return back(
+        _back_to(form, Address("/waiting", view).url()),
+        _("%(boms)s given to %(name)s.", boms=plural(len(chosen), "BOM"), name=name),
+    )
+
+
+def _back_to(form: FormData, usual: str) -> str:
+    """The page of an item that a form came from."""
+    path = text(form, "back", 400)
+    return path if path.startswith("/items/") else usual
+
+
+@router.get("/mine")
+def mine_page(call: Reader) -> Response:
+    """The open BOMs that are the person's own, and what they follow, news first."""
+    with call.read() as tx:
+        rows = waiting(tx)
+        subjects = review.followed(tx, call.actor)
+    followed = {subject.folder for subject in subjects}
+    return page(
+        call,
+        "mine.html",
+        waiting=len(rows),
+        rows=[row for row in rows if row.assignee == call.actor.username],
+        found=subjects,
+        folders=sorted({part for row in rows for part in _folders(row.folder)} - followed),
+    )
+
+
+@router.post("/mine/follow")
+def follow(call: Reader, form: Form) -> Response:
+    """Begin or end to follow an item or a folder."""
+    on = bool(text(form, "on"))
+    target = text(form, "target", 1024) or f"folder:{text(form, 'folder', 1000)}"
+    with call.write(even_when_read_only=True) as tx:
+        review.follow(tx, target, on=on)
+    said = _("You follow it now: the page For me says what changes.") if on else _("You follow it no more.")
+    return back(_back_to(form, "/mine"), said)
+
+
+@router.post("/mine/seen")
+def seen(call: Reader, form: Form) -> Response:
+    """All news are seen."""
+    with call.write(even_when_read_only=True) as tx:
+        review.have_seen(tx)
+    return back("/mine", _("All news are marked as seen."))
+
+
+_VIEW = ("q", "folder", "kind", "who", "sort")
+
+
 def _view_of(form: FormData) -> dict[str, str]:
-    return dict(Address("/waiting", {n: text(form, n, 1024) for n in ("q", "folder", "kind", "sort")}).but())
+    return dict(Address("/waiting", {name: text(form, name, 1024) for name in _VIEW}).but())
 
 
 def _gone(call: Call, action: Action, chosen: Sequence[str]) -> dict[str, Sequence[Line]]:
     """Part number → the lines that ``action`` would remove; what has changed since is left out here."""
-    found: dict[str, Sequence[Line]] = {}
+    result: dict[str, Sequence[Line]] = {}
     with call.read() as tx:
         for value in chosen:
-            part_number, _, seen = value.rpartition(" ")
+            part_number, _space, seen = value.rpartition(" ")
             with suppress(SiloError):
                 if lines := lines_for(tx, part_number, action, seen)[1]:
-                    found[part_number] = lines
-    return found
+                    result[part_number] = lines
+    return result
 
 
 def _each(
@@ -133,14 +206,18 @@ def _each(
     problems: list[str] = []
     for value in values:
         if not name(value):
-            problems.append(f"{isolate(value[:80])}: this is no BOM of the table; load the page again")
+            problems.append(
+                _("%(value)s: this is no BOM of the table; load the page again", value=isolate(value[:80]))
+            )
             continue
         try:
             with call.write() as tx:
                 change = work(tx, value)
             changes += [change] if change else []
         except VersionConflictError:
-            problems.append(f"{isolate(name(value))}: it was changed meanwhile, so nothing was done there")
+            problems.append(
+                _("%(name)s: it was changed meanwhile, so nothing was done there", name=isolate(name(value)))
+            )
         except SiloError as error:
             problems.append(f"{isolate(name(value))}: {error}")
     return changes, problems
@@ -156,17 +233,19 @@ def _show(
     changes: Sequence[int] = (),
 ) -> Response:
     with call.read() as tx:
-        rows = waiting(tx)
+        rows, people = waiting(tx), review.editors(tx)
+    who = view.get("who", "")
     folders = Counter(part for row in rows for part in _folders(row.folder))
     test, kind, folder = fits(view.get("q", "")), KINDS.get(view.get("kind", "")), view.get("folder", "")
-    found = [
+    waitings = [
         row
         for row in rows
         if (kind is None or kind[1](row))
         and (not folder or folder in _folders(row.folder))
+        and (not who or row.assignee == ("" if who == "-" else who))
         and test(row.part_number, row.name, row.folder, row.document_file)
     ]
-    order = arranged(found, view.get("sort", ""), _SORTS)
+    order = arranged(waitings, view.get("sort", ""), _SORTS)
     table = page_of(order, len(rows), int(view.get("page", "1")), PAGE_SIZE)
     return page(
         call,
@@ -179,6 +258,7 @@ def _show(
         sort=view.get("sort", ""),
         folders=sorted(folders.items()),
         kinds=KINDS,
+        people=people,
         totals={name: sum(count(row) for row in rows) for name, (_, count) in KINDS.items()},
         said=said,
         # What was done beside the problems can be undone as well.

@@ -89,7 +89,7 @@ def parent_path(b: Bench) -> None:
 
 @case()
 def symlinked_folder(b: Bench) -> None:
-    """The same file by two paths gives two documents in FreeCAD; it is one part all the same."""
+    """The same file by two paths gives two documents in FreeCAD; it is one part anyway."""
     (b.folder / "real").mkdir(exist_ok=True)
     link = b.folder / "linked"
     if not link.is_symlink():

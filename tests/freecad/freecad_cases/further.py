@@ -8,7 +8,7 @@ from freecad_cases.bench import ASM4, ASSEMBLY, LOOSE, Bench, case
 
 @case()
 def self_reference(b: Bench) -> None:
-    """A link to the very assembly that holds it; FreeCAD complains and saves it all the same."""
+    """A link to the very assembly that holds it; FreeCAD complains and saves it anyway."""
     bolt, top = b.part("bolt.FCStd"), b.container()
     b.link(top, bolt)
     b.link(top, top, "Self")

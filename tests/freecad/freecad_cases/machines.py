@@ -19,6 +19,10 @@ ROOTS = REPOSITORY / "scripts" / "freecad-roots.sh"
 
 # What the add-on must work in; the last part of a version does not matter.
 WANTED = ("0.20", "1.0", "1.1")
+# Of Python 3.11 with Qt 5 and of the newest: for what differs by Qt and by file formats, but in no other way.
+ENDS = ("0.20", "1.1")
+# For what the queue and the server do, which no version changes.
+NEWEST = ("1.1",)
 
 # As it is before a test gives itself a home of its own.
 _ENVIRONMENT = dict(os.environ)
@@ -114,12 +118,28 @@ def miss(reason: str) -> NoReturn:
 def wheel(folder: Path, name: str, version: str, content: str = "") -> None:
     """Write a package of one module as pip takes it."""
     info = f"{name}-{version}.dist-info"
-    files = {
-        f"{name}/__init__.py": content,
-        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n",
-        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
-    }
-    record = "".join(f"{path},,\n" for path in (*files, f"{info}/RECORD"))
-    with zipfile.ZipFile(folder / f"{name}-{version}-py3-none-any.whl", "w") as packed:
-        for path, text in {**files, f"{info}/RECORD": record}.items():
-            packed.writestr(path, text)
+    _pack(
+        folder,
+        info,
+        {
+            f"{name}/__init__.py": content.encode(),
+            f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n".encode(),
+        },
+    )
+
+
+def wheels_of(installed: Path, folder: Path) -> None:
+    """Write what pip installed into a folder as wheels again, so that a test needs no index."""
+    for info in installed.glob("*.dist-info"):
+        names = [line.partition(",")[0] for line in (info / "RECORD").read_text("utf-8").splitlines()]
+        kept = [name for name in names if not name.startswith("..") and "__pycache__" not in name]
+        _pack(folder, info.name, {name: (installed / name).read_bytes() for name in kept})
+
+
+def _pack(folder: Path, info: str, files: Mapping[str, bytes]) -> None:
+    kind = b"Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+    packed = {**files, f"{info}/WHEEL": kind}
+    packed[f"{info}/RECORD"] = "".join(f"{path},,\n" for path in {**packed, f"{info}/RECORD": 0}).encode()
+    with zipfile.ZipFile(folder / f"{info.removesuffix('.dist-info')}-py3-none-any.whl", "w") as out:
+        for path, content in packed.items():
+            out.writestr(path, content)

@@ -22,6 +22,8 @@ def as_freecad_reads_it() -> dict[str, Any]:
         "version": found.Version,
         "license": found.License[0]["name"],
         "icon": found.Icon,
+        "date": getattr(found, "Date", None),
+        "urls": [one["location"] for one in found.Urls],
         "freecad_min": found.FreeCADMin,
         "supports": found.supportsCurrentFreeCAD(),
         "depend": sorted(one["package"] for one in found.Depend if not one.get("optional")),

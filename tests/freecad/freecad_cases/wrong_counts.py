@@ -21,9 +21,8 @@ import Part
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "mods"))
 
-from silo.bom import roots
-from silo.bom.walk import roles, targets, tree
-from silo.workbench.freecad import host, live, witness
+from silo.bom import links, objects, roles, roots, targets
+from silo.workbench.freecad import host, live
 
 
 def document(folder: Path, name: str) -> Any:
@@ -127,6 +126,10 @@ def one_more(function: Any) -> Any:
     return lambda *args, **kwargs: (function(*args, **kwargs) or 0) + 1
 
 
+def without_beside(function: Any) -> Any:
+    return lambda *args, **kwargs: function(*args, **{**kwargs, "counts_beside": False})
+
+
 def always(answer: Any) -> Any:
     return lambda _old: lambda *_args: answer
 
@@ -134,22 +137,22 @@ def always(answer: Any) -> Any:
 # A fault: where a routine is broken, its name, and what makes the broken one of the right one.
 EITHER = {
     "an array counts one more": ((targets,), "array_count", one_more),
-    "all counts twice": ((tree.Tree,), "times", lambda old: lambda one, name: 2 * old(one, name)),
+    "all counts twice": ((objects.Tree,), "times", lambda old: lambda one, name: 2 * old(one, name)),
     "links are construction": ((roles,), "no_component", always("a joint")),
 }
 FAULTS: dict[Any, dict[str, Any]] = {
     with_everything: {
         **EITHER,
         "a Draft array counts one more": ((roles,), "draft_count", one_more),
-        "hidden sources count": ((tree.Tree,), "visible", always(True)),
+        "hidden sources count": ((objects.Tree,), "visible", always(True)),
         "operands count": ((roles,), "consumed", always({})),
-        "excluded ones count": ((roles, tree, targets), "left_out_by", always("")),
+        "excluded ones count": ((roles, objects, targets), "left_out_by", always("")),
         "hidden screws beside count": ((roots,), "is_switched_on", always(True)),
-        "screws beside do not count": ((roots,), "loose_hardware", always([])),
+        "screws beside do not count": ((links,), "silent_reader", without_beside),
     },
     assembly3: {
         **EITHER,
-        "its last group counts": ((tree,), "members", lambda _old: lambda one: one.Group[-1].Group),
+        "its last group counts": ((objects,), "members", lambda _old: lambda one: one.Group[-1].Group),
     },
 }
 LINES: dict[str, Any] = {
@@ -161,13 +164,16 @@ LINES: dict[str, Any] = {
 
 def said(path: str, change: Any = lambda lines: lines) -> list[dict[str, Any]]:
     found = live.read_checked(path)
-    told = [one.as_dict() for one in witness.accounts(replace(found, entries=change(found.entries)))]
+    told = [one.as_dict() for one in live.accounts(replace(found, entries=change(found.entries)))]
     host.close_all()
     return told
 
 
 def main() -> None:
     answers = {}
+    by_mark = objects.left_out_by
+    # FreeCAD's own view asks the right routine, whatever is broken.
+    host.Pieces._left_out_by = property(lambda _pieces: by_mark, lambda _pieces, _other: None)
     for build, faults in FAULTS.items():
         folder = Path(os.environ["SILO_OUT"]).parent / build.__name__
         folder.mkdir()

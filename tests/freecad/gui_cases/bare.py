@@ -25,6 +25,8 @@ def look() -> None:
         on_path=host.packages_folder() in [os.path.normpath(entry) for entry in sys.path],
         report=report(),
     )
+    pane = Gui.getMainWindow().findChild(QtWidgets.QDockWidget, "Database Activity")
+    tell(pane=labels(pane), mends=[one.text() for one in pane.findChildren(QtWidgets.QPushButton)])
     Gui.activateWorkbench("SiloModWorkbench")
     bar = Gui.getMainWindow().findChild(QtWidgets.QToolBar, "Silo")
     tell(buttons=[action.text() for action in bar.actions()])
@@ -43,7 +45,7 @@ def look() -> None:
 def press(window: Any) -> None:
     window.button.click()
     tell(during=[window.bar.isVisible(), window.button.isEnabled()])
-    # Whoever closes it meanwhile learns the end all the same.
+    # Whoever closes it meanwhile learns the end anyway.
     window.close()
     wait(lambda: window.isVisible() and not window.bar.isVisible())
 

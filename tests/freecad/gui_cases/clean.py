@@ -12,6 +12,7 @@ from typing import Any
 sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
+    VAULT,
     App,
     Gui,
     QtCore,
@@ -31,7 +32,7 @@ from inside import (
 
 
 def story() -> None:
-    from silo.workbench.commands import commands
+    from silo.workbench.start import commands
 
     one = addon()
     one.preferences.set("AskRegister", False)
@@ -236,6 +237,15 @@ def open_item(one: Any) -> None:
     one._window.reject()
 
 
+def project_view(one: Any) -> None:
+    """With the states of the files in FreeCAD's tree."""
+    Gui.runCommand("Silo_Project")
+    view = wait(lambda: one.project._content)
+    view._choose(str(VAULT))
+    wait(lambda: view._flow.view.rows and settled())
+    one.project.close()
+
+
 RUNS: dict[str, Callable[[Any], None]] = {
     "Origin_Commit": commit,
     "Silo_BOM": preview,
@@ -246,6 +256,7 @@ RUNS: dict[str, Callable[[Any], None]] = {
     "Silo_Help": help_page,
     "Silo_History": history,
     "Silo_Open": open_item,
+    "Silo_Project": project_view,
 }
 
 run(story)

@@ -33,6 +33,7 @@ from inside import (
     dialog,
     labels,
     part,
+    picture,
     press,
     register,
     run,
@@ -259,13 +260,6 @@ def choose_folder(folder: Path) -> None:
     found.accept()
 
 
-def picture(widget: Any, name: str) -> None:
-    """For those who look: what the test saw."""
-    if folder := os.environ.get("SILO_TEST_PICTURES"):
-        QtWidgets.QApplication.processEvents()
-        widget.grab().save(os.path.join(folder, f"{name}.png"))
-
-
 def windows(one: Any, doc: Any) -> None:
     """*History* of a document, then *Open from Silo* into an empty folder."""
     App.setActiveDocument(doc.Name)
@@ -304,22 +298,37 @@ def windows(one: Any, doc: Any) -> None:
     opened = wait(lambda: found_open("empty", "Taken"))
     group = opened.getObject("Assembly").Group
     tell(opened=sorted([obj.Name, obj.LinkedObject is not None] for obj in group))
-    # An edit of it is left alone until its own button is pressed.
+    # An edit of it is left alone until the person answers.
     path = opened.FileName
     remove(opened, "Plate")
     opened.save()
     App.closeDocument(opened.Name)
     edited = Path(path).read_bytes()
-    found.open_button.click()
-    wait(lambda: found.replace.isVisible())
-    tell(left_alone=found.news.text(), untouched=Path(path).read_bytes() == edited)
-    wait(lambda: found_open("empty", "Taken"))
-    App.closeDocument(found_open("empty", "Taken").Name)
-    found.replace.click()
-    wait(lambda: found.news.text() == "Opened.")
+
+    def take(window: Any) -> None:
+        picture(window, "choices")
+        tell(left_alone=found.news.text(), untouched=Path(path).read_bytes() == edited)
+        (box,) = window.findChildren(QtWidgets.QComboBox)
+        box.setCurrentIndex(box.findData("take"))
+        window.findChild(QtWidgets.QPushButton, "do").click()
+
+    def kept() -> int:
+        return len(list(FOLDER.rglob("kept-aside/**/*Taken.FCStd")))
+
+    before = kept(), len(boxes("Took "))
+    with dialog("SiloChoices", take):
+        found.open_button.click()
+        wait(lambda: len(boxes("Took ")) > before[1])
     again = wait(lambda: found_open("empty", "Taken"))
-    kept = [file.read_bytes() == edited for file in FOLDER.rglob("kept-aside/**/*Taken.FCStd")]
-    tell(replaced=sorted(obj.Name for obj in again.getObject("Assembly").Group), edit_kept=any(kept))
+    tell(
+        replaced=sorted(obj.Name for obj in again.getObject("Assembly").Group),
+        edit_kept=kept() > before[0],
+    )
+    # The newest lies in the project now, so it is opened and not fetched.
+    found.revisions.setCurrentItem(found.revisions.topLevelItem(0))
+    found.open_button.click()
+    wait(lambda: "in the project already" in found.news.text())
+    tell(opened_in_place=found.newest.isVisible())
     # The line has been grey, then in the colour of a warning, and is grey again.
     line = found.news.grab().toImage().convertToFormat(QtGui.QImage.Format.Format_RGB32)
     tell(news_contrast=contrast(line))

@@ -29,7 +29,7 @@ from inside import (
 )
 from inside import press as press_button
 
-BUTTON, NO_PART = 6, 7
+from silo.workbench.register.dialog import BUTTON, NO_PART
 
 
 def story() -> None:

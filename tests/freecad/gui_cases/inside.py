@@ -27,7 +27,7 @@ FOLDER = Path(os.environ["SILO_TEST_FOLDER"])
 VAULT = FOLDER / "vault"
 # These end what hangs; a machine that is ten times slower than usual must not reach them.
 WAIT_S = 120
-LONGEST_S = 280
+LONGEST_S = 560
 
 _told: dict[str, Any] = {}
 
@@ -53,7 +53,7 @@ def run(
         if code or not closes:
             os._exit(code)
 
-    # A modal window that nobody expects would hold the story up for ever.
+    # A modal window that nobody expects would hold the story up forever.
     trace = (FOLDER / "trace.txt").open("w")
     faulthandler.dump_traceback_later(LONGEST_S, file=trace, exit=True)
     watch = QtCore.QTimer(Gui.getMainWindow())
@@ -118,9 +118,9 @@ def state() -> str:
 def addon() -> Any:
     """The add-on, once FreeCAD has loaded it."""
     from silo.workbench import start
-    from silo.workbench.addon import AddOn
 
-    return next((kept for kept in start._kept if isinstance(kept, AddOn)), None)
+    late = next((kept for kept in start._kept if isinstance(kept, start.Late)), None)
+    return late.addon if late is not None else None
 
 
 def settled() -> bool:
@@ -170,6 +170,13 @@ def labels(widget: Any) -> list[str]:
     return [
         label.text() for label in widget.findChildren(QtWidgets.QLabel) if label.isVisible() and label.text()
     ]
+
+
+def picture(widget: Any, name: str) -> None:
+    """For those who look: what the test saw."""
+    if folder := os.environ.get("SILO_TEST_PICTURES"):
+        QtWidgets.QApplication.processEvents()
+        widget.grab().save(os.path.join(folder, f"{name}.png"))
 
 
 def press(widget: Any, text: str) -> None:

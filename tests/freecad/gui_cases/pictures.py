@@ -54,8 +54,16 @@ def story() -> None:
     preview(one, top)
     registering(one, top)
     commit(one, top)
+    project(one)
     offline(one, top)
     settings(one)
+
+
+def said(text: str) -> str:
+    """A text of the add-on in FreeCAD's language, up to what differs."""
+    from silo.workbench.words import translate
+
+    return translate("Silo", text).partition("{")[0]
 
 
 # --- the stage -------------------------------------------------------------------------------------------
@@ -222,7 +230,7 @@ def tour(one: Any, top: Any) -> None:
     top.getObject(_named(top, "CoverBolts")).ElementCount = 6
     top.recompute()
     ask("colleague commits")
-    wait(lambda: boxes("Revision ") and settled())
+    wait(lambda: boxes(said("Revision {n} of {number}")) and settled())
     frame()
 
     def answer(found: Any) -> None:
@@ -243,7 +251,7 @@ def tour(one: Any, top: Any) -> None:
 
     with dialog("SiloCommitDialog", answer):
         Gui.runCommand("Origin_Commit")
-    wait(lambda: boxes("BOM Updated") or boxes("Committed"))
+    wait(lambda: boxes(said("BOM Updated: {number}")) or boxes(said("Committed: {number}")))
     wait(settled)
     frame()
 
@@ -272,7 +280,7 @@ def commit(one: Any, top: Any) -> None:
     App.setActiveDocument(top.Name)
     with dialog("SiloCommitDialog", answer):
         Gui.runCommand("Origin_Commit")
-    wait(lambda: boxes("BOM Updated") and settled())
+    wait(lambda: boxes(said("BOM Updated: {number}")) and settled())
     App.setActiveDocument(top.Name)
     show(top)
     photograph(one.dock, "activity")
@@ -294,6 +302,18 @@ def registering(one: Any, top: Any) -> None:
     photograph(window, "register")
     window.close()
     wait(lambda: not one.registrations._open)
+
+
+def project(one: Any) -> None:
+    Gui.runCommand("Silo_Project")
+    view = wait(lambda: one.project._content)
+    view._choose(str(MACHINE))
+    wait(lambda: view._flow.view.rows and settled())
+    one.project.setFloating(True)
+    one.project.resize(620, 460)
+    photograph(one.project, "project")
+    one.project.setFloating(False)
+    one.project.close()
 
 
 def offline(one: Any, top: Any) -> None:

@@ -31,7 +31,7 @@ from inside import (
     wait,
 )
 
-COMPONENT, NAME, NUMBER, BUTTON = 0, 1, 4, 6
+from silo.workbench.register.dialog import BUTTON, COMPONENT, NAME, NUMBER
 
 
 def story() -> None:

@@ -145,6 +145,9 @@ def translated() -> None:
     QtWidgets.QApplication.installTranslator(loud)
     tell(translated=words.translate("Silo", "Commit to Silo"))
     QtWidgets.QApplication.removeTranslator(loud)
+    Gui.setLocale("German")
+    tell(german=[words.translate("Silo", "Part number"), words.of_command("Origin_Commit", "Commit to Silo")])
+    Gui.setLocale("English")
 
 
 def story() -> None:

@@ -27,7 +27,7 @@ def in_themes(one: Any) -> None:
     before = app.styleSheet()
     for name, sheet in (("light", before), ("dark", DARK), ("light again", before)):
         app.setStyleSheet(sheet)
-        # The boxes are made anew, which takes its time on a busy machine.
+        # The boxes are made again, which takes its time on a busy machine.
         wait(lambda name=name: can_be_read(one.dock, name))
     one.session._show(connection="online")
 

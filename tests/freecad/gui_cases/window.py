@@ -24,7 +24,7 @@ from silo_server.run import running_server
 from silo_server.settings import Settings
 
 TOKEN = "silo_" + "0123456789abcdef" * 2
-TIMEOUT_S = 300
+TIMEOUT_S = 590
 SCRIPTS = Path(__file__).parent
 
 # No start page (it needs a browser engine) and no notification area (FreeCAD 1.0 deadlocks in it without a

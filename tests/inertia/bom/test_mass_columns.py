@@ -284,9 +284,11 @@ def test_a_column_that_may_hold_masses_and_is_not_used_is_named(
     table = bom(f"Name,Material,Estimated mass (kg),{header}\nlid,steel,2,{cell}\n")
     assert table["lid"].mass_kg == 2
     assert [w.code for w in table.warnings] == [BomCode.UNUSED_COLUMN] * named
-    assert all(f"“{header}”" in w.message and f"--column mass={header}" in w.message for w in table.warnings)
+    assert all(
+        f"“{header}”" in w.message and f'--column "mass={header}"' in w.message for w in table.warnings
+    )
     without = bom(f"Name,Material,{header}\nlid,steel,{cell}\n").warnings[0]
-    assert without.message.endswith(f"--column mass={header if named else '…'}")
+    assert without.message.endswith(f'--column "mass={header if named else "…"}"')
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.numbers import Mark, parse_number
-from silo.inertia.bom import BomCode, BomTable
-from silo.inertia.bom.table import column_mark, is_empty, parse_mass
+from silo.inertia.bom import BomCode, BomTable, column_mark, is_empty, parse_mass
 
 LB = 0.45359237
 

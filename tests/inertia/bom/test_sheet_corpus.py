@@ -10,7 +10,7 @@ from functools import cache
 import pytest
 from sheet_corpus import CASES, FORMATS, read_corpus
 
-from silo.inertia.bom import BOMParser
+from silo.inertia.bom.parser import BOMParser
 from silo.workbook import read_workbook
 
 pytest.importorskip("xlrd")

@@ -15,7 +15,8 @@ import pytest
 from sheet_corpus import read_corpus
 
 from silo.bom.errors import InputError
-from silo.inertia.bom import BomCode, BOMParser
+from silo.inertia.bom import BomCode
+from silo.inertia.bom.parser import BOMParser
 from silo.workbook import read_workbook
 
 openpyxl = pytest.importorskip("openpyxl")
@@ -445,7 +446,7 @@ def test_formulas_of_an_xls_file_without_a_value() -> None:
 
 
 def test_a_circle_of_sectors_in_an_xls_file_is_refused() -> None:
-    """xlrd alone would follow it for ever."""
+    """xlrd alone would follow it forever."""
     book = read_corpus()["plain.xls"]
     chain, circle = (struct.pack("<4i", 1, 2, 3, last) for last in (4, 0))
     assert book.count(chain) == 1

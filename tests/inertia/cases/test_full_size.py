@@ -13,8 +13,7 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from step_writer import trsf_of
 
-from silo.inertia.core import combine_arrays
-from silo.inertia.model import GeometryCode
+from silo.inertia.model import GeometryCode, combine_arrays
 
 Fixture = Callable[..., Any]
 PARTS, MODULES, EACH = 20, 100, 100

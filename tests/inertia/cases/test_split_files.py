@@ -16,8 +16,7 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from step_writer import emptied, trsf_of
 
-from silo.inertia.core import TensorProblem
-from silo.inertia.model import GeometryCode
+from silo.inertia.model import GeometryCode, TensorProblem
 from silo.inertia.report import Source
 
 Fixture = Callable[..., Any]

@@ -189,7 +189,7 @@ def test_case_10_an_invalid_gear_is_never_taken_in_silence(
     by_material = pipeline(path, HEAD + "1,1,G-1,steel,,Art1GearMotor\n")
     doubts = {GeometryCode.INVALID_SHAPE, GeometryCode.MESH_MISMATCH, GeometryCode.NOT_CONVERGENT}
     assert doubts & set(codes(by_material, "Art1GearMotor"))
-    from silo.inertia.output.push import plan_push
+    from silo.inertia.push import plan_push
 
     assert "in doubt" in plan_push(by_material).skipped[0].reason
     weighed = pipeline(path, HEAD + "1,1,G-1,,0.040 kg,Art1GearMotor\n")

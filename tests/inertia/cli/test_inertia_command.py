@@ -13,17 +13,17 @@ import sys
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
-from itertools import count, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import jsonschema_rs
 import numpy as np
 import pytest
+import yaml
 
 from silo.bom.errors import InputError
-from silo.cli.common import Progress
-from silo.cli.inertia import _lines, read_options
+from silo.cli.inertia import read_options
 from silo.cli.main import build_parser
 
 Run = Callable[..., Any]
@@ -63,6 +63,16 @@ def test_json_fits_the_schema(run: Run, arm: Path) -> None:
     schema = json.loads(SCHEMA.read_text("utf-8"))
     data = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json").json()
     assert list(jsonschema_rs.validator_for(schema).iter_errors(data)) == []
+    again = run("inertia", arm / "arm.step", arm / "arm.step", "--bom", arm / "bom.csv", "--json").json()
+    assert again == [data, data]
+
+
+def test_maps_of_several_files_are_several_documents(run: Run, arm: Path) -> None:
+    """And a file for one map is refused."""
+    one = run("links", arm / "arm.step").out
+    both = run("links", arm / "arm.step", arm / "arm.step")
+    assert (both.code, list(yaml.safe_load_all(both.out))) == (0, [yaml.safe_load(one)] * 2)
+    assert run("links", arm / "arm.step", arm / "arm.step", "--out", arm / "map.yaml").code == 2
 
 
 def test_urdf_of_the_example_is_what_the_command_writes(run: Run, arm: Path) -> None:
@@ -242,7 +252,7 @@ def test_bom_and_material_options_reach_the_calculation(run: Run, arm: Path) -> 
         (["--urdf-out", "x.urdf"], "without --urdf"),
         (["--urdf", "arm.urdf", "--urdf-out", "nowhere/x.urdf"], "no folder"),
         (["--urdf", "bom.csv", "--frame", "own"], "no XML"),
-        (["--snippet", "sdf", "--json"], "--report OUT.json"),
+        (["--snippet", "sdf", "--json"], "--report FILE.json"),
         (["--default-density", "0"], "from 25 to 23000"),
         (["--default-density", "nan"], "from 25 to 23000"),
         (["--default-density", "1e999"], "from 25 to 23000"),
@@ -268,12 +278,9 @@ def test_mistakes_are_one_plain_sentence(
     [
         "links arm.step --out arm.step",
         "links arm.step --urdf arm.urdf --out ./arm.urdf",
-        "inertia arm.step --html arm.step",
         "inertia arm.step --bom bom.csv --report linked.csv",
         "inertia arm.step --urdf arm.urdf --urdf-out arm.urdf",
-        "inertia arm.step --html new.md --report new.md",
-        "mass arm.step --html arm.step",
-        "mass arm.step --html part.FCStd",
+        "inertia arm.step --report new.md --report new.md",
         "links arm.step --out part.stl",
         "inertia arm.step --preview new.glb --preview new.glb",
     ],
@@ -403,19 +410,6 @@ def test_a_weight_on_the_command_line(run: Run, arm: Path) -> None:
     assert links["forearm"]["mass"] == pytest.approx(1.5 * 0.45359237)
     assert {part["source"] for part in links["forearm"]["parts"]} == {"target_mass"}
     assert "--mass wants NAME=MASS" in run(*command, "--mass", "forearm").err
-
-
-def test_long_work_says_so_without_a_terminal(capfd: pytest.CaptureFixture[str]) -> None:
-    """What it does and for how long, on standard error; nothing of work that is done at once."""
-    with _lines("arm.step", Progress(clock=lambda: 0.0)):
-        pass
-    assert capfd.readouterr().err == ""
-    said = ""
-    with _lines("arm.step", Progress(clock=count(0, 20).__next__)) as told:
-        told("measuring 3/7")
-        while said.count("measuring 3/7") < 2:
-            said += capfd.readouterr().err
-    assert said.startswith("arm.step: ")
 
 
 def test_a_urdf_is_written_only_where_somebody_says(run: Run, arm: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo_server.run import running_server
@@ -104,7 +105,7 @@ def test_push_uses_the_identities_in_the_files(
 @pytest.fixture(name="silo")
 def _silo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SiloClient]:
     token = "silo_" + "c1" * 20
-    with running_server(f"sqlite:///{tmp_path / 'silo.db'}", token=token) as server:
+    with running_server(sqlite_database(tmp_path / "silo.db"), token=token) as server:
         monkeypatch.setenv("SILO_API_URL", server.base_url)
         monkeypatch.setenv("SILO_API_TOKEN", token)
         with SiloClient(server.base_url, token) as client:
@@ -138,3 +139,16 @@ def test_mistakes_are_one_plain_sentence(run: Run, tmp_path: Path) -> None:
         assert ran.code == 2
         assert message in ran.err
         assert len(ran.err.strip().splitlines()) == 1
+
+
+def test_what_cannot_be_read_is_no_success(run: Run, gearbox: Path) -> None:
+    """A linked file that is gone or damaged ends with 1, also without --strict; with all files there, 0."""
+    assert run("mass", gearbox).code == 0
+    gear = next(gearbox.parent.rglob("Gear.FCStd"))
+    for content in (b"no FreeCAD file", None):
+        gear.write_bytes(content) if content else gear.unlink()
+        ran = run("mass", gearbox, "--json")
+        assert (ran.code, "in no mass: 1 warning (not_read)" in ran.err) == (1, True)
+        assert "not_read" in [warning["code"] for warning in ran.json()["warnings"]]
+    codes = {warning["code"] for warning in ran.json()["warnings"]}
+    assert run("mass", gearbox, "--strict", *(f"--allow={code}" for code in codes)).code == 0

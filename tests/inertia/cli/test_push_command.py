@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo_server.run import running_server
@@ -20,7 +21,7 @@ Run = Callable[..., Any]
 def client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SiloClient]:
     """A running server that the environment names."""
     token = "silo_" + "c1" * 20
-    with running_server(f"sqlite:///{tmp_path / 'silo.db'}", token=token) as server:
+    with running_server(sqlite_database(tmp_path / "silo.db"), token=token) as server:
         monkeypatch.setenv("SILO_API_URL", server.base_url)
         monkeypatch.setenv("SILO_API_TOKEN", token)
         with SiloClient(server.base_url, token) as found:

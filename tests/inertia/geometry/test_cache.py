@@ -93,7 +93,7 @@ def test_no_temporary_file_is_left(box: Any, step_part: Any, kept: Any, tmp_path
 
 
 def test_a_cache_that_cannot_be_written_is_no_error(box: Any, step_part: Any, tmp_path: Path) -> None:
-    """A file stands where the folder should be: reading works all the same."""
+    """A file stands where the folder should be: reading works anyway."""
     (tmp_path / "cache").write_text("in the way")
     options = ReadOptions(cache_dir=tmp_path / "cache")
     assert read(step_part(box(1, 2, 3)), options=options).instances
@@ -224,7 +224,7 @@ def test_it_survives_in_the_user_s_folder(
 def test_a_folder_without_the_right_to_write_is_no_error(
     box: Any, step_part: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A home that cannot be written (here: a file in the way): read all the same, and nothing kept."""
+    """A home that cannot be written (here: a file in the way): read anyway, and nothing kept."""
     (tmp_path / "home").write_text("in the way")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
     assert read(step_part(box(1, 2, 3))).instances

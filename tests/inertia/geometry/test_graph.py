@@ -20,7 +20,7 @@ from silo.inertia.geometry.graph import (
     unfold,
     unique_names,
 )
-from silo.inertia.geometry.step.part21 import WANTED, Ref, Typed, decoded, scan
+from silo.inertia.geometry.part21 import WANTED, EntityRef, Typed, decoded, scan
 
 
 def moved(x: float) -> np.ndarray:
@@ -159,13 +159,13 @@ def test_wanted_entities_are_taken_apart() -> None:
     assert found.complete
     assert found.keywords[1] == "PRODUCT"
     assert found.arguments(1)[:1] == ("id;1",)
-    assert found.arguments(1)[3] == (Ref(7), Ref(8))
+    assert found.arguments(1)[3] == (EntityRef(7), EntityRef(8))
     assert found.arguments(3) == (
         Typed("LENGTH_UNIT", ()),
         Typed("NAMED_UNIT", (None,)),
         Typed("SI_UNIT", (".MILLI.", ".METRE.")),
     )
-    assert found.arguments(5) == ("density", Typed("POSITIVE_RATIO_MEASURE", (7.85e-6,)), Ref(3))
+    assert found.arguments(5) == ("density", Typed("POSITIVE_RATIO_MEASURE", (7.85e-6,)), EntityRef(3))
     assert 4 not in found.keywords
 
 

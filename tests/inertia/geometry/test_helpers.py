@@ -23,11 +23,11 @@ from OCP.TopoDS import TopoDS_Compound
 from step_writer import StepDocument, emptied, trsf_of
 
 from silo.inertia.geometry import ReadOptions, read
-from silo.inertia.geometry.freecad.files import read_freecad
+from silo.inertia.geometry.fcstd import read_freecad
 from silo.inertia.geometry.helpers import LEAST_MB, WORTH_HELP, Helpers, helpers_for, processors
 from silo.inertia.geometry.kernel.solids import measure_all
-from silo.inertia.geometry.step.read import read_step
-from silo.inertia.geometry.step.text import begin
+from silo.inertia.geometry.step import read_step
+from silo.inertia.geometry.step_text import begin
 from silo.inertia.model import Assembly, GeometryCode
 
 OPTIONS = ReadOptions(isolate=False, cache=False)
@@ -146,7 +146,7 @@ def test_a_split_assembly_is_the_same_assembly(helpers: Helpers, nobody: Helpers
         p.problems for p in alone.assembly.prototypes.values()
     ]
     codes = [problem.code for part in together.assembly.prototypes.values() for problem in part.problems]
-    assert codes == [GeometryCode.EXTERNAL_FILE]
+    assert codes == [GeometryCode.NOT_READ]
 
 
 class Planned(Helpers):

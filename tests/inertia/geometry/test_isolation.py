@@ -23,6 +23,7 @@ def options(**more: Any) -> ReadOptions:
     return ReadOptions(cache=False, **more)
 
 
+@pytest.mark.usefixtures("cold")
 def test_a_child_reads_what_this_process_reads(box: Any, step_part: Any, read_in: Any) -> None:
     """The same numbers to the last bit, whoever reads; only the mesh travels in single precision."""
     path = step_part(box(10, 20, 30), "bracket")
@@ -85,6 +86,7 @@ def test_missing_files_and_folders_are_kept_apart(tmp_path: Path) -> None:
         read(tmp_path / "drawing.dwg")
 
 
+@pytest.mark.usefixtures("cold")
 def test_what_the_kernel_complains_of_is_counted(
     box: Any, step_part: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -196,6 +198,7 @@ def alive(pid: int) -> bool:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no memory limit for a process")
+@pytest.mark.usefixtures("cold")
 def test_the_memory_limit_is_an_error_message(box: Any, step_part: Any) -> None:
     """A child that may have 300 MB cannot even load the kernel; the message names the limit."""
     with pytest.raises(DocumentError, match="needs more than the 300 MB allowed"):

@@ -516,3 +516,12 @@ def test_columns_beside_the_wanted_ones_are_none_of_them(tmp_path: Path) -> None
     (tmp_path / "m.toml").write_text("[materials]\nx = { density = 500, aliases = 5 }\n")
     with pytest.raises(ConfigError, match=r"aliases of “x”.*“5”"):
         user_rows(tmp_path / "m.toml")
+
+
+def test_a_card_with_the_density_of_a_guess_settles_it() -> None:
+    """A card of that name is no other material than the guess if both weigh the same."""
+    guess = MaterialTable((package_rows(),)).find("tin can")
+    assert isinstance(guess, MaterialHit)
+    assert guess.doubt
+    card = Material("tin can", guess.material.density)
+    assert MaterialTable((package_rows(),), lambda: [card]).find("tin can") == MaterialHit(card)

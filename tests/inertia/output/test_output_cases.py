@@ -21,9 +21,9 @@ from rich.console import Console
 
 from silo.bom.errors import InputError
 from silo.cli import show
-from silo.inertia.core import MassProps, combine
 from silo.inertia.links import ASSEMBLY_FRAME, link_map, origin_frame
-from silo.inertia.output.text import (
+from silo.inertia.model import MassProps, combine
+from silo.inertia.output import (
     CSV_COLUMNS,
     MAX_PART_ROWS,
     SNIPPETS,
@@ -203,7 +203,7 @@ def test_case_42_mujoco_loads_every_link(report: Any) -> None:
 
 def test_case_42_mujoco_loads_our_urdf(report: Any) -> None:
     """The same through the URDF that we write."""
-    from silo.inertia.output.urdf import Urdf
+    from silo.inertia.urdf import Urdf
 
     mujoco = pytest.importorskip("mujoco")
     joint = '<joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint>'
@@ -300,7 +300,7 @@ def test_case_43_json_fits_its_schema(report: Any) -> None:
 
 def test_schema_knows_every_code_of_the_program() -> None:
     """Enumerations of schema and program are the same."""
-    from silo.inertia.core import TensorProblem
+    from silo.inertia.model import TensorProblem
     from silo.inertia.report import Decided, Rule, Source
 
     schema = json.loads(SCHEMA.read_text("utf-8"))["$defs"]

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from silo.bom.errors import InputError
-from silo.inertia.core import MassProps
-from silo.inertia.output.urdf import Urdf, read_urdf, write_urdf
+from silo.inertia.model import MassProps
+from silo.inertia.urdf import Urdf, read_urdf, write_urdf
 
 PROPS = MassProps(1.5, [0.1, 0.2, 0.3], np.diag([0.01, 0.02, 0.025]))  # type: ignore[arg-type]
 
@@ -183,3 +183,11 @@ def test_nothing_is_written_where_no_link_is_known(tmp_path: Path) -> None:
     assert (filled.written, filled.absent) == ((), ("ghost",))
     assert [p.name for p in tmp_path.iterdir()] == ["robot.urdf"]
     assert (tmp_path / "robot.urdf").stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize(("turn", "doubted"), [("0 0 90", True), ("0 -90 0", True), ("0 -1.57 0", False)])
+def test_a_joint_that_turns_by_more_than_a_turn_is_doubted_both_ways(turn: str, doubted: bool) -> None:
+    """Degrees are noticed by their size, whatever their sign."""
+    joint = f"<joint><parent link='a'/><child link='b'/><origin rpy='{turn}'/></joint>"
+    urdf = Urdf(f"<robot><link name='a'/><link name='b'/>{joint}</robot>".encode())
+    assert bool(urdf.doubts) is doubted

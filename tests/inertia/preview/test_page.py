@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from bodies import box
 
+from silo.drawing.page import report_html
 from silo.inertia.geometry import Mesh
-from silo.inertia.preview import report_html
 from silo.inertia.report import InertiaReport, Source
 
 Fixture = Callable[..., Any]
@@ -78,7 +78,7 @@ def test_values_that_are_not_finite_are_no_zero(page: str, assemble: Fixture, co
 
 def test_every_source_has_a_colour() -> None:
     """A new source of masses must not break the page."""
-    from silo.inertia.output.text import SOURCE_WORDS
-    from silo.inertia.preview import _SOURCE_COLOURS
+    from silo.drawing.page import _SOURCE_COLOURS
+    from silo.inertia.output import SOURCE_WORDS
 
     assert set(SOURCE_WORDS) == set(_SOURCE_COLOURS) == set(Source)

@@ -15,11 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from silo.inertia.core import MassProps
+from silo.drawing.page import LinkView, ellipsoid, inertia_ellipsoid, shaded, views_of, write_glb
 from silo.inertia.geometry import Mesh
 from silo.inertia.geometry.together import mesh_volume
-from silo.inertia.model import Assembly, Instance, Prototype
-from silo.inertia.preview import LinkView, ellipsoid, inertia_ellipsoid, shaded, views_of, write_glb
+from silo.inertia.model import Assembly, Instance, MassProps, Prototype
 
 
 def cube_mesh(size: float = 0.1) -> Mesh:

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import numpy as np
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from silo.inertia.core import MassProps, combine, place
 from silo.inertia.links import origin_frame
-from silo.inertia.output.text import settled
+from silo.inertia.model import MassProps, combine, place
+from silo.inertia.output import settled
 
 length = st.floats(-5, 5, allow_nan=False)
 positive = st.floats(1e-3, 10)
@@ -103,7 +104,7 @@ def test_sums_of_bodies_are_bodies(parts: list[MassProps]) -> None:
     assert settled(whole).check(tolerance=0.0) == ()
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(20))
 @given(bodies(), rigid(), st.floats(0.1, 10))
 def test_place_agrees_with_transform_and_scales_by_powers(
     part: MassProps, placement: np.ndarray, factor: float

@@ -11,6 +11,7 @@ from typing import Any
 import jsonschema_rs
 import pytest
 from bodies import box, placement, shape_only
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,7 +19,7 @@ from silo.inertia.bom import BOMEntry, BomTable
 from silo.inertia.bom.parser import with_structure
 from silo.inertia.matching import bare, plain
 from silo.inertia.model import Assembly, Instance
-from silo.inertia.output.text import report_json
+from silo.inertia.output import report_json
 from silo.inertia.report import Source
 
 Compute = Callable[..., Any]
@@ -41,7 +42,7 @@ MASSES = (None, 0.0, 0.0785, 0.5)
 SCHEMA = json.loads(
     (Path(__file__).parents[3] / "mods" / "silo" / "inertia" / "schema.json").read_text("utf-8")
 )
-quietly = settings(max_examples=60)
+quietly = settings(max_examples=examples(20))
 
 
 @st.composite

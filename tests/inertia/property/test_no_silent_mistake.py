@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bodies import box, placement
+from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -174,7 +175,7 @@ class Writer:
         return text if self.header_unit else f"{text} {unit}"
 
 
-@settings(max_examples=300)
+@settings(max_examples=examples(80))
 @given(st.integers(0, 2**32))
 def test_a_wrong_mass_is_never_silent(compute: Callable[..., Any], seed: int) -> None:
     """Per part: the truth within the stated rounding, or a warning that names the part."""

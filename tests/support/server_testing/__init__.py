@@ -9,9 +9,10 @@ from server_testing.caller import (
     bom,
     form_body,
     merge_body,
+    run_alone,
     wait_until,
 )
-from server_testing.databases import Databases, empty_database, postgres
+from server_testing.databases import Databases, empty_database, postgres, sqlite_database
 from server_testing.process import ServerProcess, reserved_port
 
 __all__ = [
@@ -27,5 +28,7 @@ __all__ = [
     "merge_body",
     "postgres",
     "reserved_port",
+    "run_alone",
+    "sqlite_database",
     "wait_until",
 ]

@@ -3,19 +3,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import http.client
 import json
 import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Coroutine, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 from urllib.parse import quote, urlsplit
 
 from urllib3.util import wait_for_read
 
-TIMEOUT = 60
+TIMEOUT = 300  # [s], reached only if the test fails; a busy machine may need minutes
+R = TypeVar("R")
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,6 +247,12 @@ def form_body(parts: Mapping[str, str | tuple[str, bytes]]) -> tuple[bytes, dict
         out += (b"Content-Type: application/octet-stream\r\n\r\n" if file else b"\r\n") + content + b"\r\n"
     out += f"--{boundary}--\r\n".encode()
     return out, {"Content-Type": f"multipart/form-data; boundary={boundary}"}
+
+
+def run_alone(work: Coroutine[Any, Any, R]) -> R:
+    """Run a coroutine to its end, beside the running loop that a browser's tests leave in this thread."""
+    with ThreadPoolExecutor(1) as other:
+        return other.submit(asyncio.run, work).result()
 
 
 def wait_until(true: Callable[[], bool], what: str, seconds: float = 60.0) -> None:

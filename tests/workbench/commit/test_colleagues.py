@@ -22,11 +22,10 @@ from silo.bom.model import BomEntry
 from silo.outbox.entry import UNKNOWN, Commit, State
 from silo.outbox.send import send_all
 from silo.platform import stamp_of
-from silo.workbench.commit.flow import Answer, Choice, CommitFlow, Look, Theirs, line_words
+from silo.workbench.commit.flow import Choice, CommitAnswer, CommitFlow, Look, Theirs, line_words
 from silo.workbench.commit.opened import Opened
-from silo.workbench.commit.plan import Plan, plan
-from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
-from silo.workbench.pane.waiting import rows
+from silo.workbench.commit.plan import CommitPlan, plan
+from silo.workbench.pane.activity import Action, Do, Line, PaneEntry, Tone, rows
 from silo.workbench.session.session import Newer
 
 
@@ -70,7 +69,7 @@ class Person:
         office.preferences.set("AskComment", True)
         office.desk.decide = self
 
-    def __call__(self, planned: Plan, look: Look) -> Answer | None:
+    def __call__(self, planned: CommitPlan, look: Look) -> CommitAnswer | None:
         answers: list[Mapping[str, Theirs]] = []
         look(answers.append)
         self.office.gui.run_until(lambda: self.office.session.idle and answers)
@@ -87,7 +86,7 @@ class Person:
                 rows.append(replace(row, on_top=theirs.newer or {}))
             elif self.choice is not None:
                 choices.append((row, theirs, self.choice))
-        return Answer(tuple(rows), "mine", choices=tuple(choices))
+        return CommitAnswer(tuple(rows), "mine", choices=tuple(choices))
 
 
 class NoChecksums(Silo):
@@ -248,9 +247,9 @@ def lost(*_: object, **__: object) -> None:
 def test_an_answer_reaches_older_boxes(office: Office, flow: CommitFlow) -> None:
     """Given in Register Parts, or in another box; other files and other identities still ask."""
 
-    def asking(key: str, identity: str, *files: str) -> Entry:
+    def asking(key: str, identity: str, *files: str) -> PaneEntry:
         same = Action(Do.SAME, "Same part", identity, objects=files)
-        return Entry(key, "x", 1.0, lines=(Line("2 files", Tone.WARNING, (same,)),))
+        return PaneEntry(key, "x", 1.0, lines=(Line("2 files", Tone.WARNING, (same,)),))
 
     office.session.add(asking("asked", "ID", "/v/a", "/v/b"))
     office.session.add(asking("more", "ID", "/v/a", "/v/b", "/v/c"))
@@ -270,9 +269,9 @@ def test_a_file_that_somebody_replaced_is_asked_about_also_offline(office: Offic
     Path(doc.FileName).write_bytes(b"by a colleague, not committed")
     edit(doc, b"mine")
 
-    asked: list[Plan] = []
+    asked: list[CommitPlan] = []
 
-    def person(planned: Plan, look: Look) -> Answer | None:
+    def person(planned: CommitPlan, look: Look) -> CommitAnswer | None:
         asked.append(planned)
         found: list[Mapping[str, Theirs]] = []
         look(found.append)
@@ -283,7 +282,7 @@ def test_a_file_that_somebody_replaced_is_asked_about_also_offline(office: Offic
     flow.start(doc)
     office.settle()
     assert [row.replaced for row in asked[0].rows] == [True]
-    office.desk.decide = lambda planned, _look: Answer(planned.rows, "mine")
+    office.desk.decide = lambda planned, _look: CommitAnswer(planned.rows, "mine")
     flow.start(doc)
     office.settle()
     kept = [path.read_bytes() for path in (office.folder / "data" / "kept-aside").rglob("*.FCStd")]

@@ -13,7 +13,16 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import DocumentError
 from silo.workbench.commit.opened import Base
-from silo.workbench.commit.plan import Plan, Row, Snapshot, State, Taken, leaves_first, plan, take_each
+from silo.workbench.commit.plan import (
+    CommitPlan,
+    CommittedDocument,
+    DocumentRow,
+    DocumentState,
+    Snapshot,
+    leaves_first,
+    plan,
+    take_each,
+)
 
 
 class Doc:
@@ -69,7 +78,7 @@ class Documents:
         doc.marks["changed"] = False
 
 
-def names(planned: Plan) -> list[str]:
+def names(planned: CommitPlan) -> list[str]:
     return [row.label for row in planned.rows]
 
 
@@ -86,7 +95,7 @@ def test_changed_documents_come_leaves_first_and_the_asked_one_last() -> None:
 def test_a_saved_document_is_committed_all_the_same() -> None:
     """The person asked for it; the server says whether it is news."""
     planned = plan(Doc("Top", Doc("Part")), Documents())
-    assert [(row.label, row.state) for row in planned.rows] == [("Top", State.SAVED)]
+    assert [(row.label, row.state) for row in planned.rows] == [("Top", DocumentState.SAVED)]
     assert planned.is_simple
 
 
@@ -124,24 +133,24 @@ def test_documents_that_link_to_each_other() -> None:
 @pytest.mark.parametrize(
     ("doc", "state", "can_commit"),
     [
-        (Doc("T", changed=True), State.CHANGED, True),
-        (Doc("T"), State.SAVED, True),
-        (Doc("T", path=""), State.UNNAMED, False),
-        (Doc("T", changed=True, partial=True), State.PARTIAL, False),
-        (Doc("T", partial=True), State.SAVED, True),
-        (Doc("fixed", changed=True), State.READ_ONLY, False),
-        (Doc("fixed"), State.SAVED, True),
-        (Doc("T", changed=True, newer=True), State.LOST, False),
-        (Doc("T", changed=True, recomputed=True), State.RECOMPUTED, True),
-        (Doc("T", changed=True, recomputed=True, partial=True), State.SAVED, True),
-        (Doc("fixed", changed=True, recomputed=True), State.SAVED, True),
-        (Doc("T", newer=True), State.SAVED, True),
-        (Doc("T", damaged=True), State.DAMAGED, False),
-        (Doc("T", damaged=True, changed=True), State.DAMAGED, False),
+        (Doc("T", changed=True), DocumentState.CHANGED, True),
+        (Doc("T"), DocumentState.SAVED, True),
+        (Doc("T", path=""), DocumentState.UNNAMED, False),
+        (Doc("T", changed=True, partial=True), DocumentState.PARTIAL, False),
+        (Doc("T", partial=True), DocumentState.SAVED, True),
+        (Doc("fixed", changed=True), DocumentState.READ_ONLY, False),
+        (Doc("fixed"), DocumentState.SAVED, True),
+        (Doc("T", changed=True, newer=True), DocumentState.LOST, False),
+        (Doc("T", changed=True, recomputed=True), DocumentState.RECOMPUTED, True),
+        (Doc("T", changed=True, recomputed=True, partial=True), DocumentState.SAVED, True),
+        (Doc("fixed", changed=True, recomputed=True), DocumentState.SAVED, True),
+        (Doc("T", newer=True), DocumentState.SAVED, True),
+        (Doc("T", damaged=True), DocumentState.DAMAGED, False),
+        (Doc("T", damaged=True, changed=True), DocumentState.DAMAGED, False),
     ],
     ids=lambda value: value.Name if isinstance(value, Doc) else str(value),
 )
-def test_states(doc: Doc, state: State, can_commit: bool) -> None:
+def test_states(doc: Doc, state: DocumentState, can_commit: bool) -> None:
     """What cannot be saved whole is never saved; what needs no saving is sent as it is."""
     (row,) = plan(doc, Documents()).rows
     assert (row.state, row.can_commit) == (state, can_commit)
@@ -165,7 +174,7 @@ class Outbox:
         return None
 
 
-def taken(rows: Iterable[Row], documents: Documents, *, unknown: str = "") -> list[Taken]:
+def taken(rows: Iterable[DocumentRow], documents: Documents, *, unknown: str = "") -> list[CommittedDocument]:
     def take(doc: Any) -> Snapshot:
         return Snapshot(doc.FileName, doc.Label, None if doc.Name == unknown else f"{doc.Name}-id")
 

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from silo.workbench.freecad.edits import EditWatch, same
+from silo.workbench.freecad.facts import EditWatch, same
 
 
 @dataclass
@@ -98,7 +99,7 @@ def test_without_time_it_counts_as_edited(watch: EditWatch, box: Owner) -> None:
 
 
 def test_objects_come_and_go(watch: EditWatch, box: Owner) -> None:
-    """A new one that goes again is none; an array's elements may be made anew."""
+    """A new one that goes again is none; an array's elements may be made again."""
     made = Owner("More", {}, box.Document)
     watch.slotCreatedObject(made)
     assert watch.is_edited(box.Document)
@@ -126,6 +127,10 @@ def test_what_is_not_saved_is_no_edit(watch: EditWatch, box: Owner) -> None:
     for name in ("Shown", "Finish"):
         watch.slotAppendDynamicProperty(box, name)
         box.values[name] = "x"
+    # What a view has is no edit; the document of views has no name.
+    view = SimpleNamespace(Document=SimpleNamespace(Document=box.Document))
+    watch.slotAppendDynamicProperty(view, "Proxy")
+    watch.slotRemoveDynamicProperty(view, "Proxy")
     assert list(watch.differences(box.Document)) == ["Box.Finish"]
 
 

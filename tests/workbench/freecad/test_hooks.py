@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from silo.workbench.freecad.edits import CommitHook
+from silo.workbench.freecad.facts import CommitHook
 
 
 class Signal:
@@ -110,7 +110,7 @@ def test_a_menu_is_seen_although_freecad_makes_its_action_late(fork: Fork) -> No
 
 
 def test_without_a_document_there_is_nothing_to_see(fork: Fork) -> None:
-    """The command may be pressed all the same."""
+    """The command may be pressed anyway."""
     fork.actions = [Action()]
     fork.hook.connect()
     fork.active = None

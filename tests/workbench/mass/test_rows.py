@@ -14,7 +14,7 @@ from silo.inertia.links import Link, LinkMap
 from silo.inertia.masses import Options
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Assembly, Instance, Note, Prototype
-from silo.workbench.mass.rows import Shown, mass_text, shown
+from silo.workbench.mass.rows import MassView, mass_text, shown
 
 
 def made(name: str, size: float, density: float | None, *problems: Note) -> Prototype:
@@ -26,7 +26,7 @@ def made(name: str, size: float, density: float | None, *problems: Note) -> Prot
     )
 
 
-def window(*parts: Prototype, counts: tuple[int, ...] = ()) -> Shown:
+def window(*parts: Prototype, counts: tuple[int, ...] = ()) -> MassView:
     """The window of an assembly with these parts, as often as ``counts`` says."""
     instances = []
     for part, count in zip(parts, counts or (1,) * len(parts), strict=True):

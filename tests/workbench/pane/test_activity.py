@@ -14,15 +14,15 @@ from silo.workbench.pane.activity import (
     Activity,
     Batch,
     Do,
-    Entry,
     Line,
+    PaneEntry,
     Tone,
     gathered,
 )
 
 
-def entry(key: str, when: float = 0.0, title: str = "x", rank: int = 0, also: str = "") -> Entry:
-    return Entry(key=key, title=title, when=when, rank=rank, also=(also,) if also else ())
+def entry(key: str, when: float = 0.0, title: str = "x", rank: int = 0, also: str = "") -> PaneEntry:
+    return PaneEntry(key=key, title=title, when=when, rank=rank, also=(also,) if also else ())
 
 
 def keys(activity: Activity) -> list[str]:
@@ -70,21 +70,21 @@ def test_only_so_many_are_kept() -> None:
 def test_a_box_is_never_longer_than_can_be_read() -> None:
     """Ten thousand findings are some lines, the last of which counts the rest."""
     lines = tuple(Line(f"finding {i}") for i in range(10_000))
-    made = Entry("k", "t", 0.0, lines=lines)
+    made = PaneEntry("k", "t", 0.0, lines=lines)
     assert len(made.lines) == MOST_LINES
     assert made.lines[-1].text == f"… and {10_001 - MOST_LINES} more lines; the preview shows all"
 
 
 def test_text_in_boxes_is_harmless() -> None:
     """Titles, names and lines pass through the same cleaning."""
-    made = Entry("k", "\x1b[2J<b>", 0.0, who="a\nb", lines=(Line("x\u202ey"),))
+    made = PaneEntry("k", "\x1b[2J<b>", 0.0, who="a\nb", lines=(Line("x\u202ey"),))
     assert (made.title, made.who, made.lines[0].text) == ("[2J<b>", "a b", "x y")
 
 
 def test_a_box_as_plain_text() -> None:
     """The spec's box (§6)."""
     register = Action(Do.REGISTER, "Register Parts…")
-    box = Entry(
+    box = PaneEntry(
         "k",
         "BOM Updated: ASM-001",
         0.0,
@@ -113,7 +113,7 @@ entries = st.builds(
 
 
 @given(st.lists(entries, max_size=40))
-def test_always_sorted_unique_and_never_poorer(told: list[Entry]) -> None:
+def test_always_sorted_unique_and_never_poorer(told: list[PaneEntry]) -> None:
     """Whatever comes in whatever order: newest first, one per key, the highest rank of each key wins."""
     activity = activity_of(told)
     whens = [one.when for one in activity.entries]
@@ -123,8 +123,8 @@ def test_always_sorted_unique_and_never_poorer(told: list[Entry]) -> None:
         assert one.rank == max(other.rank for other in told if other.key == one.key)
 
 
-def news(number: int, when: float, part_of: Batch | None = Batch.CREATED, who: str = "ann") -> Entry:
-    return Entry(f"e{number}", f"New item: M01-{number:04}", when, who=who, part_of=part_of)
+def news(number: int, when: float, part_of: Batch | None = Batch.CREATED, who: str = "ann") -> PaneEntry:
+    return PaneEntry(f"e{number}", f"New item: M01-{number:04}", when, who=who, part_of=part_of)
 
 
 def test_a_batch_is_one_box() -> None:
@@ -158,14 +158,14 @@ def test_gathering_loses_nothing(told: list[tuple[int, Batch | None]]) -> None:
     assert sum(counts) == len(entries)
 
 
-def asking(key: str, when: float, *files: str, document: str = "/v/Top.FCStd") -> Entry:
+def asking(key: str, when: float, *files: str, document: str = "/v/Top.FCStd") -> PaneEntry:
     question = Line(
         "2 files carry the same Silo identity",
         Tone.WARNING,
         (Action(Do.SAME, "Same part", "ID", document, files), Action(Do.DECIDE, "New part…")),
     )
     other = Line("a link is broken", Tone.ERROR, (Action(Do.SHOW, "Show"),))
-    return Entry(key, "x", when, lines=(question, other), document=document)
+    return PaneEntry(key, "x", when, lines=(question, other), document=document)
 
 
 def buttons(activity: Activity, key: str) -> list[str]:
@@ -177,7 +177,7 @@ def test_only_the_newest_box_of_an_assembly_asks() -> None:
     """It has all questions that are open; boxes of other assemblies, and newer ones, keep theirs."""
     other = asking("other", 1, "/v/a", document="/v/Other.FCStd")
     activity = activity_of([asking("old", 1, "/v/a", "/v/b"), other, asking("late", 9, "/v/a")])
-    activity = activity.add(Entry("new", "x", 2, document="/v/Top.FCStd"))
+    activity = activity.add(PaneEntry("new", "x", 2, document="/v/Top.FCStd"))
     assert buttons(activity, "old") == ["Show"]
     assert buttons(activity, "other") == buttons(activity, "late") == ["Same part", "New part…", "Show"]
     # A colleague's event says nothing of this computer's files.

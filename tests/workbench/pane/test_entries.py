@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from activities import activity_of, entry_text
 
-from silo.activity import counts_text, english
 from silo.api.boms import NOT_ATOMIC
 from silo.api.events import ServerEvent
-from silo.api.wire import Draft, MergeDiff, MergeWarning
+from silo.api.wire import CostTotal, Draft, Lacking, MergeDiff, MergeWarning, ProductSummary, Revision
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom_sync import counts_text, english
 from silo.workbench import words
-from silo.workbench.pane.activity import Do, Entry
+from silo.workbench.pane.activity import Do, PaneEntry
 from silo.workbench.pane.entries import badges, of_event, of_sent, of_team
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def page(path: str) -> str:
     return f"https://silo.example.com{path}"
 
 
-def box(vault: Vault) -> Entry:
+def box(vault: Vault) -> PaneEntry:
     return of_sent(vault.told[-1], page, now=0.0)
 
 
@@ -59,6 +59,35 @@ def test_a_commit_of_a_released_product_says_which_draft_it_is_part_of(vault: Va
     of_released = sent.result.model_copy(update={"draft": Draft(label="C", released="B")})
     shown = entry_text(of_sent(replace(sent, result=of_released), page, now=0.0))
     assert "This is part of draft C. Revision B stays released as it is." in shown.splitlines()
+    # A file without a BOM says so as well.
+    uploaded = Revision(revision_number=2, draft=of_released.draft)
+    shown = entry_text(of_sent(replace(sent, result=None, uploaded=uploaded), page, now=0.0))
+    assert "This is part of draft C. Revision B stays released as it is." in shown.splitlines()
+
+
+def test_a_commit_says_what_is_open_in_its_product(vault: Vault) -> None:
+    """In the sub-assemblies, as the server keeps it; what is open in its own BOM is said already."""
+    vault.commit(vault.snapshot(vault.part("Bolt", 12)))
+    vault.send()
+    assert "Open in" not in entry_text(box(vault)), "this Silo keeps no summaries"
+    kept = ProductSummary(
+        part_number=vault.number,
+        open={vault.number: "1 conflict", **{f"A01-9{n}": "2 conflicts" for n in range(9)}},
+        incomplete={"A01-9": "incomplete: no file"},
+        parts=28,
+        total_mass_kg=12.4,
+        totals=[CostTotal(currency="EUR", total_cost=8)],
+        mass_missing=Lacking(count=2, first=["P"]),
+    )
+    shown = entry_text(of_sent(replace(vault.told[-1], summary=kept), page, now=0.0)).splitlines()
+    opened = [line for line in shown if line.startswith("Open in")]
+    assert opened == [f"Open in A01-9{n}: 2 conflicts" for n in range(3)]
+    assert shown[shown.index(opened[-1]) + 1].startswith("… and 7 more lines")
+    assert "12.4 kg for 26 of 28 parts · 8.00 EUR" in shown
+    few = kept.model_copy(update={"open": {}})
+    assert "Open in A01-9: incomplete: no file" in entry_text(
+        of_sent(replace(vault.told[-1], summary=few), page, now=0.0)
+    )
 
 
 LINE = {"part_number": "P", "quantity": 1}
@@ -150,8 +179,8 @@ def test_a_page_of_another_server_is_not_offered() -> None:
 
 
 def test_a_gap_is_reported_once() -> None:
-    """A server that counts anew has forgotten what happened; the pane does not pretend to know."""
-    gaps = [of_event(ServerEvent(str(n), "reset", {"reason": "counts anew"}), page, now=n) for n in range(3)]
+    """A server that counts again has forgotten what happened; the pane does not pretend to know."""
+    gaps = [of_event(ServerEvent(str(n), "reset", {"reason": "counts again"}), page, now=n) for n in range(3)]
     activity = activity_of(gap for gap in gaps if gap is not None)
     (entry,) = activity.entries
     assert entry.title == "Some activity may be missing"

@@ -13,8 +13,7 @@ from silo.bom.model import BomEntry
 from silo.outbox.entry import Commit, Entry, State
 from silo.outbox.store import Store
 from silo.workbench.commit.flow import of_held
-from silo.workbench.pane.activity import Do
-from silo.workbench.pane.waiting import can_send, heading, meant_for_another, rows
+from silo.workbench.pane.activity import Do, can_send, heading, meant_for_another, rows
 
 HERE = "https://silo.example.com"
 
@@ -77,12 +76,13 @@ def test_a_held_commit_has_the_choices_of_the_dialog(entry: Entry) -> None:
     newer = {"revision_number": 2, "created_by": "alice", "comment": "less"}
     held = replace(entry, state=State.HELD, reason="alice committed revision 2", newer=newer)
     (row,) = rows([held], HERE)
-    assert [(a.do, a.text) for a in row.actions[:3]] == [
+    assert [(a.do, a.text) for a in row.actions[:4]] == [
         (Do.OPEN_THEIRS, "Open theirs beside mine"),
+        (Do.COMPARE, "Compare with revision 2"),
         (Do.TAKE_THEIRS, "Take theirs"),
         (Do.RETRY, "Commit mine on top"),
     ]
-    assert [a.do for a in row.actions[3:]] == [Do.SAVE_COPY, Do.DISCARD]
+    assert [a.do for a in row.actions[4:]] == [Do.SAVE_COPY, Do.DISCARD]
     (row,) = rows([replace(held, path="")], HERE)
     assert [a.do for a in row.actions] == [Do.RETRY, Do.SAVE_COPY, Do.DISCARD]
     (row,) = rows([replace(held, server="http://old.example:80")], HERE)
@@ -120,6 +120,9 @@ def test_a_held_commit_shows_what_each_changed(entry: Entry) -> None:
     (row,) = rows([held], HERE, {held.id: theirs})
     assert row.details == ("Bolt: 6 → 0 by them, as before in yours",)
     assert row.more == ()
+    placed = replace(theirs, lines=(ThreeLines(bolt, None, replace(bolt, instances=("B1", "B2"))),))
+    ((shown,),) = [one.more for one in rows([held], HERE, {held.id: placed})]
+    assert (shown.do, shown.document, shown.objects) == (Do.SHOW, held.path, ("B1", "B2"))
     # A long one has its first lines, and a button for all of them.
     (row,) = rows([held], HERE, {held.id: replace(theirs, lines=theirs.lines * 15)})
     assert len(row.details) == 3
@@ -131,4 +134,9 @@ def test_a_held_commit_shows_what_each_changed(entry: Entry) -> None:
 def test_what_a_server_that_was_set_back_has_lost_goes_with_retry_all(entry: Entry) -> None:
     """Also where nothing else waits; a colleague's revision is a question for each commit."""
     for newer, can in (({"revision_number": 1, "set_back": True}, True), ({"revision_number": 1}, False)):
-        assert can_send([replace(entry, state=State.HELD, newer=newer)], HERE) is can
+        held = replace(entry, state=State.HELD, newer=newer)
+        assert can_send([held], HERE) is can
+        # Nothing of a colleague's could be taken: the server's revision is an older one of this computer.
+        (row,) = rows([held], HERE)
+        assert (Do.TAKE_THEIRS not in [one.do for one in row.actions]) is can
+        assert ("Retry" in [one.text for one in row.actions]) is can

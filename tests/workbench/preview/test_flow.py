@@ -14,7 +14,7 @@ from desk import Document, Office
 from silo.bom.errors import DocumentError, InputError, UnreachableError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.preview.flow import PreviewFlow, Row, rows
+from silo.workbench.preview.flow import PreviewFlow, PreviewRow, rows
 
 
 @pytest.fixture(name="shown")
@@ -255,7 +255,7 @@ def test_a_line_says_why_it_counts_so_many(office: Office, flow: PreviewFlow, to
     assert "not open any more" in str(window.failed[-1])
 
 
-def _flat(table: Iterable[Row]) -> Iterator[Row]:
+def _flat(table: Iterable[PreviewRow]) -> Iterator[PreviewRow]:
     for row in table:
         yield row
         yield from _flat(row.children)

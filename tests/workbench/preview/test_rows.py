@@ -12,16 +12,17 @@ from typing import Any
 
 import pytest
 from gearbox_story import GearboxStory
+from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.model import BomEntry, Extraction
 from silo.cli.common import read_assembly
 from silo.cli.main import main
-from silo.registering.on_disk import proposals_for, register_all
+from silo.registering.orders import proposals_for, register_all
 from silo.workbench.commit.plan import Snapshot
-from silo.workbench.preview.flow import Kind, Preview, Row, ask, rows, summary, to_sync
-from silo.workbench.session.jobs import Control
+from silo.workbench.preview.flow import Preview, PreviewRow, RowKind, ask, rows, summary, to_sync
+from silo.workbench.session import Control
 from silo_server.run import running_server
 
 CONTROL = Control(lambda _detail, _fraction: None)
@@ -36,7 +37,7 @@ def _story(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GearboxStory]:
     token = "silo_" + uuid.uuid4().hex
     with (
         pytest.MonkeyPatch.context() as patch,
-        running_server(f"sqlite:///{folder / 'silo.db'}", token=token) as server,
+        running_server(sqlite_database(folder / "silo.db"), token=token) as server,
         SiloClient(server.base_url, token) as client,
     ):
         for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME"):
@@ -104,9 +105,9 @@ def _diff(story: GearboxStory, capsys: pytest.CaptureFixture[str]) -> dict[str, 
     return data
 
 
-def lines(table: Iterable[Row]) -> set[tuple[str, str, str, str]]:
+def lines(table: Iterable[PreviewRow]) -> set[tuple[str, str, str, str]]:
     """(kind, part number, CAD's quantity, Silo's)."""
-    told = (Kind.GROUP, Kind.NOT_COUNTED, Kind.UNREGISTERED)
+    told = (RowKind.GROUP, RowKind.NOT_COUNTED, RowKind.UNREGISTERED)
     return {(row.kind.value, row.number, row.cad, row.silo) for row in table if row.kind not in told}
 
 
@@ -130,7 +131,7 @@ def lines_of_diff(diff: dict[str, Any]) -> set[tuple[str, str, str, str]]:
     }
 
 
-def below(table: Iterable[Row], number: str) -> tuple[Row, ...]:
+def below(table: Iterable[PreviewRow], number: str) -> tuple[PreviewRow, ...]:
     return next(row.children for row in table if row.number == number)
 
 
@@ -149,12 +150,14 @@ def test_each_assembly_has_the_lines_of_the_diff(
 
 def test_what_is_not_counted_has_the_reason_of_the_diff(preview: Preview, diff: dict[str, Any]) -> None:
     """Every finding of the walk, in the same words; unregistered components are rows of their own."""
-    groups = [row for row in rows(preview) if row.kind is Kind.GROUP]
-    told = {child.note for row in groups for child in row.children if child.kind is Kind.NOT_COUNTED}
+    groups = [row for row in rows(preview) if row.kind is RowKind.GROUP]
+    told = {child.note for row in groups for child in row.children if child.kind is RowKind.NOT_COUNTED}
     elsewhere = ("unregistered", "unreferenced", "conflict")
     assert told == {f["message"] for f in diff["findings"] if f["code"] not in elsewhere}
     assert any("construction geometry, not counted" in text for text in told)
-    unregistered = [child.name for row in groups for child in row.children if child.kind is Kind.UNREGISTERED]
+    unregistered = [
+        child.name for row in groups for child in row.children if child.kind is RowKind.UNREGISTERED
+    ]
     assert unregistered == ["Motor Mount"]
     assert [f["code"] for f in diff["findings"]].count("unregistered") == 1
 
@@ -213,7 +216,7 @@ def test_an_unregistered_sub_assembly_can_be_opened_too(story: GearboxStory) -> 
     found = read_assembly(str(story.top))
     entries = tuple(_without_identity(entry) if entry.is_assembly else entry for entry in found.entries)
     table = rows(preview_of(story, replace(found, entries=entries)))
-    (group,) = (row for row in table if row.kind is Kind.GROUP and row.name.startswith("Without"))
+    (group,) = (row for row in table if row.kind is RowKind.GROUP and row.name.startswith("Without"))
     gearbox = next(row for row in group.children if row.name.startswith("Gearbox"))
     assert {row.name for row in gearbox.children} == {"Housing", "Shaft", "Gear"}
 
@@ -235,7 +238,7 @@ def nested(depth: int) -> Extraction:
     return Extraction(BomEntry("/v/Top.FCStd", label="Top", is_assembly=True, level=0), below)
 
 
-def size(table: Iterable[Row]) -> int:
+def size(table: Iterable[PreviewRow]) -> int:
     return sum(1 + size(row.children) for row in table)
 
 
@@ -263,7 +266,7 @@ def _known(extraction: Extraction, uuids: dict[str, str]) -> Extraction:
     return replace(extraction, entries=tuple(known(entry) for entry in extraction.entries))
 
 
-def _last(row: Row) -> Row:
+def _last(row: PreviewRow) -> PreviewRow:
     return _last(row.children[-1]) if row.children else row
 
 
@@ -288,9 +291,9 @@ def test_a_missing_component_is_a_row_of_its_own_kind(tmp_path: Path) -> None:
         Snapshot(top.doc_path, "top", top.silo_uuid, Extraction(top, (lost, known[1]))), silo, CONTROL
     )
     kinds = {(row.kind, row.name, row.cad, row.silo) for row in rows(preview)}
-    assert (Kind.MISSING, "Lid", "2", "") in kinds
-    assert (Kind.MISSING, "Lid", "", "2") in kinds
-    assert (Kind.UNCHANGED, "Pin", "2", "2") in kinds
+    assert (RowKind.MISSING, "Lid", "2", "") in kinds
+    assert (RowKind.MISSING, "Lid", "", "2") in kinds
+    assert (RowKind.UNCHANGED, "Pin", "2", "2") in kinds
     assert next(row.note for row in rows(preview)) == "missing: Lid.FCStd#Body"
     assert summary(preview) == "1 missing"
 

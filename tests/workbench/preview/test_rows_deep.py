@@ -12,8 +12,8 @@ from fcstd_writer import Doc, locals_, part
 from silo.fcstd import Library
 from silo.testing import FakeSilo
 from silo.workbench.commit.plan import take
-from silo.workbench.preview.flow import MOST_ROWS, Kind, Preview, Row, ask, rows
-from silo.workbench.session.jobs import Control
+from silo.workbench.preview.flow import MOST_ROWS, Preview, PreviewRow, RowKind, ask, rows
+from silo.workbench.session import Control
 
 CONTROL = Control(lambda _detail, _fraction: None)
 
@@ -45,7 +45,7 @@ def preview(folder: Path, silo: FakeSilo, name: str) -> Preview:
     return ask(take(Library().open(str(folder / f"{name}.FCStd"))), silo, CONTROL)
 
 
-def flat(table: Iterable[Row]) -> list[Row]:
+def flat(table: Iterable[PreviewRow]) -> list[PreviewRow]:
     return [row for top in table for row in (top, *flat(top.children))]
 
 
@@ -57,7 +57,9 @@ def test_levels_that_double_the_rows_end_with_a_remark(folder: Path, silo: FakeS
         below = assembly(folder, silo, f"Level{level}", *twins)
     table = flat(rows(preview(folder, silo, below)))
     assert 100 < len(table) < MOST_ROWS
-    assert any(row.kind is Kind.GROUP and row.name == "… more rows than can be shown here" for row in table)
+    assert any(
+        row.kind is RowKind.GROUP and row.name == "… more rows than can be shown here" for row in table
+    )
 
 
 def test_each_sub_assembly_gets_its_share(folder: Path, silo: FakeSilo) -> None:
@@ -67,6 +69,6 @@ def test_each_sub_assembly_gets_its_share(folder: Path, silo: FakeSilo) -> None:
     assembly(folder, silo, "Few", "Leaf")
     assembly(folder, silo, "Top", "Many", "Few")
     many, few = rows(preview(folder, silo, "Top"), most=60)
-    assert [row.kind for row in many.children] == [Kind.GROUP]
+    assert [row.kind for row in many.children] == [RowKind.GROUP]
     assert [row.name for row in few.children] == ["Leaf"]
     assert len(rows(preview(folder, silo, "Many"), most=4)) == 40

@@ -9,10 +9,10 @@ import pytest
 from desk import Document, Office
 
 from silo.bom.errors import ReadOnlyError, SiloError
-from silo.registering.journal import Journal
+from silo.registering.items import Journal
 from silo.registering.orders import Order
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
+from silo.workbench.pane.activity import Action, Do, Line, PaneEntry, Tone
 from silo.workbench.register.flow import RegisterFlow
 
 
@@ -46,7 +46,7 @@ def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Docu
     plate = next(part.FileName for part in top.parts if part.Label == "Plate")
     for key, file in (("asked", plate), ("other", "/v/b")):
         same = Action(Do.SAME, "Same part", "id", objects=(file, "/v/a"))
-        office.session.add(Entry(key, "x", 1.0, lines=(Line("2 files", Tone.WARNING, (same,)),)))
+        office.session.add(PaneEntry(key, "x", 1.0, lines=(Line("2 files", Tone.WARNING, (same,)),)))
     flow.start(top)
     office.settle()
     (window,) = office.desk.registers
@@ -65,6 +65,67 @@ def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Docu
     boxes = {box.key: box for box in office.session.shown.activity.entries}
     assert not boxes["asked"].lines[0].actions
     assert boxes["other"].lines[0].actions
+
+
+def test_one_undo_takes_back_what_was_registered(office: Office, flow: RegisterFlow, top: Document) -> None:
+    """New items are archived, the files forget them, and the assembly's BOM waits for nobody."""
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.registers
+    assert not flow.can_take_back(window.path)
+    window.register(orders(office))
+    office.settle()
+    numbers = [result.part_number or "" for result in window.results]
+    assert flow.can_take_back(window.path)
+    flow.take_back(window.path)
+    office.settle()
+    assert [error for _, error in window.back] == [None, None]
+    assert [doc.identity for doc in top.parts] == ["", ""]
+    assert not {item.part_number for item in office.silo.search_items("")} & set(numbers)
+    assert not flow.can_take_back(window.path)
+    assert not flow._journal.item_ids()
+    window.register(orders(office))  # and they can be registered again
+    office.settle()
+    assert [result.error for result in window.results] == [None] * 4
+    assert len({result.item_id for result in window.results}) == 4
+
+
+def test_what_waits_of_an_item_that_goes_is_discarded(
+    office: Office, flow: RegisterFlow, top: Document
+) -> None:
+    """Its file would be refused for ever."""
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.registers
+
+    def refuse(name: str) -> None:
+        if name == "upload_file":
+            raise ReadOnlyError("maintenance")
+
+    office.silo.before = refuse
+    window.register(orders(office))
+    office.settle()
+    assert {Path(entry.path).stem for entry in office.session.shown.waiting} >= {"Plate", "Shaft"}
+    flow.take_back(window.path)
+    office.settle()
+    assert not {Path(entry.path).stem for entry in office.session.shown.waiting} & {"Plate", "Shaft"}
+
+
+def test_what_cannot_be_taken_back_is_said_and_stays(
+    office: Office, flow: RegisterFlow, top: Document
+) -> None:
+    """A file that cannot be written keeps its item."""
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.registers
+    window.register(orders(office))
+    office.settle()
+    office.desk.refusal = SiloError("the disk is full")
+    flow.take_back(window.path)
+    office.settle()
+    assert {str(error) for _, error in window.back} == {"the disk is full"}
+    found = {item.part_number for item in office.silo.search_items("")}
+    assert {result.part_number for result in window.results} <= found
 
 
 def test_no_unsaved_edits_are_left(office: Office, flow: RegisterFlow, top: Document) -> None:
@@ -103,7 +164,7 @@ def test_a_server_that_refuses_leaves_the_files_alone(
 def test_a_dialog_that_was_closed_meanwhile_is_not_drawn(
     office: Office, flow: RegisterFlow, top: Document
 ) -> None:
-    """What it had asked for is done all the same."""
+    """What it had asked for is done anyway."""
     flow.start(top)
     office.settle()
     (window,) = office.desk.registers

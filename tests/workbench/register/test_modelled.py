@@ -12,12 +12,12 @@ from fcstd_writer import Doc, locals_
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library, stamp, unstamp
-from silo.registering.journal import Journal
-from silo.registering.offer import Candidate, Seen, State, offer
+from silo.registering.items import Journal
+from silo.registering.offer import Candidate, ComponentState, OpenedFile, offer
 from silo.registering.orders import carry_out
 from silo.testing import FakeSilo
 from silo.workbench.register.flow import APART, NEW, EditedRow, choose, heading
-from silo.workbench.session.jobs import Control
+from silo.workbench.session import Control
 
 
 @pytest.fixture
@@ -31,10 +31,10 @@ def path(tmp_path: Path) -> Path:
     return doc.save(tmp_path / "machine.FCStd")
 
 
-def offered(path: Path, silo: FakeSilo, state: State = State.READY) -> list[EditedRow]:
+def offered(path: Path, silo: FakeSilo, state: ComponentState = ComponentState.READY) -> list[EditedRow]:
     with Library() as library:
         extraction = extract(choose_assembly(library.open(path)))
-    seen = {str(path): Seen(state)}
+    seen = {str(path): OpenedFile(state)}
     found = offer(extraction, seen, silo, "kindred-rd", Control(lambda _text, _part: None))
     return [EditedRow.of(candidate) for candidate in found.candidates]
 
@@ -103,7 +103,7 @@ def test_different_parts_get_a_number_each(path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_written_offers_nothing_of_it(path: Path) -> None:
-    rows = offered(path, FakeSilo(), State.READ_ONLY)
+    rows = offered(path, FakeSilo(), ComponentState.READ_ONLY)
     assert [row.section for row in rows] == ["", "standard"]
 
 

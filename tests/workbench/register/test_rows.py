@@ -7,14 +7,31 @@ import pytest
 
 from silo.bom.model import BomEntry
 from silo.bom.resolve import Categories, Proposal
-from silo.registering.offer import Candidate, Offer, Similar, State
-from silo.workbench.register.flow import ASK, NEW, SAME, EditedRow, choose, notices, number_texts, retype
+from silo.registering.offer import Candidate, ComponentState, Offer, Similar
+from silo.workbench.register.flow import (
+    ASK,
+    NEW,
+    SAME,
+    EditedRow,
+    Filter,
+    choose,
+    grouped,
+    headings,
+    notices,
+    number_texts,
+    retype,
+    set_all,
+)
 
 NUMBERS = {"M01": "M01-0007"}
 
 
 def row(
-    file: str, *, state: State = State.READY, same_as: str = "", similar: tuple[Similar, ...] = ()
+    file: str,
+    *,
+    state: ComponentState = ComponentState.READY,
+    same_as: str = "",
+    similar: tuple[Similar, ...] = (),
 ) -> EditedRow:
     entry = BomEntry(f"vault/{file}.FCStd", silo_uuid="one" if same_as else None, label=file)
     proposal = Proposal(entry, file, "part", "M01")
@@ -35,7 +52,7 @@ def test_a_person_learns_that_look_alikes_were_not_looked_for() -> None:
 
 def test_what_cannot_be_registered_is_promised_no_number() -> None:
     """A read-only file gets none, and takes none from the others."""
-    rows = [row("A", state=State.READ_ONLY), row("B")]
+    rows = [row("A", state=ComponentState.READ_ONLY), row("B")]
     assert number_texts(rows, NUMBERS) == ["", "M01-0007 (new)"]
     assert (rows[0].can_register, rows[0].can_choose, rows[0].checked) == (False, False, False)
 
@@ -84,7 +101,7 @@ def test_where_all_others_are_new_parts_the_last_one_keeps_the_number() -> None:
 
 def test_a_read_only_copy_can_be_kept_but_not_made_new() -> None:
     """Keeping writes nothing into the file."""
-    one = row("A", state=State.READ_ONLY, same_as="M01-0001")
+    one = row("A", state=ComponentState.READ_ONLY, same_as="M01-0001")
     assert list(one.choices()) == [SAME]
     choose([one], one, SAME)
     assert one.can_keep
@@ -110,3 +127,48 @@ def test_the_category_follows_the_type() -> None:
     one.category = "M02"
     retype(one, "assembly", categories)
     assert one.category == "M02"
+
+
+def test_one_value_is_set_for_all_chosen_rows() -> None:
+    """Names count; a category that a person sets is no guess; finished and standard ones stay as they are."""
+    rows = [row("Left"), row("Right"), row("Fixed", state=ComponentState.READ_ONLY)]
+    rows[0].checked = False
+    set_all(rows, "name", "Jaw {n} ({name})", {})
+    assert [one.name for one in rows] == ["Jaw 1 (Left)", "Jaw 2 (Right)", "Fixed"]
+    set_all(rows, "category", "M02", {})
+    assert [(one.category, one.checked) for one in rows] == [("M02", True), ("M02", True), ("M01", False)]
+    set_all(rows[:1], "supplier", "Misumi", {})
+    made = [one.order().proposal for one in rows]
+    assert [(one.sourcing, one.supply) for one in made[:2]] == [
+        ("purchased", {"supplier": "Misumi"}),
+        ("", {}),
+    ]
+    set_all(rows[:1], "sourcing", "manufactured", {})
+    assert rows[0].order().supplier == ""
+
+
+@pytest.mark.parametrize(
+    ("only", "words", "shown"),
+    [
+        (Filter.ALL, "", "ABC"),
+        (Filter.ALL, "b", "B"),
+        (Filter.ALL, "b m01", "B"),
+        (Filter.NEW, "", "AC"),
+        (Filter.DUPLICATES, "", "B"),
+        (Filter.UNSURE, "", "BC"),
+    ],
+)
+def test_rows_are_filtered(only: Filter, words: str, shown: str) -> None:
+    same = Similar("M01-0001", "id", "B", same_file=True)
+    rows = [row("A"), row("B", similar=(same,)), row("C", state=ComponentState.READ_ONLY)]
+    assert "".join(one.name for one in rows if one.fits(only, words)) == shown
+
+
+def test_rows_of_a_folder_stand_together_with_that_of_the_assembly_last() -> None:
+    """One folder has no heading of its own."""
+    order = [row(name).candidate for name in ("a/1", "top", "b/2", "a/3", "main")]
+    rows = [EditedRow.of(one) for one in grouped(order)]
+    assert [one.name for one in rows] == ["a/1", "a/3", "b/2", "top", "main"]
+    texts = headings(rows)
+    assert (texts[0], texts[0] == texts[1], len(set(texts))) == ("vault/a", True, 3)
+    assert headings(rows[:2]) == ["Components"] * 2

@@ -3,46 +3,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from desk import Document, Documents, Office
+from desk import Cad, Document, Office
 from fcstd_writer import Doc as File
 from fcstd_writer import part
+from model_scenes import body, geometry
 from other_disk import other_disk
 
 from silo.api.files import Origin
+from silo.api.wire import Occurrence, Scene, SceneGeometry
+from silo.inertia.geometry.together import mesh_volume
 from silo.workbench.commit.flow import Choice, CommitFlow, Theirs, of_held
 from silo.workbench.revisions.flow import RevisionFlow
-
-
-@dataclass
-class Cad:
-    """FreeCAD's documents and files."""
-
-    documents: Documents
-    docs: list[Document]
-    opened: list[Path] = field(default_factory=list)
-
-    def find(self, path: str, /) -> Document | None:
-        return next((doc for doc in self.docs if doc.FileName == path), None)
-
-    def open(self, path: str, /) -> None:
-        self.opened.append(Path(path))
-
-    def close(self, doc: Any, /) -> None:
-        self.docs.remove(doc)
-
-    def save_copy(self, doc: Any, path: Path, /) -> None:
-        path.write_bytes(doc.content)
-
-    def open_paths(self) -> tuple[str, ...]:
-        return tuple(doc.FileName for doc in self.docs)
-
-    def is_open_elsewhere(self, _path: str, /) -> bool:
-        return False
 
 
 @dataclass
@@ -214,3 +191,45 @@ def test_what_was_found_without_words_is_there_at_once(day: Day) -> None:
     assert [item.name for item in day.flow.recent] == found[-1] != []
     search("nothing is called so")
     assert [item.name for item in day.flow.recent] == found[1]
+
+
+def test_another_revision_is_shown_as_a_ghost_and_removed_again(day: Day) -> None:
+    """Each body once where it stands there, in m; what cannot be shown is a sentence."""
+    number = day.held.part_number
+    places = [np.eye(4), np.diag([1.0, -1, 1, 1]), np.eye(4)]
+    places[0][:3, 3] = places[2][:3, 3] = 0.5, 0, 1
+    rows = [("A.1", 0, "Plate"), ("A.2", 0, "Plate"), ("B", 0, "Gone"), ("C", None, "Plate")]
+    occurrences = [
+        Occurrence(
+            path=path.split("."), lines=[], geometry=geometry, key=key, matrix=place.T.ravel().tolist()
+        )
+        for (path, geometry, key), place in zip(rows, [*places, np.eye(4)], strict=True)
+    ]
+    files = [SceneGeometry(id="sha", url="", bytes=1)]
+    day.office.silo.scenes[number, 1] = Scene(
+        part_number=number, revision=1, geometries=files, occurrences=occurrences
+    )
+    day.office.silo.scenes[number, 3] = Scene(part_number=number, revision=3)
+    day.office.silo.geometries["sha"] = geometry({"Plate": (body("block", 0.2), (1, 0, 0, 1))})
+
+    def compared(revision: int) -> str:
+        answers: list[str] = []
+        path = day.doc.FileName
+        day.flow.compare(path, number, revision, answers.append, lambda error: answers.append(str(error)))
+        day.office.settle()
+        (answer,) = answers
+        return answer
+
+    assert compared(1) == (
+        "Ghost: 2 only in revision 1, 1 elsewhere there. Only here: 2. "
+        "Not compared: 3 in groups and arrays without links."
+    )
+    assert [ghost.path for ghost in day.cad.ghosts] == [("A", "1"), ("A", "2")]
+    middles = [ghost.mesh.vertices.mean(axis=0) for ghost in day.cad.ghosts]
+    np.testing.assert_allclose(middles, [[0.5, 0, 1], [0, 0, 0]], atol=1e-5)
+    assert mesh_volume(day.cad.ghosts[1].mesh) == pytest.approx(0.2 * 0.14 * 0.08, rel=1e-3)
+    assert compared(1) == "The ghost is removed."
+    assert compared(3) == "Silo has no model of revision 3 yet."
+    assert "no revision 9" in compared(9)
+    day.cad.docs.clear()
+    assert "it is not open any more" in compared(1)

@@ -40,10 +40,10 @@ def test_a_colleagues_commit_during_our_own_is_shown_after_it() -> None:
 
 
 def test_a_restored_server_gives_our_number_to_a_colleague() -> None:
-    """It counts anew, and says so."""
+    """It counts again, and says so."""
     known = Colleagues()
     known.arrived(ITEM, 5)
-    known.anew()
+    known.forget_own()
     known.heard(ITEM, newer(4))
     assert known.newer == {ITEM: newer(4)}
 

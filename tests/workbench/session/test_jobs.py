@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from silo.bom.errors import CancelledError, InputError, SiloError
-from silo.workbench.session.jobs import Busy, Control, Job, Worker
+from silo.bom.errors import CancelledError, InputError, PackageError, SiloError
+from silo.workbench.session import Busy, Control, Job, Worker
 
-WAIT_S = 60
+WAIT_S = 300  # reached only if the test fails; a busy machine may need minutes
 
 
 class Gui:
@@ -89,6 +89,23 @@ def test_a_bug_is_reported_in_one_plain_sentence(worker: Worker, gui: Gui, bugs:
     gui.run_until(lambda: bool(told))
     assert str(told[0]) == "Sending: unexpected problem (KeyError: 'oops')"
     assert isinstance(bugs[0], KeyError)
+
+
+@pytest.mark.parametrize(("name", "is_bug"), [("pydantic_core._pydantic_core", False), ("silo.gone", True)])
+def test_a_package_that_cannot_be_imported_is_no_bug(
+    worker: Worker, gui: Gui, bugs: list[BaseException], name: str, is_bug: bool
+) -> None:
+    """Installing it mends that, and the sentence names it."""
+    told: list[SiloError] = []
+
+    def lack(_control: Control) -> None:
+        raise ImportError("wrong version", name=name)
+
+    worker.submit(Job("Connecting", lack, failed=told.append))
+    gui.run_until(lambda: bool(told))
+    assert isinstance(told[0], PackageError)
+    assert f"package {name.partition('.')[0]}: wrong version" in str(told[0])
+    assert bool(bugs) == is_bug
 
 
 def test_progress_is_reported(worker: Worker, gui: Gui, busy: list[Busy | None]) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +12,10 @@ from typing import Any
 
 import pytest
 from desk import Office
+from fcstd_writer import Doc
 from server_testing import wait_until
 
+from silo.api.config import Pause
 from silo.api.events import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeEvent, MergeResult
 from silo.bom.errors import SiloError, UnreachableError
@@ -44,6 +47,30 @@ def test_a_commit_is_kept_and_sent(office: Office) -> None:
     office.settle()
     assert office.files("Bolt") == [b"content"]
     assert (office.session.shown.waiting, [sent.part_number for sent in office.sent]) == ((), ["M01-0001"])
+
+
+DRAWING = "print('a banner'); from silo.drawing.models import NoDrawer, work_with; work_with(NoDrawer)"
+
+
+@pytest.mark.parametrize("dies", ["", "if not os.path.exists('x'): open('x', 'w'); os._exit(1)", "1 / 0"])
+def test_a_model_is_drawn_after_its_commit_arrived(
+    office: Office, dies: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a child, which may print a banner, and die once while it starts; if it dies again, it is a line."""
+    monkeypatch.chdir(office.folder)
+    office.session._drawing = lambda: [sys.executable, "-c", f"import os\n{dies}\n{DRAWING}"]
+    doc = office.document("Box", Doc("Box").save(office.folder / "made.FCStd").read_bytes())
+    office.desk.documents.save(doc)
+    office.session.keep(Commit(doc.FileName, 1.0, "Box", doc.identity, file=Path(doc.FileName)), failing)
+    office.settle()
+    assert office.session._models.left(60) == 0
+    office.gui.run_all()
+    assert len(office.files("Box")) == 1
+    works = dies != "1 / 0"
+    assert [set(parts) for parts in office.silo.models.values()] == [{"structure", "geometry"}] * works
+    assert [line.partition(": the")[0] for line in office.console] == [
+        "[Silo] Box.FCStd: no model was made"
+    ] * (not works)
 
 
 def test_a_restored_server_that_counts_anew_gives_our_number_to_a_colleague(office: Office) -> None:
@@ -170,7 +197,7 @@ def test_a_commit_that_a_full_disk_kept_is_not_reported_as_lost(office: Office, 
     made = commit(office, "Bolt", hold=hold)
     base = Base(made.path, stamp_of(made.path), UNKNOWN)
     office.session.keep(made, failing, base)
-    office.session._waits(())  # read before there was anything
+    office.session._waits(((), None))  # read before there was anything
     office.settle()
     assert base.origin == hashlib.sha256(b"content").hexdigest()  # the next commit is made from this one
     assert any("Bolt: It is kept, and sent once the disk" in line for line in office.console)
@@ -286,6 +313,23 @@ def test_a_person_saves_a_copy_and_discards(office: Office) -> None:
     office.session.discard(entry.id)
     office.settle()
     assert (target.read_bytes(), office.session.shown.waiting) == (b"content", ())
+
+
+def test_a_pause_that_is_over_is_not_shown_with_what_waits(office: Office) -> None:
+    """Whatever brings what is shown: a start, or a person's choice."""
+    made, store = commit(office, "Bolt"), Store(office.session.outbox.path)
+    entries = [store.add(replace(made, key=key), office.silo.base_url) for key in ("a", "b", "c")]
+    store.set_pause(office.silo.base_url, Pause(store.clock() + 600, "busy (429)", "busy", 1, told=True))
+    office.session.begin(live=False)
+    office.settle()
+    assert office.session.shown.pause is not None
+    office.session.discard(entries[0].id)
+    office.settle()
+    assert office.session.shown.pause is not None
+    store.set_pause(office.silo.base_url, None)
+    office.session.discard(entries[1].id)
+    office.settle()
+    assert (len(office.session.shown.waiting), office.session.shown.pause) == (1, None)
 
 
 def test_one_item_in_trouble_holds_up_no_other(office: Office) -> None:

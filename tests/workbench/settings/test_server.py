@@ -12,11 +12,11 @@ import pytest
 
 from silo.api.config import same_server
 from silo.bom.errors import ConfigError
-from silo.workbench.settings.preferences import DEFAULTS, Preferences
+from silo.workbench.settings import DEFAULTS, Preferences
 from silo.workbench.settings.server import (
-    Known,
-    Origin,
     Server,
+    ServerPreferences,
+    SettingSource,
     choose_server,
     read_known,
 )
@@ -96,65 +96,65 @@ def test_the_certificate_settings_are_one_value() -> None:
 
 def test_nothing_set_up_is_no_error() -> None:
     """FreeCAD without a server is a normal thing."""
-    assert choose_server(Known(), EMPTY, {}) == Server()
-    assert not choose_server(Known(), EMPTY, {}).configured
+    assert choose_server(ServerPreferences(), EMPTY, {}) == Server()
+    assert not choose_server(ServerPreferences(), EMPTY, {}).configured
 
 
 @pytest.mark.parametrize(
     ("known", "store", "env", "wanted"),
     [
         pytest.param(
-            Known(HOME, "from-preference"),
+            ServerPreferences(HOME, "from-preference"),
             EMPTY,
             {},
-            Server(HOME, "from-preference", True, Origin.PREFERENCES, Origin.PREFERENCES),
+            Server(HOME, "from-preference", True, SettingSource.PREFERENCES, SettingSource.PREFERENCES),
             id="preferences alone",
         ),
         pytest.param(
-            Known(HOME, "from-preference"),
+            ServerPreferences(HOME, "from-preference"),
             Store({HOME: "from-keyring"}),
             {},
-            Server(HOME, "from-keyring", True, Origin.PREFERENCES, Origin.KEYRING),
+            Server(HOME, "from-keyring", True, SettingSource.PREFERENCES, SettingSource.KEYRING),
             id="keyring before preference",
         ),
         pytest.param(
-            Known(HOME, "from-preference"),
+            ServerPreferences(HOME, "from-preference"),
             Store({HOME: "from-keyring"}),
             {"SILO_API_TOKEN": "from-env"},
-            Server(HOME, "from-env", True, Origin.PREFERENCES, Origin.ENVIRONMENT),
+            Server(HOME, "from-env", True, SettingSource.PREFERENCES, SettingSource.ENVIRONMENT),
             id="environment before keyring",
         ),
         pytest.param(
-            Known(HOME, "from-preference"),
+            ServerPreferences(HOME, "from-preference"),
             Store({HOME: "home", OTHER: "other"}),
             {"SILO_API_URL": OTHER},
-            Server(OTHER, "other", True, Origin.ENVIRONMENT, Origin.KEYRING),
+            Server(OTHER, "other", True, SettingSource.ENVIRONMENT, SettingSource.KEYRING),
             id="the other server's own token",
         ),
         pytest.param(
-            Known(HOME, "from-preference"),
+            ServerPreferences(HOME, "from-preference"),
             EMPTY,
             {"SILO_API_URL": OTHER},
-            Server(OTHER, "", True, Origin.ENVIRONMENT, Origin.NONE),
+            Server(OTHER, "", True, SettingSource.ENVIRONMENT, SettingSource.NONE),
             id="a token is sent to no other server",
         ),
         pytest.param(
-            Known(HOME, "from-preference"),
+            ServerPreferences(HOME, "from-preference"),
             EMPTY,
             {"SILO_API_URL": HOME + "/"},
-            Server(HOME + "/", "from-preference", True, Origin.ENVIRONMENT, Origin.PREFERENCES),
+            Server(HOME + "/", "from-preference", True, SettingSource.ENVIRONMENT, SettingSource.PREFERENCES),
             id="the same server, written otherwise",
         ),
         pytest.param(
-            Known(HOME, "t", verify=True),
+            ServerPreferences(HOME, "t", verify=True),
             EMPTY,
             {"SILO_SSL_VERIFY": "false"},
-            Server(HOME, "t", False, Origin.PREFERENCES, Origin.PREFERENCES),
+            Server(HOME, "t", False, SettingSource.PREFERENCES, SettingSource.PREFERENCES),
             id="environment decides about certificates",
         ),
     ],
 )
-def test_who_wins(known: Known, store: Store, env: dict[str, str], wanted: Server) -> None:
+def test_who_wins(known: ServerPreferences, store: Store, env: dict[str, str], wanted: Server) -> None:
     """Environment, then keyring, then preference; a token belongs to its server."""
     assert choose_server(known, store, env) == wanted
 
@@ -162,24 +162,24 @@ def test_who_wins(known: Known, store: Store, env: dict[str, str], wanted: Serve
 def test_the_configuration_file_comes_last() -> None:
     """What `silo-mod` uses is found, unless the preferences name another server."""
     file = SimpleNamespace(url=HOME, token="from-file", verify="ca.pem")
-    assert choose_server(Known(), EMPTY, {}, file) == Server(
-        HOME, "from-file", "ca.pem", Origin.FILE, Origin.FILE
+    assert choose_server(ServerPreferences(), EMPTY, {}, file) == Server(
+        HOME, "from-file", "ca.pem", SettingSource.FILE, SettingSource.FILE
     )
-    chosen = choose_server(Known(OTHER), EMPTY, {}, file)
+    chosen = choose_server(ServerPreferences(OTHER), EMPTY, {}, file)
     assert (chosen.url, chosen.token) == (OTHER, "")
 
 
 def test_a_certificate_setting_nobody_understands_is_reported() -> None:
     """Neither yes nor no must not mean "do not check"."""
     with pytest.raises(ConfigError, match=r"SILO_SSL_VERIFY: wanted true, false or .*; maybe is no file"):
-        choose_server(Known(HOME), EMPTY, {"SILO_SSL_VERIFY": "maybe"})
+        choose_server(ServerPreferences(HOME), EMPTY, {"SILO_SSL_VERIFY": "maybe"})
 
 
 def test_the_variable_may_name_a_file_with_authorities(tmp_path: Path) -> None:
     """As on the command line."""
     authorities = tmp_path / "ca.pem"
     authorities.write_text("")
-    chosen = choose_server(Known(HOME), EMPTY, {"SILO_SSL_VERIFY": str(authorities)})
+    chosen = choose_server(ServerPreferences(HOME), EMPTY, {"SILO_SSL_VERIFY": str(authorities)})
     assert chosen.verify == str(authorities)
 
 

@@ -13,8 +13,7 @@ from pathlib import Path
 from silo.bom.errors import InputError, counted
 from silo.bom.headers import Role, find_clashes
 from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
-from silo.inertia.bom.sheet import MASS_COLUMNS, Sheet, read_sheet
-from silo.inertia.bom.table import (
+from silo.inertia.bom import (
     FORCE_UNITS,
     BomCode,
     BOMEntry,
@@ -27,7 +26,8 @@ from silo.inertia.bom.table import (
     read_mass_header,
     unit_factor,
 )
-from silo.workbook import Row
+from silo.inertia.bom.sheet import MASS_COLUMNS, Sheet, read_sheet
+from silo.workbook import SheetRow
 
 _TOTAL_TOLERANCE = 1e-3
 """Relative, beside the rounding of both columns: how far a total may be from quantity times mass."""
@@ -81,12 +81,12 @@ class MassReader:
             self._warnings.append(BomWarning(code, message, line, name))
             self._reported.add(code)
 
-    def read(self, row: Row, name: str, quantity: float | None) -> MassCell:
+    def read(self, row: SheetRow, name: str, quantity: float | None) -> MassCell:
         """Return the mass of one piece."""
-        one, total = (self._cell(role, row, name) for role in MASS_COLUMNS)
-        self._cells[row.line] = one, total
-        if one.kg is not None or total.kg is None:
-            return one
+        cell, total = (self._cell(role, row, name) for role in MASS_COLUMNS)
+        self._cells[row.line] = cell, total
+        if cell.kg is not None or total.kg is None:
+            return cell
         if quantity:
             return replace(total, kg=total.kg / quantity, quantum_kg=total.quantum_kg / quantity)
         words = "there is a total mass only, and no quantity to divide it by; it is not used"
@@ -117,7 +117,7 @@ class MassReader:
         """Report whether the mass of one piece stands in the file, and is no share of a total."""
         return self._cells[row.line][0].kg is not None
 
-    def _cell(self, role: Role, row: Row, name: str) -> MassCell:
+    def _cell(self, role: Role, row: SheetRow, name: str) -> MassCell:
         header = self._columns.masses.get(role)
         if header is None:
             return MassCell()
@@ -134,15 +134,15 @@ class MassReader:
         if cell.kg is None:
             return cell
         if not cell.unit:
-            known = f"and “{header.strange}” in its header is no known unit"
-            words = f"the mass “{text}” has no unit, {known if header.strange else 'nor has its header'}"
+            sentence = f"and “{header.strange}” in its header is no known unit"
+            words = f"the mass “{text}” has no unit, {sentence if header.strange else 'nor has its header'}"
             self._report(BomCode.MASS_WITHOUT_UNIT, f"{words}; read as kg", row.line, name, once=True)
         if cell.unit in FORCE_UNITS:
             words = f"“{cell.unit}” is a unit of force; masses are what weighs as much at 9.80665 m/s²"
             self._report(BomCode.FILE, words, row.line, name, once=True)
         return cell
 
-    def _decide(self, text: str, unit: str | None, row: Row, name: str) -> MassCell:
+    def _decide(self, text: str, unit: str | None, row: SheetRow, name: str) -> MassCell:
         likely, unlikely = (
             parse_mass(text, mark=mark, unit=unit) for mark in (self._likely, self._likely.other)
         )
@@ -195,7 +195,7 @@ def _agree(row: BOMEntry, count: float, total: MassCell) -> bool:
 class BOMParser:
     """Reads BOM exports of Onshape and others, and Silo's own.
 
-    All options are the user's word against what would be found out from the file:
+    All options are the user's word against what the file shows:
 
     columns
         role → header text, for renamed columns: ``{"name": "Bauteil", "mass": "Gew."}``.
@@ -248,8 +248,8 @@ class BOMParser:
         warnings += _second_columns(sheet)
         masses = MassReader(sheet, self._decimal, self._mass_unit, warnings)
         item_role = _item_role(sheet)
-        found = [_entry(sheet, row, masses, item_role, warnings) for row in sheet.rows]
-        rows = _indented([entry for entry in found if entry is not None], sheet, warnings)
+        entries = [_entry(sheet, row, masses, item_role, warnings) for row in sheet.rows]
+        rows = _indented([entry for entry in entries if entry is not None], sheet, warnings)
         table_rows = masses.check_totals(BomTable(with_structure(masses.to_display_precision(rows))))
         warnings += _doubtful_items(table_rows)
         warnings += _duplicates(table_rows)
@@ -257,7 +257,7 @@ class BOMParser:
 
 
 def _entry(
-    sheet: Sheet, row: Row, masses: MassReader, item_role: Role, warnings: list[BomWarning]
+    sheet: Sheet, row: SheetRow, masses: MassReader, item_role: Role, warnings: list[BomWarning]
 ) -> BOMEntry | None:
     cell = sheet.columns.cell
     number, text = cell(row.cells, Role.PART_NUMBER), cell(row.cells, Role.DESCRIPTION)
@@ -334,14 +334,14 @@ def _item_role(sheet: Sheet) -> Role:
 
 def _level(text: str, item_role: Role, line: int, name: str, warnings: list[BomWarning]) -> int:
     """Read a level: "2", "..2" and "+2" are one below "1". Item numbers (1.1) are no levels."""
-    found = re.fullmatch(r"[\s.+>·-]*(\d{1,3})[\s.]*", text)
-    if found is None and text and item_role is not Role.LEVEL:
+    match = re.fullmatch(r"[\s.+>·-]*(\d{1,3})[\s.]*", text)
+    if match is None and text and item_role is not Role.LEVEL:
         words = f"the level “{text}” cannot be read; the row is taken to stand at the top"
         warnings.append(BomWarning(BomCode.FILE, words, line, name))
-    return int(found[1]) if found else 1
+    return int(match[1]) if match else 1
 
 
-def _check_length(sheet: Sheet, row: Row, name: str, warnings: list[BomWarning]) -> None:
+def _check_length(sheet: Sheet, row: SheetRow, name: str, warnings: list[BomWarning]) -> None:
     if not sheet.delimiter:
         return  # a workbook's cells stand where they stand
     if any(cell.strip() for cell in row.cells[len(sheet.header) :]):
@@ -367,15 +367,14 @@ def _doubtful_columns(sheet: Sheet) -> Iterator[BomWarning]:
         if any(parse_mass(cell).kg is not None for row in sheet.rows for cell in row.cells[index : index + 1])
     ]
     titles = [sheet.header[index].strip() for index in unused]
-    for what, known in (("mass", sheet.columns.masses), ("material", Role.MATERIAL in at)):
-        if not known:
+    for what, is_role_known in (("mass", sheet.columns.masses), ("material", Role.MATERIAL in at)):
+        if not is_role_known:
+            title = titles[0] if what == "mass" and titles else "…"
             words = f"there is no {what} column (the columns are {seen}); "
-            words += (
-                f"if one of them is it, say --column {what}={titles[0] if what == 'mass' and titles else '…'}"
-            )
+            words += f'if one of them is it, say --column "{what}={title}"'
             yield BomWarning(BomCode.MISSING_COLUMN, words, sheet.header_line)
     for title in titles if sheet.columns.masses else ():
-        words = f"the column “{title}” may hold masses, and was not used; --column mass={title} takes it"
+        words = f'the column “{title}” may hold masses, and was not used; --column "mass={title}" takes it'
         if read_mass_header(title).rate:
             words = f"the column “{title}” holds no masses of one piece, and was not used"
         yield BomWarning(BomCode.UNUSED_COLUMN, words, sheet.header_line)
@@ -384,12 +383,12 @@ def _doubtful_columns(sheet: Sheet) -> Iterator[BomWarning]:
 def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
     """Warn of columns that mean the same as one that is used, and say something else somewhere."""
     cells = [row.cells for row in sheet.rows]
-    for one in find_clashes(sheet.header, cells, sheet.columns.at, sheet.columns.others, is_empty):
+    for clash in find_clashes(sheet.header, cells, sheet.columns.at, sheet.columns.others, is_empty):
         yield BomWarning(
             BomCode.FILE,
-            f"the columns “{one.ours}” and “{one.other}” both mean the {one.role.replace('_', ' ')}; "
-            f"“{one.ours}” was used, though line {sheet.rows[one.row].line} has “{one.used}” there and "
-            f"“{one.unused}” in the other. --column {one.role}={one.other} takes the other one",
+            f"the columns “{clash.ours}” and “{clash.other}” both mean the {clash.role.replace('_', ' ')}; "
+            f"“{clash.ours}” was used, though line {sheet.rows[clash.row].line} has “{clash.used}” there and "
+            f'“{clash.unused}” in the other. --column "{clash.role}={clash.other}" takes the other one',
             sheet.header_line,
         )
 

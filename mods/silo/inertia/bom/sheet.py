@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Bytes of a CSV export or a workbook → a header, rows with their line numbers, what each column holds.
 
-Encoding and delimiter of a CSV file are found out. The order of the tries: a byte order mark decides; then
+Encoding and delimiter of a CSV file are detected. The order of the tries: a byte order mark decides; then
 UTF-8; then the Windows code pages. A delimiter is right if a line under it reads as a header; nothing is
 concluded from counting commas. Columns are found by :mod:`silo.bom.headers`, or by the user's word.
 """
@@ -18,8 +18,8 @@ from itertools import islice, zip_longest
 
 from silo.bom.errors import InputError, counted, listed
 from silo.bom.headers import Role, alias, normal, plain_cell
-from silo.inertia.bom.table import MassHeader, read_mass_header
-from silo.workbook import STARTS, Grid, Row, read_workbook
+from silo.inertia.bom import MassHeader, read_mass_header
+from silo.workbook import STARTS, Grid, SheetRow, read_workbook, unicode_name
 
 MAX_BYTES = 64 * 1024 * 1024
 HEADER_WITHIN = 40
@@ -92,14 +92,14 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
     seen: list[tuple[Role, int]] = []
     unused: list[int] = []
     for index, cell in enumerate(header):
-        found = _role_of(cell)
+        role_here = _role_of(cell)
         if index in taken:
             continue
-        if found is None:
+        if role_here is None:
             if read_mass_header(cell).names_masses:
                 unused.append(index)
-        elif found[0] not in wanted:
-            role, rank = found
+        elif role_here[0] not in wanted:
+            role, rank = role_here
             seen.append((role, index))
             if rank < best.get(role, sys.maxsize):
                 at[role], best[role] = index, rank
@@ -110,16 +110,16 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
 
 def _role_of(cell: str) -> tuple[Role, int] | None:
     """Return role and rank of a header: "Mass", "Mass (g)", "mass_kg", "Gewicht in kg", "Summe Masse"."""
-    found = alias(normal(cell.replace("/", " per ")))  # "Mass/unit" is no unit of a mass
-    if found is not None and found[0] not in MASS_COLUMNS:
-        return found if found[0] in ROLES else None
+    role = alias(normal(cell.replace("/", " per ")))  # "Mass/unit" is no unit of a mass
+    if role is not None and role[0] not in MASS_COLUMNS:
+        return role if role[0] in ROLES else None
     header = read_mass_header(cell)
-    if header.unit and not header.title and (found is None):
-        found = Role.MASS, sys.maxsize - 1  # "kg", "[g/pc]", "Total kg"
-    found = found or alias(header.title)
-    if found is None or found[0] not in MASS_COLUMNS or header.rate:
+    if header.unit and not header.title and (role is None):
+        role = Role.MASS, sys.maxsize - 1  # "kg", "[g/pc]", "Total kg"
+    role = role or alias(header.title)
+    if role is None or role[0] not in MASS_COLUMNS or header.rate:
         return None
-    return (Role.TOTAL_MASS, found[1]) if header.total else found
+    return (Role.TOTAL_MASS, role[1]) if header.total else role
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ class Sheet:
     header: tuple[str, ...]
     header_line: int
     columns: Columns
-    rows: tuple[Row, ...]
+    rows: tuple[SheetRow, ...]
     delimiter: str
     notes: tuple[str, ...] = ()
 
@@ -151,7 +151,7 @@ def read_sheet(
 ) -> Sheet:
     """Decode a CSV export, or the first sheet of a workbook that holds a BOM.
 
-    ``columns``, ``encoding``, ``delimiter``: the user's word, else found out.
+    ``columns``, ``encoding``, ``delimiter``: the user's word, else detected.
 
     Raises InputError if there is no header line with a column that distinguishes parts, or if the given
     encoding does not fit; the message lists what was seen.
@@ -198,7 +198,7 @@ def read_sheet(
 
 
 def _sheet(
-    records: list[Row],
+    records: list[SheetRow],
     best: _Header,
     given: Mapping[str, str] | None,
     notes: list[str],
@@ -214,7 +214,7 @@ def _sheet(
             f"{above} ({under})" if under.strip() else own
             for above, own, under in zip_longest(filled, header.cells, below, fillvalue="")
         ]
-        header, columns = Row(header.line, tuple(cells)), find_columns(cells, given)
+        header, columns = SheetRow(header.line, tuple(cells)), find_columns(cells, given)
         first += 1
     seen = ", ".join(cell.strip() for cell in header.cells if cell.strip())
     notes += [
@@ -231,7 +231,9 @@ def _sheet(
     return Sheet(header.cells, header.line, columns, rows, best.delimiter, tuple(notes))
 
 
-def _as_shown(records: list[Row], grid: Grid, header: Row, columns: Columns) -> tuple[list[Row], list[str]]:
+def _as_shown(
+    records: list[SheetRow], grid: Grid, header: SheetRow, columns: Columns
+) -> tuple[list[SheetRow], list[str]]:
     """Return the records with the texts of merged cells in each of their lines, and what a reader must know.
 
     A number in a merged cell may be of all lines together: the first keeps it.
@@ -258,7 +260,7 @@ def _as_shown(records: list[Row], grid: Grid, header: Row, columns: Columns) -> 
                 break
             cells = [*row.cells, *[""] * (column + 1 - len(row.cells))]
             cells[column] = cell.text
-            records[index] = Row(row.line, tuple(cells))
+            records[index] = SheetRow(row.line, tuple(cells))
     hidden = sorted({row for row, _ in grid.cells if row in grid.hidden_rows})
     struck = sorted({row for (row, _), cell in facts.items() if cell.struck})
     uncalculated = sum(cell.uncalculated for cell in grid.cells.values())
@@ -278,9 +280,9 @@ def _as_shown(records: list[Row], grid: Grid, header: Row, columns: Columns) -> 
     return records, [note for note, there in notes.items() if there]
 
 
-def _lines(rows: Sequence[int], one: str = "is", many: str = "are") -> str:
+def _lines(rows: Sequence[int], text: str = "is", many: str = "are") -> str:
     numbers = listed([str(row + 1) for row in rows], 8)
-    return f"lines {numbers} {many}" if len(rows) > 1 else f"line {numbers} {one}"
+    return f"lines {numbers} {many}" if len(rows) > 1 else f"line {numbers} {text}"
 
 
 def _columns(names: Sequence[str]) -> str:
@@ -288,7 +290,7 @@ def _columns(names: Sequence[str]) -> str:
     return f"the columns {shown} are" if len(names) > 1 else f"the column {shown} is"
 
 
-def _continues(header: Row, columns: Columns, below: Sequence[Row]) -> bool:
+def _continues(header: SheetRow, columns: Columns, below: Sequence[SheetRow]) -> bool:
     """Report whether the record below a header is its second line: no name, and units for masses."""
     if not below or any(columns.cell(below[0].cells, role) for role in _NAMES):
         return False
@@ -301,7 +303,7 @@ def _continues(header: Row, columns: Columns, below: Sequence[Row]) -> bool:
         for cell in below[0].cells[place : place + 1]
         if any(map(str.isalpha, cell))
     ]
-    return bool(read) and not any(one.strange or one.rate for one in read)
+    return bool(read) and not any(mass_header.strange or mass_header.rate for mass_header in read)
 
 
 def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[tuple[str, str]]:
@@ -312,17 +314,9 @@ def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[tuple
         except (UnicodeDecodeError, LookupError) as error:
             raise InputError(f"{source}: cannot be read as {encoding}: {error}") from error
         return
-    start = data[:64]
-    # UTF-16 without its mark: every second byte of ASCII text is zero.
-    wide = "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
-    for found, name in (
-        (data.startswith(b"\xef\xbb\xbf"), "utf-8-sig"),
-        (data.startswith((b"\xff\xfe", b"\xfe\xff")), "utf-16"),
-        (start.count(0) > len(start) // 4, wide),
-    ):
-        if found:
-            yield name, data.decode(name, errors="replace")
-            return
+    if name := unicode_name(data):
+        yield name, data.decode(name, errors="replace")
+        return
     for name in ("utf-8", *_CODE_PAGES):
         try:
             yield name, data.decode(name)
@@ -330,11 +324,11 @@ def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[tuple
             continue
 
 
-def _records(text: str, delimiter: str, *, strict: bool = False) -> Iterator[Row]:
+def _records(text: str, delimiter: str, *, strict: bool = False) -> Iterator[SheetRow]:
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=strict)
     line = 1
     for cells in reader:
-        yield Row(line, tuple(cell.replace("\0", "") for cell in cells))
+        yield SheetRow(line, tuple(cell.replace("\0", "") for cell in cells))
         line = reader.line_num + 1
 
 
@@ -353,7 +347,7 @@ def _bad_quotes(text: str, delimiter: str) -> int | None:
 
 
 def _best_header(
-    tables: Iterable[tuple[str, Sequence[Row]]], given: Mapping[str, str] | None
+    tables: Iterable[tuple[str, Sequence[SheetRow]]], given: Mapping[str, str] | None
 ) -> _Header | None:
     """Return the (delimiter, line) that names most roles; None if no line names a usable set."""
     best: _Header | None = None
@@ -370,7 +364,7 @@ def _best_header(
     return best
 
 
-def _first_records(text: str, delimiter: str) -> list[Row]:
+def _first_records(text: str, delimiter: str) -> list[SheetRow]:
     try:
         return list(islice(_records(text, delimiter), HEADER_WITHIN))
     except csv.Error:  # a cell beyond the csv module's limit: with this delimiter it is no table

@@ -117,7 +117,7 @@ def integrate(faces: Iterable[Face], *, centre: Floats, size: float, volume: flo
     volume
         a rough one, not 0; ``eps`` is relative to it.
     """
-    # A shell without any volume would be refined for ever; below this, rounding is larger than the tolerance.
+    # A shell without any volume would be refined forever; below this, rounding is larger than the tolerance.
     tolerance = eps * max(abs(volume) / size**3, THIN)
     total, error = np.zeros(15), 0.0
     for face in faces:
@@ -550,7 +550,7 @@ class Turned:
     """Any curve turned round an axis: what it is at three angles says all, so few points are asked.
 
     ask(u, v)
-        as for :class:`Asked`; u is the angle.
+        as for :class:`SampledSurface`; u is the angle.
     """
 
     ask: Ask
@@ -577,7 +577,7 @@ class Turned:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class SampledSurface:
     """Any other surface: asked point by point, which is slow and always right.
 
     ask(u, v)
@@ -593,5 +593,5 @@ class Asked:
     def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
         """See :class:`silo.inertia.geometry.exact.Surface`."""
         rows = [[self.ask(float(x), float(y)) for x in row] for row, y in zip(u, v, strict=True)]
-        found = np.array(rows, dtype=np.float64).reshape(*u.shape, 3, 3)
-        return found[..., 0, :], found[..., 1, :], found[..., 2, :]
+        points = np.array(rows, dtype=np.float64).reshape(*u.shape, 3, 3)
+        return points[..., 0, :], points[..., 1, :], points[..., 2, :]

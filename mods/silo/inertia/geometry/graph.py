@@ -284,13 +284,13 @@ class Progress:
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class GeometryReading:
     """What a reader found, and what it depended on besides the file's own bytes.
 
     others
         files that were read as well (split assemblies, linked documents).
     missing
-        product names for which a file was looked for in vain.
+        product names for which no file was found.
     absent
         files that were named and are not there.
     kept
@@ -381,14 +381,14 @@ class ReadOptions:
     @classmethod
     def from_content(cls, values: Mapping[str, Any]) -> ReadOptions:
         """Return the inverse of :meth:`content_options`, for the child process: no isolation, no cache."""
-        known = {f.name for f in fields(cls)}
-        given = {name: value for name, value in values.items() if name in known - _LOCAL}
+        names = {f.name for f in fields(cls)}
+        given = {name: value for name, value in values.items() if name in names - _LOCAL}
         if given.get("root") is not None:
             given["root"] = Path(given["root"])
         return cls(**given, isolate=False, cache=False)
 
 
-class Kind(StrEnum):
+class Format(StrEnum):
     """A format we read."""
 
     STEP = "step"
@@ -403,10 +403,14 @@ class Kind(StrEnum):
     @property
     def is_mesh(self) -> bool:
         """Report whether it is triangles without a geometry kernel behind them."""
-        return self in (Kind.STL, Kind.OBJ, Kind.PLY, Kind.GLB, Kind.THREEMF)
+        return self in (Format.STL, Format.OBJ, Format.PLY, Format.GLB, Format.THREEMF)
 
 
-_SUFFIXES = {f".{kind}": kind for kind in Kind} | {".stp": Kind.STEP, ".p21": Kind.STEP, ".brp": Kind.BREP}
+_SUFFIXES = {f".{kind}": kind for kind in Format} | {
+    ".stp": Format.STEP,
+    ".p21": Format.STEP,
+    ".brp": Format.BREP,
+}
 
 
 def is_model_name(path: Path) -> bool:
@@ -425,7 +429,7 @@ _HEAD_BYTES = 1024
 READABLE = "STEP, FCStd, BREP, STL, OBJ, 3MF, GLB, PLY"
 
 
-def detect(path: Path) -> Kind:
+def detect(path: Path) -> Format:
     """Return the format of a file.
 
     Raises DocumentError if the file is missing, empty, a Git LFS pointer, or of no format we read. A file
@@ -436,7 +440,7 @@ def detect(path: Path) -> Kind:
     by_content = _by_content(path, head)
     if by_content is not None:
         return by_content
-    if by_suffix in (Kind.STL, Kind.OBJ):
+    if by_suffix in (Format.STL, Format.OBJ):
         # A binary STL begins with 80 free bytes and an OBJ with anything: only the suffix can say it.
         return by_suffix
     for start, words in _OTHERS.items():
@@ -464,31 +468,37 @@ def _head(path: Path) -> bytes:
     return head
 
 
-def _by_content(path: Path, head: bytes) -> Kind | None:
+def is_binary_brep(path: Path) -> bool:
+    """Return True if the shape in a file is stored as binary, False if as text."""
+    with path.open("rb") as stream:
+        return stream.read(64).lstrip().startswith(b"Open CASCADE Topology")
+
+
+def _by_content(path: Path, head: bytes) -> Format | None:
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     if text.startswith(b"ISO-10303-21"):
-        return Kind.STEP
+        return Format.STEP
     if text.startswith((b"DBRep_DrawableShape", b"CASCADE Topology", b"Open CASCADE Topology")):
-        return Kind.BREP
+        return Format.BREP
     if head.startswith(b"glTF"):
-        return Kind.GLB
+        return Format.GLB
     if text.startswith((b"ply\n", b"ply\r")):
-        return Kind.PLY
+        return Format.PLY
     if text.startswith(b"solid") and b"facet" in head:
-        return Kind.STL
+        return Format.STL
     if head.startswith(b"PK"):
         return _zip_kind(path)
     return None
 
 
-def _zip_kind(path: Path) -> Kind | None:
+def _zip_kind(path: Path) -> Format | None:
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
     except (zipfile.BadZipFile, OSError) as error:
         raise DocumentError(str(path), f"is a damaged zip file ({error}); save it again") from error
     if "Document.xml" in names:
-        return Kind.FREECAD
+        return Format.FREECAD
     if any(name.lower().endswith(".model") for name in names):
-        return Kind.THREEMF
+        return Format.THREEMF
     return None

@@ -111,8 +111,8 @@ class Helpers:
         begun = self._running[0].one(function, arguments)
 
         def result() -> T:
-            found = begun.result()
-            return function(*arguments) if found is None else found[0]
+            outcome = begun.result()
+            return function(*arguments) if outcome is None else outcome[0]
 
         return result
 
@@ -125,7 +125,7 @@ class Helpers:
         """Return one result for each row, in order.
 
         task
-            makes what is to be done for a row, for whichever process does it.
+            makes what is to be done for a row, for any process.
         done
             called in this process with how many have begun, and the total; its errors end everything.
         """
@@ -142,10 +142,10 @@ class Helpers:
                 number = waiting.popleft()
                 done(number + 1, len(rows))
                 results[number] = here(rows[number])
-        for one in working:
+        for future in working:
             # One that is still loading the kernel has nothing to do any more, and nobody waits for it.
-            if not one.cancel():
-                one.result()
+            if not future.cancel():
+                future.result()
         return [results[n] if n in results else here(row) for n, row in enumerate(rows)]
 
 
@@ -162,10 +162,10 @@ class _Helper:
         """Return (result,), or None if the helper cannot do it."""
 
         def run() -> tuple[T] | None:
-            found: tuple[T] | None = None
+            result: tuple[T] | None = None
             with suppress(BrokenExecutor):
-                found = _taken(self._sent(function, arguments))
-            return found
+                result = _received(self._sent(function, arguments))
+            return result
 
         return self._thread.submit(run)
 
@@ -188,8 +188,8 @@ class _Helper:
                 if not taken:
                     return
                 number, sent = taken.popleft()
-                if (found := _taken(sent)) is not None:
-                    results[number] = found[0]
+                if (answer := _received(sent)) is not None:
+                    results[number] = answer[0]
 
         return self._thread.submit(run)
 
@@ -202,7 +202,7 @@ class _Helper:
         return self._process.submit(_answer, next(self._files), function, arguments)
 
 
-def _taken(sent: Future[Path]) -> Any:
+def _received(sent: Future[Path]) -> Any:
     try:
         path = sent.result()
     except Exception:  # noqa: BLE001 - this process does it again, and reports what it meets
@@ -240,9 +240,6 @@ def _answer(path: Path, function: Callable[..., Any], arguments: tuple[Any, ...]
 
 
 def _load_kernel() -> None:
-    from silo.inertia.geometry.kernel import (
-        occt,
-        solids,  # noqa: F401 - brep is what measures
-    )
+    from silo.inertia.geometry.kernel import quiet, solids  # noqa: F401 - solids is what measures
 
-    occt.quiet()
+    quiet()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What measuring a product's solids gives, and what is said of them; the same for every engine. Pure.
+"""What measuring a product's solids gives, and what is reported of them; the same for every engine. Pure.
 
 Also what any file may have wrong: its unit, placements that scale or coincide.
 """
@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import counted, listed
-from silo.inertia.core import rigid_mask
 from silo.inertia.geometry.graph import Unfolded, lost_characters
 from silo.inertia.geometry.together import Body, Mesh, Together, about_enclosed, combined
-from silo.inertia.model import Assembly, GeometryCode, Instance, Note, Prototype, SolidProps
+from silo.inertia.model import Assembly, GeometryCode, Instance, Note, Prototype, SolidProps, rigid_mask
 
 STATED = 5e-5
 """Relative: what the volume may depend on the way that it is taken, and no farther in silence."""
@@ -158,7 +157,11 @@ def loose_notes(surfaces: Sequence[Mesh], bodies: Sequence[Body], solids: Sequen
         low, high = mesh.vertices.min(axis=0) + slack, mesh.vertices.max(axis=0) - slack
         return bool((low >= body.low).all() and (high <= body.high).all())
 
-    left = [one for one in surfaces if len(one) and not any(is_beside(one, body) for body in bodies)]
+    left = [
+        surface
+        for surface in surfaces
+        if len(surface) and not any(is_beside(surface, body) for body in bodies)
+    ]
     lost = sum(map(about_enclosed, left))
     if not solids or lost <= COSMETIC * sum(solid.volume_m3 for solid in solids):
         return []
@@ -199,11 +202,11 @@ TORN = 1e-3
 """Relative: as open as a solid with a missing face, for a mass."""
 
 
-def cavity_note(found: Together) -> Note:
+def cavity_note(together: Together) -> Note:
     """Report solids that were taken as cavities of others."""
     words = (
         "some solids of this product are inside out and some are not: "
-        f"{found.cavities} taken as cavities of the solid around them, {found.turned} as bodies"
+        f"{together.cavities} taken as cavities of the solid around them, {together.turned} as bodies"
     )
     return Note(GeometryCode.NEGATIVE_VOLUME, words)
 

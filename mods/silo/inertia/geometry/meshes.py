@@ -2,7 +2,7 @@
 """Mesh files: STL, OBJ, PLY and GLB through trimesh, and 3MF.
 
 A mesh has a volume only if it is closed and its triangles agree on what is outside. What is not so is
-computed all the same and said: a number from an open mesh looks like any other number.
+computed anyway and said: a number from an open mesh looks like any other number.
 
 3MF files (3MF Core Specification 1.3, with the Production Extension's parts in several model files).
 
@@ -30,9 +30,9 @@ from silo.inertia.geometry.graph import (
     MAX_DEPTH,
     MESH_UNITS,
     Child,
-    Kind,
+    Format,
+    GeometryReading,
     Node,
-    Reading,
     ReadOptions,
     Report,
     in_metres,
@@ -61,7 +61,7 @@ class MeshScene:
     said: Mapping[str, Sequence[Note]] = field(default_factory=dict)
 
 
-def read_mesh(path: Path, kind: Kind, options: ReadOptions, report: Report) -> Reading:
+def read_mesh(path: Path, kind: Format, options: ReadOptions, report: Report) -> GeometryReading:
     """Return the assembly of a mesh file: one instance, or those of its scene. Raises DocumentError."""
     report("reading", 0, 0)
     scene = _scene(path, kind)
@@ -81,7 +81,7 @@ def read_mesh(path: Path, kind: Kind, options: ReadOptions, report: Report) -> R
         prototypes[key] = _prototype(key, name, Mesh(mesh.vertices * unit, mesh.faces), said)
     problems += [*scene.said.get("", ())]
     problems += implausible_size(prototypes, unit_name)
-    return Reading(
+    return GeometryReading(
         assembled(unfolded, prototypes, problems, name=path.stem, source=str(path), unit=unit_name)
     )
 
@@ -99,8 +99,8 @@ def _check(path: Path, what: str, numbers: Floats) -> None:
         raise DocumentError(str(path), f"{reason}; repair the file or export it again")
 
 
-def _scene(path: Path, kind: Kind) -> MeshScene:
-    if kind is Kind.THREEMF:
+def _scene(path: Path, kind: Format) -> MeshScene:
+    if kind is Format.THREEMF:
         return read_3mf(path)
     try:
         import trimesh
@@ -108,7 +108,7 @@ def _scene(path: Path, kind: Kind) -> MeshScene:
         raise ConfigError(
             'mesh files need trimesh, which is not installed: pip install "silo-mod[inertia]"'
         ) from error
-    if kind is Kind.PLY and _is_cut_off(path.read_bytes()):
+    if kind is Format.PLY and _is_cut_off(path.read_bytes()):
         raise DocumentError(str(path), "the file ends in the middle; export or copy it again")
     try:
         # Infinite coordinates are refused below, in words; numpy's own would be about trimesh.
@@ -129,7 +129,7 @@ def _is_cut_off(data: bytes) -> bool:
     return b"format ascii" in head and listed > sum(bool(line.strip()) for line in body.splitlines())
 
 
-def _from_trimesh(path: Path, kind: Kind, loaded: Any) -> MeshScene:
+def _from_trimesh(path: Path, kind: Format, loaded: Any) -> MeshScene:
     meshes: dict[str, Mesh] = {}
     nodes: dict[str, Node] = {}
     for name, geometry in loaded.geometry.items():
@@ -141,9 +141,9 @@ def _from_trimesh(path: Path, kind: Kind, loaded: Any) -> MeshScene:
     if not meshes:
         raise DocumentError(str(path), "holds no triangles")
     roots = _tree(loaded.graph, nodes)
-    glb = kind is Kind.GLB
+    glb = kind is Format.GLB
     said: list[Note] = []
-    if kind in (Kind.OBJ, Kind.GLB):
+    if kind in (Format.OBJ, Format.GLB):
         used = [loaded.graph.transforms.node_data[n].get("geometry") for n in loaded.graph.nodes_geometry]
         read = (
             sum(name in nodes for name in used)
@@ -174,7 +174,9 @@ def _unread(data: bytes, glb: bool, read: int) -> list[Note]:
         full = {n for n, node in enumerate(nodes) if "mesh" in node}
         left_out = len(full - placed)
         drawn = [meshes[nodes[n]["mesh"]].get("primitives", ()) for n in full & placed]
-        listed = sum(one.get("mode", 4) in _TRIANGLES for primitives in drawn for one in primitives)
+        listed = sum(
+            primitive.get("mode", 4) in _TRIANGLES for primitives in drawn for primitive in primitives
+        )
         listed += sum("EXT_mesh_gpu_instancing" in nodes[n].get("extensions", ()) for n in placed)
     else:
         lines = [line.split() for line in _POLYGON.findall(data)]
@@ -311,10 +313,10 @@ class _Package:
         if model.unit not in MESH_UNITS:
             self._fail(f"states the unit '{model.unit}', which 3MF does not know")
         unit_m = MESH_UNITS[model.unit]
-        for number, found in model.objects.items():
-            if _key(root, number) not in self._reached and found.kind in _PART:
+        for number, obj in model.objects.items():
+            if _key(root, number) not in self._reached and obj.kind in _PART:
                 why = "is marked as not printed" if number in model.unprinted else "is built by nothing"
-                self._say("", f"object {number} “{found.name}” {why}: left out")
+                self._say("", f"object {number} “{obj.name}” {why}: left out")
         return MeshScene(self._meshes, self._nodes, tuple(roots), model.unit, unit_m, self._said)
 
     def _say(self, key: str, words: str, code: GeometryCode = GeometryCode.NOT_COUNTED) -> None:
@@ -326,11 +328,12 @@ class _Package:
         Bambu Studio and Orca Slicer give all that is not the part one type, negative volumes as well.
         """
         self._reached.add(_key(part, number))
-        found = self._model(part).objects.get(number)
-        word = role or (found.kind if found else "")
-        if found is None or word in (*_PART, *_NEGATIVE):
+        obj = self._model(part).objects.get(number)
+        word = role or (obj.kind if obj else "")
+        if obj is None or word in (*_PART, *_NEGATIVE):
             return False
-        self._say("", f"object {number} “{found.name}” is not the part ({word}): left out")
+        name = f" “{obj.name}”" if obj.name else ""
+        self._say("", f"object {number}{name} is not the part ({word}): left out")
         return True
 
     def _root(self) -> str:
@@ -361,12 +364,12 @@ class _Package:
             self._fail(f"its object {number} contains itself")
         if key in self._nodes:
             return key
-        found = self._model(part).objects.get(number)
-        if found is None:
+        obj = self._model(part).objects.get(number)
+        if obj is None:
             self._fail(f"refers to an object {number} that it does not hold")
         children: list[Child] = []
         cuts: list[Mesh] = []
-        for other, child, transform in found.components:
+        for other, child, transform in obj.components:
             roles = self._slicer.roles.get((number, child), [""])
             role = roles.pop(0) if roles[1:] else roles[0]  # a shared mesh is listed once for each use
             if self._is_left_out(role, other or part, child):
@@ -380,22 +383,22 @@ class _Package:
                 self._say(
                     "", f"the negative volume {child} is an assembly: {_NOT_CUT}", GeometryCode.INVALID_SHAPE
                 )
-        faces = dict(enumerate(found.faces))
+        faces = dict(enumerate(obj.faces))
         for kind, first, last in self._slicer.volumes.get(number, ()):
             if kind not in _PART:
                 taken = [faces.pop(row) for row in range(first, last + 1) if row in faces]
                 if kind not in _NEGATIVE:
                     self._say("", f"a volume of object {number} is not the part ({kind}): left out")
                 elif taken:
-                    cuts.append(self._mesh(number, found.vertices, taken))
+                    cuts.append(self._mesh(number, obj.vertices, taken))
         if faces:
-            self._meshes[key] = self._mesh(number, found.vertices, list(faces.values()))
+            self._meshes[key] = self._mesh(number, obj.vertices, list(faces.values()))
             self._carve(key, cuts)
-        if found.lattice or not (faces or found.components):
-            what = "beams, which are not measured" if found.lattice else "no triangles"
-            words = f"object {number} “{found.name}” has {what}: its volume is missing"
+        if obj.lattice or not (faces or obj.components):
+            what = "beams, which are not measured" if obj.lattice else "no triangles"
+            words = f"object {number} “{obj.name}” has {what}: its volume is missing"
             self._say("", words, GeometryCode.BODY_MISSING)
-        name = found.name or (self._path.stem if not inside else f"object {number}")
+        name = obj.name or (self._path.stem if not inside else f"object {number}")
         whole = tuple(self._carved(key, child, cuts) for child in children)
         self._nodes[key] = Node(key, name, whole, bool(faces))
         return key
@@ -485,7 +488,9 @@ class _Slicer:
             self.volumes[self._object].append(("", first, last))
         elif key == "volume_type" or (key, value) == ("modifier", "1"):
             volumes = self.volumes[self._object]
-            volumes[-1:] = [(value if key == "volume_type" else "modifier", *one[1:]) for one in volumes[-1:]]
+            volumes[-1:] = [
+                (value if key == "volume_type" else "modifier", *volume[1:]) for volume in volumes[-1:]
+            ]
 
 
 class _ModelReader:

@@ -10,7 +10,7 @@ What was read is kept, by content: the same bytes, kernel and options give the s
 file's SHA-256, the reading options, the kernel's version and a fingerprint of our own code that measures. The
 folder is bounded: what was not used for longest goes first. A split assembly also keeps the hashes of the
 files it was completed from, and the names of those it lacked: one part file changed, added or removed, and
-the assembly is read anew. Anything unexpected counts as "not there".
+the assembly is read again. Anything unexpected counts as "not there".
 
 An assembly is one file: numbers as npz arrays, words as JSON, and nothing in it can be executed. The same
 form goes from the reading process to its parent and into the cache.
@@ -30,7 +30,7 @@ import tempfile
 import threading
 import time
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -45,9 +45,9 @@ from silo.bom.document import relative
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError, counted
 from silo.files import content_hash
 from silo.inertia.geometry.graph import (
-    Kind,
+    Format,
+    GeometryReading,
     Progress,
-    Reading,
     ReadOptions,
     Report,
     detect,
@@ -64,10 +64,10 @@ _OUT_OF_MEMORY = ("MemoryError", "bad_alloc", "Cannot allocate memory", "failed 
 _WORKER = "from silo.inertia.geometry.read import main; main()"
 
 
-def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] = ()) -> None:
+def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] = (), **env: str) -> None:
     """Read ``path`` in a child process; the stored geometry is at ``result`` afterwards.
 
-    ``command`` starts another child than the usual worker, speaking like it.
+    ``command`` starts another child than the usual worker, speaking like it; ``env`` is set for it.
 
     Raises DocumentError (bad file, crash, time or memory limit), ConfigError (kernel not installed) and
     CancelledError.
@@ -81,9 +81,13 @@ def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] =
         "cpu_s": options.timeout_s,
     }
     command = command or [python(), "-c", _WORKER]
-    with tempfile.TemporaryFile() as errors, _child(command, errors) as process:
-        answer = _talk(process, path, options, task)
-        process.wait()
+    # In a file: FreeCAD's window would be ended by the signal of a pipe whose reader has died.
+    with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as errors:
+        given.write(json.dumps(task).encode("utf-8") + b"\n")
+        given.seek(0)
+        with _child(command, given, errors, env) as process:
+            answer = _talk(process, path, options)
+            process.wait()
         if answer is None:
             raise DocumentError(str(path), _death(process.returncode, errors, options))
     if answer.get("event") == "error":
@@ -92,18 +96,10 @@ def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] =
         raise DocumentError(str(path), str(answer["reason"]))
 
 
-def _talk(
-    process: subprocess.Popen[bytes], path: Path, options: ReadOptions, task: dict[str, Any]
-) -> dict[str, Any] | None:
+def _talk(process: subprocess.Popen[bytes], path: Path, options: ReadOptions) -> dict[str, Any] | None:
     """Return the child's last word, None if it ended without one."""
     lines: queue.Queue[bytes | None] = queue.Queue()
     threading.Thread(target=_pump, args=(process.stdout, lines), daemon=True).start()
-    if process.stdin is not None:
-        try:
-            process.stdin.write(json.dumps(task).encode("utf-8") + b"\n")
-            process.stdin.close()
-        except BrokenPipeError:
-            return None
     deadline = time.monotonic() + options.timeout_s if options.timeout_s else None
     while True:
         if options.cancelled is not None and options.cancelled():
@@ -119,6 +115,8 @@ def _talk(
             continue
         if line is None:
             return None
+        if not line.startswith(b"{"):
+            continue  # FreeCAD's banner
         event: dict[str, Any] = json.loads(line)
         if event.get("event") != "progress":
             return event
@@ -133,13 +131,15 @@ def _pump(stream: IO[bytes] | None, lines: queue.Queue[bytes | None]) -> None:
 
 
 @contextmanager
-def _child(command: Sequence[str], errors: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+def _child(
+    command: Sequence[str], given: IO[bytes], errors: IO[bytes], env: Mapping[str, str]
+) -> Iterator[subprocess.Popen[bytes]]:
     process = subprocess.Popen(
         command,
-        stdin=subprocess.PIPE,
+        stdin=given,
         stdout=subprocess.PIPE,
         stderr=errors,
-        env=_environment(),
+        env={**_environment(), **env},
         **platform.child_options(group=True),
     )
     try:
@@ -155,9 +155,9 @@ def python() -> str:
     """Return a Python interpreter to start. Inside FreeCAD ``sys.executable`` is FreeCAD itself."""
     if "python" in Path(sys.executable or "").name.lower():
         return sys.executable
-    for found in platform.python_beside(sys.base_exec_prefix):
-        if os.path.isfile(found):
-            return found
+    for path in platform.python_beside(sys.base_exec_prefix):
+        if os.path.isfile(path):
+            return path
     raise ConfigError(
         f"no Python interpreter was found beside {sys.executable} to read geometry with; "
         "read it with isolate=False"
@@ -168,9 +168,9 @@ def _environment() -> dict[str, str]:
     # The child must find the same modules, however this process found them.
     paths = os.pathsep.join(p for p in sys.path if p)
     # One thread: numpy's pool would reserve memory for each core, which counts against the limit.
-    one = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    environment = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     # What the kernel prints is written at once, and not lost when the child ends itself.
-    return {**os.environ, **one, "PYTHONPATH": paths, "PYTHONUNBUFFERED": "1"}
+    return {**os.environ, **environment, "PYTHONPATH": paths, "PYTHONUNBUFFERED": "1"}
 
 
 def _death(code: int, errors: IO[bytes], options: ReadOptions) -> str:
@@ -211,7 +211,7 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
     kind = detect(path)
     if not options.isolate:
         if not kind.is_mesh:
-            from silo.inertia.geometry.kernel import occt
+            from silo.inertia.geometry import kernel as occt
 
             occt.quiet()
         with Helpers() as helpers:
@@ -219,9 +219,9 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
     kept = Cache(options.cache_dir or default_folder()) if options.cache else None
     for _ in range(ATTEMPTS):
         key = key_of(path, _content(kind, options))
-        known = kept.get(key, path) if kept else None
-        if known is not None:
-            return known
+        stored = kept.get(key, path) if kept else None
+        if stored is not None:
+            return stored
         begin = time.time_ns()
         with scratch_folder("silo-geometry-") as folder:
             result = Path(folder) / "result.npz"
@@ -237,20 +237,20 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
     )
 
 
-def _content(kind: Kind, options: ReadOptions) -> dict[str, Any]:
+def _content(kind: Format, options: ReadOptions) -> dict[str, Any]:
     """Return what a result depends on besides the file.
 
     For FreeCAD documents also the cards that hold densities.
     """
     content = options.content_options()
-    if kind is not Kind.FREECAD:
+    if kind is not Format.FREECAD:
         return content
     from silo.inertia.materials import cards_fingerprint
 
     return {**content, "cards": cards_fingerprint()}
 
 
-def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers) -> Reading:
+def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers) -> GeometryReading:
     """Read in this process, and in the helpers: what the child does."""
     try:
         return _reading(path, options, report, helpers)
@@ -260,26 +260,26 @@ def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers
         raise DocumentError(str(path), str(error)) from error
 
 
-def _reading(path: Path, options: ReadOptions, report: Report, helpers: Helpers) -> Reading:
+def _reading(path: Path, options: ReadOptions, report: Report, helpers: Helpers) -> GeometryReading:
     kind = detect(path)
-    if kind is Kind.STEP:
+    if kind is Format.STEP:
         # The kernel is not there inside FreeCAD, which reads the other formats; the text does without it.
-        from silo.inertia.geometry.step.text import begin
+        from silo.inertia.geometry.step_text import begin
 
         text = begin(path, options, helpers)
         import silo.inertia.geometry.kernel  # noqa: F401 - first: it says what is wrong with it
-        from silo.inertia.geometry.step.read import read_step
+        from silo.inertia.geometry.step import read_step
 
         return read_step(path, options, report, helpers, text)
     if kind.is_mesh:
         from silo.inertia.geometry.meshes import read_mesh
 
         return read_mesh(path, kind, options, report)
-    if kind is Kind.BREP:
+    if kind is Format.BREP:
         from silo.inertia.geometry.kernel.solids import read_brep
 
         return read_brep(path, options, report)
-    from silo.inertia.geometry.freecad.files import read_freecad
+    from silo.inertia.geometry.fcstd import read_freecad
 
     return read_freecad(path, options, report, helpers)
 
@@ -297,9 +297,9 @@ def _reporter(path: Path, options: ReadOptions) -> Report:
 # --- the child ------------------------------------------------------------------------------------------
 
 
-def main() -> None:
+def main(work: Callable[[dict[str, Any], IO[str], IO[bytes]], None] | None = None) -> None:
     """Run as the child: read the task from standard input, do it, say how it went. Exit code 0 unless it
-    crashed.
+    crashed. ``work`` does the task; it reads the geometry of a file unless given.
 
     Standard output is the line to the parent, so the kernel, which prints there too, gets a file instead;
     what it wrote is counted and becomes a problem of the assembly.
@@ -311,10 +311,10 @@ def main() -> None:
     with tempfile.TemporaryFile() as noise:
         os.dup2(noise.fileno(), 1)
         try:
-            _read(task, parent, noise)
+            (work or _read)(task, parent, noise)
         except SiloError as error:
             reason = getattr(error, "reason", str(error))
-            _say(parent, event="error", reason=reason, config=isinstance(error, ConfigError))
+            say(parent, event="error", reason=reason, config=isinstance(error, ConfigError))
     os._exit(0)
 
 
@@ -337,18 +337,18 @@ def _read(task: dict[str, Any], parent: IO[str], noise: IO[bytes]) -> None:
     options = ReadOptions.from_content(task["options"])
 
     def report(stage: str, done: int, total: int) -> None:
-        _say(parent, event="progress", stage=stage, done=done, total=total)
+        say(parent, event="progress", stage=stage, done=done, total=total)
 
     with helpers_for(int(task["processes"]), int(task["memory_mb"])) as helpers:
         reading = read_here(Path(task["path"]), options, report, helpers)
     reading = with_complaints(reading, _complaints(noise))
     save(reading.assembly, Path(task["result"]), provenance(reading, options))
-    _say(parent, event="done")
+    say(parent, event="done")
     # Taking a large document of the kernel down can take longer than reading it, and may crash.
     os._exit(0)
 
 
-def with_complaints(reading: Reading, lines: list[str]) -> Reading:
+def with_complaints(reading: GeometryReading, lines: list[str]) -> GeometryReading:
     """Return what the kernel printed, as one problem of the assembly."""
     if not lines:
         return reading
@@ -367,7 +367,8 @@ def _complaints(noise: IO[bytes]) -> list[str]:
     return [line.decode("utf-8", errors="replace")[:200] for line in lines if _COMPLAINT.search(line)]
 
 
-def _say(parent: IO[str], **event: object) -> None:
+def say(parent: IO[str], **event: object) -> None:
+    """Send the parent a line."""
     parent.write(json.dumps(event) + "\n")
     parent.flush()
 
@@ -484,7 +485,7 @@ def key_parts(path: Path, options: Mapping[str, Any]) -> list[str]:
 def measured_by() -> str:
     """Return a fingerprint of the code that reads and measures: another version's numbers are not ours."""
     package = Path(__file__).resolve().parent
-    return fingerprint([*package.rglob("*.py"), package.parent / "core.py", package.parent / "model.py"])
+    return fingerprint([*package.rglob("*.py"), package.parent / "model.py"])
 
 
 def fingerprint(paths: Iterable[Path]) -> str:
@@ -496,13 +497,13 @@ def fingerprint(paths: Iterable[Path]) -> str:
 
 
 def _versions() -> str:
-    found = []
+    versions = []
     for name in KERNELS:
         try:
-            found.append(f"{name} {importlib.metadata.version(name)}")
+            versions.append(f"{name} {importlib.metadata.version(name)}")
         except importlib.metadata.PackageNotFoundError:
             continue
-    return ", ".join(found)
+    return ", ".join(versions)
 
 
 @dataclass(frozen=True)
@@ -545,7 +546,7 @@ class Cache:
             with suppress(OSError):
                 stat = path.stat()
                 kept.append((stat.st_mtime_ns, stat.st_size, path))
-        size = sum(one for _, one, _ in kept)
+        size = sum(each_size for _, each_size, _ in kept)
         for _, one, path in sorted(kept):
             if size <= self.max_bytes:
                 return
@@ -556,7 +557,7 @@ class Cache:
         return self.folder / key[:2] / f"{key}.npz"
 
 
-def provenance(reading: Reading, options: ReadOptions) -> dict[str, Any]:
+def provenance(reading: GeometryReading, options: ReadOptions) -> dict[str, Any]:
     """Return what a reading depends on besides its own bytes; kept with it, checked by :meth:`Cache.get`."""
     folder = Path(reading.assembly.source).resolve().parent
     return {
@@ -590,8 +591,8 @@ def changed_since(begin_ns: int, extra: Mapping[str, Any], source: Path) -> bool
     folder = source.resolve().parent
     for name in extra.get("others", {}):
         try:
-            found = (folder / name).stat()
-            if max(found.st_mtime_ns, found.st_ctime_ns) > begin_ns:
+            stat = (folder / name).stat()
+            if max(stat.st_mtime_ns, stat.st_ctime_ns) > begin_ns:
                 return True
         except OSError:
             return True

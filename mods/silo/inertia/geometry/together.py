@@ -2,7 +2,7 @@
 """The bodies of one product together: copies, cavities and overlaps; what a mesh encloses. For every engine.
 
 Nesting and orientation decide together. A body inside of another one with the opposite orientation is its
-cavity, whichever of the two is inside out: mirrored housings have both turned. A body inside of another one
+cavity, if either is inside out: mirrored housings have both turned. A body inside of another one
 with the same orientation adds nothing, for the space is filled already; that, and bodies that overlap, is a
 problem. A copy that lies exactly on a body is counted once.
 
@@ -24,11 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.bom.errors import counted
-from silo.inertia.core import combine_arrays
-from silo.inertia.model import GeometryCode, Note, SolidProps
+from silo.inertia.model import GeometryCode, Note, SolidProps, combine_arrays
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Box = tuple[Floats, Floats]
+"""The lowest and the highest corner."""
 
 PICTURE_TRIANGLES = 120_000
 """The most triangles that are kept of one prototype; a populated circuit board has millions."""
@@ -69,6 +70,27 @@ class Mesh:
         mirrored = np.linalg.det(matrix[:3, :3]) < 0
         faces = self.faces[:, ::-1] if mirrored else self.faces
         return Mesh(self.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces)
+
+
+def exact_box(about: Sequence[Any], exact: Callable[[int], Any]) -> Box:
+    """Return the box around shapes; about each there is a box that may be too large.
+
+    Only a shape that may reach beyond the others is looked at in full: that takes a minute for all faces of
+    a circuit board, and a second for those at its border.
+    """
+    if not about:
+        return np.zeros(3), np.zeros(3)
+    reach = np.array([[*np.negative(low), *high] for low, high in about])
+    result, seen = np.full(6, -np.inf), set[int]()
+    for axis in range(6):
+        for number in np.argsort(-reach[:, axis]):
+            if reach[number, axis] <= result[axis]:
+                break
+            if number not in seen:
+                seen.add(number)
+                low, high = exact(number)
+                result = np.maximum(result, [*np.negative(low), *high])
+    return -result[:3], result[3:]
 
 
 def joined(parts: list[Mesh]) -> Mesh:
@@ -132,6 +154,20 @@ def _centred(mesh: Mesh) -> tuple[Floats, Floats]:
     return mesh.vertices - centre, centre
 
 
+def distinct(rows: NDArray[Any]) -> tuple[Indices, Indices]:
+    """Return the index of the first row of each kind, kinds in order, and for each row its kind.
+
+    ``np.unique`` of rows compares them one by one and takes twenty times as long.
+    """
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    is_new = np.ones(len(rows), dtype=bool)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    kind = np.empty(len(rows), dtype=np.int64)
+    kind[order] = np.cumsum(is_new) - 1
+    return order[is_new], kind
+
+
 def welded(vertices: Floats, faces: Indices) -> Mesh:
     """Make equal vertices one (an STL repeats each six times); leave out triangles without area.
 
@@ -143,16 +179,15 @@ def welded(vertices: Floats, faces: Indices) -> Mesh:
     step = float(mesh.extents.max()) * WELD
     if step == 0.0:
         return mesh
-    grid = np.round(mesh.vertices / step)
-    _, first, place = np.unique(grid, axis=0, return_index=True, return_inverse=True)
-    return _merged(mesh.vertices[first[place.reshape(-1)]], mesh.faces)
+    first, place = distinct(np.round(mesh.vertices / step))
+    return _merged(mesh.vertices[first[place]], mesh.faces)
 
 
 def _merged(vertices: Floats, faces: Indices) -> Mesh:
-    unique, place = np.unique(vertices, axis=0, return_inverse=True)
-    faces = place.reshape(-1)[faces]
+    first, place = distinct(vertices)
+    faces = place[faces]
     flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
-    return Mesh(unique, faces[~flat])
+    return Mesh(vertices[first], faces[~flat])
 
 
 def without_doubled(mesh: Mesh) -> tuple[Mesh, int]:
@@ -163,8 +198,7 @@ def without_doubled(mesh: Mesh) -> tuple[Mesh, int]:
     order = np.argsort(mesh.faces, axis=1)
     rows = np.take_along_axis(mesh.faces, order, axis=1)
     even = np.isin(order @ np.array([9, 3, 1]), _EVEN)
-    kinds, kind = np.unique(rows, axis=0, return_inverse=True)
-    kind = kind.reshape(-1)
+    kinds, kind = distinct(rows)
     if len(kinds) == len(mesh.faces):
         return mesh, 0
     forward = np.bincount(kind, weights=even, minlength=len(kinds))
@@ -185,10 +219,10 @@ def open_edges(mesh: Mesh) -> int:
     """Return how many edges are not used exactly twice, once in each direction."""
     directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     ends = np.sort(directed, axis=1)
-    _, number = np.unique(ends, axis=0, return_inverse=True)
+    number = distinct(ends)[1]
     forward = directed[:, 0] == ends[:, 0]
-    ups = np.bincount(number.reshape(-1), weights=forward)
-    downs = np.bincount(number.reshape(-1), weights=~forward)
+    ups = np.bincount(number, weights=forward)
+    downs = np.bincount(number, weights=~forward)
     return int(((ups != 1) | (downs != 1)).sum())
 
 
@@ -198,8 +232,7 @@ def components(mesh: Mesh, most: int) -> list[Mesh]:
     Pieces that touch in a corner only are two: each may be inside out by itself.
     """
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, number = np.unique(edges, axis=0, return_inverse=True)
-    rows = number.reshape(-1, 3)
+    rows = distinct(edges)[1].reshape(-1, 3)
     face_labels = _labels(rows, int(rows.max()) + 1 if len(rows) else 0)[rows[:, 0]]
     labels = np.unique(face_labels)
     if not 1 < len(labels) <= most:
@@ -307,7 +340,7 @@ class Body:
 
 Common = Callable[[Body, Body], SolidProps | None]
 """What two bodies have in common, whatever their orientation: volume 0 for nothing, None if it cannot be
-found out."""
+known."""
 
 
 class _Role(Enum):
@@ -344,10 +377,12 @@ def together(bodies: Sequence[Body], common: Common, problems: list[Note]) -> To
         if role is _Role.CAVITY:
             rest[hosts[number]] = _minus(rest[hosts[number]], bodies[number].props)
     swallowed = {n for n, role in enumerate(roles) if role is _Role.SWALLOWED}
-    crossing = {pair: found for pair, found in relations.partial.items() if swallowed.isdisjoint(pair)}
-    for (one, other), found in crossing.items():
+    crossing = {
+        pair: solid_props for pair, solid_props in relations.partial.items() if swallowed.isdisjoint(pair)
+    }
+    for (one, other), shared in crossing.items():
         if roles[one] is roles[other] is _Role.BODY:
-            rest[other] = _minus(rest[other], found)
+            rest[other] = _minus(rest[other], shared)
     _tell([bodies[n] for n in swallowed], list(crossing.values()), relations.unknown, problems)
     kept = [props for props, role in zip(rest, roles, strict=True) if role is _Role.BODY]
     turned = sum(b.props.reversed for b, role in zip(bodies, roles, strict=True) if role is _Role.BODY)
@@ -372,19 +407,19 @@ def _without_copies(bodies: Sequence[Body], problems: list[Note]) -> list[Body]:
     return kept
 
 
-def _is_copy(one: Body, other: Body) -> bool:
-    a, b = one.props, other.props
-    size = float(np.linalg.norm(one.high - one.low))
+def _is_copy(body: Body, other: Body) -> bool:
+    a, b = body.props, other.props
+    size = float(np.linalg.norm(body.high - body.low))
     if abs(a.volume_m3 - b.volume_m3) > 2 * SAME * b.volume_m3:
         return False
     if np.abs(a.com_m - b.com_m).max() > 1e-7 * size:
         return False
     if np.abs(a.inertia_unit - b.inertia_unit).max() > 1e-6 * np.abs(b.inertia_unit).max():
         return False
-    if max(np.abs(one.low - other.low).max(), np.abs(one.high - other.high).max()) > 1e-6 * size:
+    if max(np.abs(body.low - other.low).max(), np.abs(body.high - other.high).max()) > 1e-6 * size:
         return False
     # A cube and the same turned by 45 degrees have equal moments, but not equal corners.
-    return one.mesh is None or other.mesh is None or _same_corners(one.mesh, other.mesh, 1e-6 * size)
+    return body.mesh is None or other.mesh is None or _same_corners(body.mesh, other.mesh, 1e-6 * size)
 
 
 def _same_corners(one: Mesh, other: Mesh, step: float) -> bool:
@@ -402,42 +437,42 @@ class _Relations:
     partial
         (one, other) → what both have in common, if neither holds the other.
     unknown
-        pairs of which that cannot be found out.
+        pairs of which that is not known.
     """
 
     def __init__(self, bodies: Sequence[Body], common: Common) -> None:
         self.holders: list[list[int]] = [[] for _ in bodies]
         self.partial: dict[tuple[int, int], SolidProps] = {}
         self.unknown: list[tuple[int, int]] = []
-        for one, other in _near(bodies):
-            large, small = bodies[one], bodies[other]
-            found = common(large, small)
+        for body, other in _close_pairs(bodies):
+            large, small = bodies[body], bodies[other]
+            props = common(large, small)
             least = small.props.volume_m3
-            if found is None:
-                self._guess(one, other, large, small)
-            elif found.volume_m3 >= (1 - WHOLE) * least:
-                self.holders[other].append(one)
-            elif found.volume_m3 > COMMON * least:
-                self.partial[one, other] = found
+            if props is None:
+                self._guess(body, other, large, small)
+            elif props.volume_m3 >= (1 - WHOLE) * least:
+                self.holders[other].append(body)
+            elif props.volume_m3 > COMMON * least:
+                self.partial[body, other] = props
 
-    def _guess(self, one: int, other: int, large: Body, small: Body) -> None:
+    def _guess(self, index: int, other: int, large: Body, small: Body) -> None:
         if large.mesh is not None and small.mesh is not None and len(small.mesh):
             inside = is_inside(small.mesh, large.mesh)
             if inside and bool((small.low >= large.low).all() and (small.high <= large.high).all()):
-                self.holders[other].append(one)
+                self.holders[other].append(index)
                 return
-        self.unknown.append((one, other))
+        self.unknown.append((index, other))
 
 
-def _near(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
+def _close_pairs(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
     """Yield pairs whose boxes share more than a face."""
     low = np.array([body.low for body in bodies])
     high = np.array([body.high for body in bodies])
-    for one in range(len(bodies) - 1):
-        depth = np.minimum(high[one], high[one + 1 :]) - np.maximum(low[one], low[one + 1 :])
-        least = np.minimum(np.ptp([low[one], high[one]], axis=0), high[one + 1 :] - low[one + 1 :])
+    for index in range(len(bodies) - 1):
+        depth = np.minimum(high[index], high[index + 1 :]) - np.maximum(low[index], low[index + 1 :])
+        least = np.minimum(np.ptp([low[index], high[index]], axis=0), high[index + 1 :] - low[index + 1 :])
         for other in np.nonzero((depth > 1e-7 * least).all(axis=1))[0].tolist():
-            yield one, one + 1 + other
+            yield index, index + 1 + other
 
 
 def _roles(bodies: Sequence[Body], holders: list[list[int]]) -> tuple[list[_Role], list[int]]:
@@ -476,12 +511,12 @@ def _tell(
         what = counted(len(swallowed), "solid lies", "solids lie")
         reasons.append(f"{what} inside of another one ({volume * 1e6:.6g} cm³, not counted)")
     if crossing:
-        volume = sum(found.volume_m3 for found in crossing)
+        volume = sum(props.volume_m3 for props in crossing)
         what = counted(len(crossing), "pair of solids overlaps", "pairs of solids overlap")
         reasons.append(f"{what} ({volume * 1e6:.6g} cm³, counted once)")
     if unknown:
         what = counted(len(unknown), "pair of solids", "pairs of solids")
-        reasons.append(f"{what} may overlap, which could not be found out")
+        reasons.append(f"{what} may overlap; this could not be checked")
     if reasons:
         words = "; ".join(reasons) + ". Is it one part? Its volume is in doubt"
         problems.append(Note(GeometryCode.OVERLAPPING_SOLIDS, words))
@@ -513,16 +548,16 @@ class MeshCommon:
     def __init__(self) -> None:
         self._manifold = cache(_closed)
 
-    def __call__(self, one: Body, other: Body) -> SolidProps | None:
+    def __call__(self, body: Body, other: Body) -> SolidProps | None:
         """Return the moments of what both have in common; None if a mesh is not closed."""
-        a, b = self._manifold(one), self._manifold(other)
+        a, b = self._manifold(body), self._manifold(other)
         if a is None or b is None:
             return None
         both = a ^ b
         if both.is_empty():
             return NOTHING
-        found = both.to_mesh64()
-        return mesh_solid(Mesh(found.vert_properties[:, :3], found.tri_verts.astype(np.int64)))
+        mesh = both.to_mesh64()
+        return mesh_solid(Mesh(mesh.vert_properties[:, :3], mesh.tri_verts.astype(np.int64)))
 
 
 def _closed(body: Body) -> Any:
@@ -537,17 +572,17 @@ def _closed(body: Body) -> Any:
         vert_properties=np.ascontiguousarray(body.mesh.vertices),
         tri_verts=np.ascontiguousarray(faces, np.uint64),
     )
-    found = manifold3d.Manifold(mesh)
-    sound = found.status() == manifold3d.Error.NoError and found.volume() > 0
-    return found if sound else None
+    manifold = manifold3d.Manifold(mesh)
+    sound = manifold.status() == manifold3d.Error.NoError and manifold.volume() > 0
+    return manifold if sound else None
 
 
 def without(mesh: Mesh, cut: Mesh) -> Mesh | None:
     """Return what is left of a mesh when another one is cut away; None if one of them does not close."""
-    one, other = _closed(_body(mesh)), _closed(_body(cut))
-    if one is None or other is None:
+    body, other = _closed(_body(mesh)), _closed(_body(cut))
+    if body is None or other is None:
         return None
-    left = (one - other).to_mesh64()
+    left = (body - other).to_mesh64()
     return Mesh(left.vert_properties[:, :3], left.tri_verts.astype(np.int64))
 
 
@@ -570,12 +605,12 @@ def enclosed(mesh: Mesh, problems: list[Note]) -> SolidProps:
             f"its triangles are in more than {MAX_COMPONENTS} pieces, which may overlap; they were added up"
         )
         problems.append(Note(GeometryCode.OVERLAPPING_SOLIDS, words))
-    found = together([_body(piece) for piece in pieces], MeshCommon(), problems)
-    if found.turned:
-        which = "the mesh is" if len(pieces) == 1 else f"{found.turned} of its {len(pieces)} pieces are"
+    relations = together([_body(piece) for piece in pieces], MeshCommon(), problems)
+    if relations.turned:
+        which = "the mesh is" if len(pieces) == 1 else f"{relations.turned} of its {len(pieces)} pieces are"
         words = f"{which} inside out; the sign was turned"
         problems.append(Note(GeometryCode.NEGATIVE_VOLUME, words))
-    return replace(combined(found.solids), reversed=found.turned > 0)
+    return replace(combined(relations.solids), reversed=relations.turned > 0)
 
 
 def _body(piece: Mesh) -> Body:

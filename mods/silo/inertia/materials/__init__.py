@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from silo.bom.errors import ConfigError, InputError
 from silo.bom.numbers import LONGEST, parse_number, plain, plain_text, read_number
 from silo.freecads import material_folders
-from silo.inertia.bom.table import MASS_UNITS
+from silo.inertia.bom import MASS_UNITS
 from silo.inertia.matching import Suggester
 
 if TYPE_CHECKING:
@@ -217,12 +217,12 @@ class _Index:
         return self.exact[tuple(near[0].split())] if near else None
 
     def _ancestors(self, name: str) -> set[str]:
-        found: set[str] = set()
+        ancestors: set[str] = set()
         above = self._family.get(name, "")
-        while above and above not in found:
-            found.add(above)
+        while above and above not in ancestors:
+            ancestors.add(above)
             above = self._family.get(above, "")
-        return found
+        return ancestors
 
 
 def load_materials(paths: Iterable[Path | str] = (), *, freecad: bool = True) -> MaterialTable:
@@ -259,7 +259,7 @@ def words(text: str) -> Words:
     return tuple(_WORD.findall(plain_text(re.sub(r"\bTiN\b", "titanium nitride", text)).casefold()))
 
 
-def _uncovered(text: Words, known: Set[str]) -> Words:
+def _uncovered(text: Words, covered: Set[str]) -> Words:
     """Leave out platings: ("zinc", "plated", "steel") → ("steel",), ("zinc", "plated") → ().
 
     known
@@ -271,7 +271,7 @@ def _uncovered(text: Words, known: Set[str]) -> Words:
         if (
             with_what
             and word not in _MEANING["thick"]
-            and (word in known or word in _MEANING["coat"] or word in _MEANING["with"])
+            and (word in covered or word in _MEANING["coat"] or word in _MEANING["with"])
         ):
             continue
         with_what = word in _MEANING["covered"] and bool(_MEANING["with"] & set(text[index + 1 : index + 2]))
@@ -283,7 +283,7 @@ def _uncovered(text: Words, known: Set[str]) -> Words:
                 kept
                 and not with_what
                 and kept[-1] not in _MEANING["thick"]
-                and (kept[-1] in known | _MEANING["coat"])
+                and (kept[-1] in covered | _MEANING["coat"])
             ):
                 kept.pop()
         else:
@@ -365,8 +365,8 @@ def checked_density(value: float) -> float:
 
 def density_factor(unit: str) -> float | None:
     """Return the kg/m^3 per ``unit`` ("g/cm^3"); None if it is no unit of density."""
-    found = _SHAPE.fullmatch(f"1 {_plain_density(unit)}")
-    return _factor_of(found) if found else None
+    match = _SHAPE.fullmatch(f"1 {_plain_density(unit)}")
+    return _factor_of(match) if match else None
 
 
 def read_density(text: str, factor: float = 1.0, *, points_are_decimal: bool = False) -> DensityCell:
@@ -376,13 +376,13 @@ def read_density(text: str, factor: float = 1.0, *, points_are_decimal: bool = F
     What no solid weighs is refused.
     """
     cell = _plain_density(text)
-    found = _SHAPE.fullmatch(cell)
-    if found is not None:
-        own = _factor_of(found)
+    match = _SHAPE.fullmatch(cell)
+    if match is not None:
+        own = _factor_of(match)
         if own is None:
             return DensityCell(None, f"wanted a unit such as kg/m3 or g/cm3, got “{text.strip()[:LONGEST]}”")
-        factor, cell = own, found["number"].strip()
-    has_unit = found is not None
+        factor, cell = own, match["number"].strip()
+    has_unit = match is not None
     number = parse_number(cell)
     if number is not None and number.other is not None and float(number.other) * factor > DENSEST:
         value = float(number.exact)  # the other reading is denser than any metal
@@ -411,8 +411,8 @@ def _plain_density(text: str) -> str:
     return re.sub(r"³$", "3", plain_text(text).strip("\"'")).casefold().replace("μ", "µ")
 
 
-def _factor_of(found: re.Match[str]) -> float | None:
-    mass, volume = MASS_UNITS.get(found["mass"]), _VOLUMES.get(found["volume"])
+def _factor_of(match: re.Match[str]) -> float | None:
+    mass, volume = MASS_UNITS.get(match["mass"]), _VOLUMES.get(match["volume"])
     return None if mass is None or volume is None else mass / volume
 
 
@@ -604,15 +604,15 @@ def cards_fingerprint() -> str:
 
 def materials_of(cards: Iterable[Card]) -> list[Material]:
     """Return all cards with a density, by name and by file name, in order; the first of a name wins."""
-    found: dict[str, Material] = {}
+    materials: dict[str, Material] = {}
     for card in cards:
         if card.density is not None:
             stem = card.path.stem
             title = card.name or stem
             aliases = {stem, stem.removesuffix("-Generic"), title.removesuffix(" Generic")} - {title}
             source = f"FreeCAD card {card.path.name}"
-            found.setdefault(title, Material(title, card.density, tuple(sorted(aliases)), source))
-    return list(found.values())
+            materials.setdefault(title, Material(title, card.density, tuple(sorted(aliases)), source))
+    return list(materials.values())
 
 
 def cards_in(folders: Iterable[Path]) -> list[Card]:
@@ -642,8 +642,8 @@ def _texts(folder: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _own_uuid(text: str) -> str:
-    found = _UUID.search(text.partition("Inherits:")[0])
-    return found[1].casefold() if found else ""
+    match = _UUID.search(text.partition("Inherits:")[0])
+    return match[1].casefold() if match else ""
 
 
 def _card_density(text: str, by_uuid: Mapping[str, str], depth: int) -> float | None:

@@ -9,8 +9,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from silo.workbench.commit.flow import Answer, Choice, Theirs, choice_texts, line_texts, more_text
-from silo.workbench.commit.plan import Plan, Row, State
+from silo.workbench.commit.flow import Choice, CommitAnswer, Theirs, choice_texts, line_texts, more_text
+from silo.workbench.commit.plan import CommitPlan, DocumentRow, DocumentState
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
@@ -24,7 +24,7 @@ _MOST_LINES = 12
 class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
     """Asks for a comment, and shows what will be saved and in which order."""
 
-    def __init__(self, plan: Plan, parent: Any, *, note: str = "", comment: str = "") -> None:
+    def __init__(self, plan: CommitPlan, parent: Any, *, note: str = "", comment: str = "") -> None:
         super().__init__(parent)
         self._plan = plan
         self._theirs: dict[int, Theirs] = {}
@@ -66,11 +66,11 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self.comment.setFocus()
 
     def _heading(self) -> str:
-        edited = sum(row.state is not State.RECOMPUTED for row in self._plan.rows[:-1])
+        edited = sum(row.state is not DocumentState.RECOMPUTED for row in self._plan.rows[:-1])
         recomputed = len(self._plan.rows) - 1 - edited
-        told = [translate("Silo", "This file is committed:")]
+        lines = [translate("Silo", "This file is committed:")]
         if edited:
-            one = translate(
+            text = translate(
                 "Silo",
                 "This file is committed, and {n} file below it that has unsaved edits, that one first:",
             )
@@ -78,12 +78,12 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
                 "Silo",
                 "This file is committed, and {n} files below it that have unsaved edits, the lowest first:",
             )
-            told = [counted(edited, one, many)]
+            lines = [counted(edited, text, many)]
         if recomputed:
-            one = translate("Silo", "{n} more was only recomputed; check it to commit it all the same.")
-            many = translate("Silo", "{n} more were only recomputed; check them to commit them all the same.")
-            told.append(counted(recomputed, one, many))
-        return "\n".join(told)
+            text = translate("Silo", "{n} more was only recomputed; check it to commit it anyway.")
+            many = translate("Silo", "{n} more were only recomputed; check them to commit them anyway.")
+            lines.append(counted(recomputed, text, many))
+        return "\n".join(lines)
 
     def _make_files(self) -> Any:
         tree = widgets.tree("files", (translate("Silo", "File"), translate("Silo", "State"), ""))
@@ -119,7 +119,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
             parts.append(button)
         return widgets.line(*parts, None)
 
-    def select(self, wanted: Callable[[Row], bool]) -> None:
+    def select(self, wanted: Callable[[DocumentRow], bool]) -> None:
         """Check the files that are wanted and can be committed."""
         for number, row in enumerate(self._plan.rows):
             if number not in self._theirs:
@@ -128,7 +128,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
     def _check(self, item: Any, on: bool) -> None:
         item.setCheckState(0, QtCore.Qt.CheckState.Checked if on else QtCore.Qt.CheckState.Unchecked)
 
-    def _mark(self, item: Any, row: Row, tree: Any) -> None:
+    def _mark(self, item: Any, row: DocumentRow, tree: Any) -> None:
         self._check(item, row.wanted)
         if not row.can_commit:
             item.setFlags(item.flags() & ~QtCore.Qt.ItemFlag.ItemIsUserCheckable)
@@ -161,11 +161,11 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
 
     # -- what colleagues did ----------------------------------------------------------------------------
 
-    def show_theirs(self, found: Mapping[str, Theirs]) -> None:
+    def show_theirs(self, theirs_by_identity: Mapping[str, Theirs]) -> None:
         """Show what colleagues committed since; called when the look at Silo is done, perhaps never."""
         self._looking.hide()
         for number, row in enumerate(self._plan.rows):
-            theirs = found.get(row.path)
+            theirs = theirs_by_identity.get(row.path)
             if theirs is not None and row.can_commit and self._theirs.get(number) != theirs:
                 self._theirs[number] = theirs
                 self._show_one(self.files.topLevelItem(number), number, theirs)
@@ -214,22 +214,22 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
 
     def _details(self, theirs: Theirs) -> list[tuple[str, str]]:
         """The lines below a file, each with its tool tip."""
-        told = []
+        lines = []
         if theirs.revision:
             when = time.strftime("%Y-%m-%d %H:%M", time.localtime(theirs.when)) if theirs.when else ""
             said = plain(theirs.comment, 160) or translate("Silo", "(no comment)")
-            told.append((" · ".join(filter(None, (when, said))), theirs.comment))
-        return told + [(text, text) for text in line_texts(theirs, _MOST_LINES)]
+            lines.append((" · ".join(filter(None, (when, said))), theirs.comment))
+        return lines + [(text, text) for text in line_texts(theirs, _MOST_LINES)]
 
     def _chose(self, number: int, box: Any) -> None:
         self._check(self.files.topLevelItem(number), Choice(box.currentData()) is Choice.ON_TOP)
         self._update_commit()
 
     def _tell_who(self) -> None:
-        names = sorted({plain(one.who, 40) for one in self._theirs.values() if one.who})
+        names = sorted({plain(their.who, 40) for their in self._theirs.values() if their.who})
         who = ", ".join(names) or translate("Silo", "Somebody")
         text = translate("Silo", "Commit to Silo – {who} committed since you opened")
-        if not any(one.revision for one in self._theirs.values()):
+        if not any(their.revision for their in self._theirs.values()):
             text = translate("Silo", "Commit to Silo – changed on disk since you opened")
         self.setWindowTitle(text.replace("{who}", who))
 
@@ -241,13 +241,13 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         only = translate("Silo", "Do it") if chosen and not rows else translate("Silo", "Commit")
         self.commit.setText(only)
 
-    def answer(self) -> Answer:
+    def answer(self) -> CommitAnswer:
         """What the person wants."""
         chosen = self.chosen()
         registering = self.register.isChecked() and any(row.is_top for row in chosen)
-        return Answer(chosen, self.text(), registering, self.choices())
+        return CommitAnswer(chosen, self.text(), registering, self.choices())
 
-    def choices(self) -> tuple[tuple[Row, Theirs, Choice], ...]:
+    def choices(self) -> tuple[tuple[DocumentRow, Theirs, Choice], ...]:
         """What to do about colleagues' files, beside committing."""
         return tuple(
             (self._plan.rows[number], self._theirs[number], choice)
@@ -255,7 +255,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
             if (choice := Choice(box.currentData())) in (Choice.OPEN, Choice.TAKE)
         )
 
-    def chosen(self) -> tuple[Row, ...]:
+    def chosen(self) -> tuple[DocumentRow, ...]:
         """The documents to commit, in order."""
         rows = []
         for number in range(self.files.topLevelItemCount()):

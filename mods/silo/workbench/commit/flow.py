@@ -36,44 +36,44 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from silo.bom.compare import Assembly, ThreeLines
+from silo.bom.compare import ComparedAssembly, ThreeLines
 from silo.bom.errors import DocumentError, NotFoundError, RouteMissingError, SiloError
 from silo.bom.findings import Finding, FindingCode
 from silo.bom.model import Extraction, walk_entries
 from silo.bom.resolve import display_name
-from silo.outbox.entry import UNKNOWN, Commit, new_key
-from silo.outbox.store import on_top, seen
+from silo.outbox.entry import UNKNOWN, Commit, new_key, on_top
 from silo.platform import data_folder, one_path, read_memory, write_memory
 from silo.workbench.commit.opened import Base
 from silo.workbench.commit.plan import (
+    CommitPlan,
+    CommittedDocument,
+    DocumentRow,
     Documents,
-    Plan,
-    Row,
+    DocumentState,
     Snapshot,
-    State,
-    Taken,
     is_edited,
     plan,
     refusal,
     take_each,
 )
-from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, not_in_silo_key
+from silo.workbench.pane.activity import Action, Do, Line, PaneEntry, Tone, not_in_silo_key
 from silo.workbench.session.session import Session
-from silo.workbench.settings.preferences import ALLOW, Preferences
+from silo.workbench.settings import ALLOW, Preferences
 from silo.workbench.words import counted, plain, quantity, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.files import Standing
     from silo.api.transport import Cancel
-    from silo.bom.walk.tree import Key
+    from silo.bom.objects import Key
     from silo.outbox.entry import Entry as QueueEntry
     from silo.outbox.store import Store
-    from silo.registering.offer import Candidate, Seen
+    from silo.registering.offer import Candidate, OpenedFile
     from silo.workbench.preview.flow import PreviewFlow
-    from silo.workbench.preview.flow import Window as Preview
+    from silo.workbench.preview.flow import PreviewWindow as Preview
     from silo.workbench.register.flow import RegisterFlow
-    from silo.workbench.register.flow import Window as Registering
+    from silo.workbench.register.flow import RegisterWindow as Registering
+    from silo.workbench.revisions.flow import Differences, Ghost
     from silo.workbench.session.session import Newer
 
 
@@ -85,15 +85,15 @@ class Decisions:
 
     def accept(self, identity: str, files: Iterable[str]) -> None:
         """These files are the same part, says a person."""
-        known = self._read()
-        known[identity.lower()] = sorted({*known.get(identity.lower(), ()), *files})
-        write_memory(self._path, known)
+        accepted = self._read()
+        accepted[identity.lower()] = sorted({*accepted.get(identity.lower(), ()), *files})
+        write_memory(self._path, accepted)
 
     def without_accepted(self, extraction: Extraction) -> Extraction:
         """The extraction without the copied-identity findings that a person has accepted."""
         if not any(f.code is FindingCode.COPIED_IDENTITY for f in extraction.findings):
             return extraction
-        known = self._read()
+        accepted_now = self._read()
         identities = {
             entry.key: (entry.silo_uuid or "").lower()
             for entry in walk_entries((extraction.assembly, *extraction.entries))
@@ -104,14 +104,16 @@ class Decisions:
                 return False
             first = finding.where[0]
             files = {place.doc_path for place in finding.where}
-            return files <= set(known.get(identities.get((first.doc_path, first.obj), ""), ()))
+            return files <= set(accepted_now.get(identities.get((first.doc_path, first.obj), ""), ()))
 
         kept = tuple(f for f in extraction.findings if not accepted(f))
         return replace(extraction, findings=kept)
 
     def _read(self) -> dict[str, list[str]]:
-        known = read_memory(self._path)
-        return {key: [str(file) for file in files] for key, files in known.items() if isinstance(files, list)}
+        memory = read_memory(self._path)
+        return {
+            key: [str(file) for file in files] for key, files in memory.items() if isinstance(files, list)
+        }
 
 
 class Choice(StrEnum):
@@ -171,10 +173,14 @@ class Theirs:
 
 def of_held(entry: QueueEntry) -> Theirs:
     """The revision that a held commit of the outbox would undo, as it was when the commit was to be sent."""
-    newer = entry.newer
+    return theirs_of(entry.path, entry.part_number, entry.newer)
+
+
+def theirs_of(path: str, part_number: str, newer: Mapping[str, Any]) -> Theirs:
+    """A revision that is newer than a file was made from, as plain values."""
     return Theirs(
-        entry.path,
-        entry.part_number,
+        path,
+        part_number,
         newer["revision_number"],
         newer.get("created_by") or "",
         comment=newer.get("comment") or "",
@@ -212,7 +218,7 @@ def more_text(left: int) -> str:
 
 
 @dataclass(frozen=True)
-class Asked:
+class FileToCheck:
     """A file to look at: its path, the identity of its item, and what the document was made from."""
 
     path: str
@@ -223,8 +229,8 @@ class Asked:
 def look(
     client: SiloClient,
     outbox: Store,
-    asked: Iterable[Asked],
-    mine: Callable[[str], Assembly | None],
+    asked: Iterable[FileToCheck],
+    mine: Callable[[str], ComparedAssembly | None],
     cancelled: Cancel | None = None,
 ) -> dict[str, Theirs]:
     """Path → what a colleague committed since, for the files where that is so. For a worker.
@@ -232,19 +238,19 @@ def look(
     mine
         the BOM of the document of a path as it is now.
     """
-    files = [one for one in asked if one.identity]
-    items = client.get_items_by_uuid([one.identity for one in files], cancelled=cancelled)
-    found: dict[str, Theirs] = {}
-    for one in files:
-        if (item := items.get(one.identity)) is None:
+    files = [check for check in asked if check.identity]
+    items = client.get_items_by_uuid([check.identity for check in files], cancelled=cancelled)
+    theirs: dict[str, Theirs] = {}
+    for check in files:
+        if (item := items.get(check.identity)) is None:
             continue
-        file = _File(one.path, item.part_number, one.identity, one.base.settle(outbox))
+        file = _File(check.path, item.part_number, check.identity, check.base.settle(outbox))
         if (stands := file.standing(client, outbox)) is not None:
             lines: tuple[ThreeLines, ...] = ()
             with suppress(SiloError):  # the question stands without its details
-                lines = file.lines(client, stands, mine(one.path), cancelled)
-            found[one.path] = file.theirs(stands, lines)
-    return found
+                lines = file.lines(client, stands, mine(check.path), cancelled)
+            theirs[check.path] = file.theirs(stands, lines)
+    return theirs
 
 
 def gone(client: SiloClient, announced: Mapping[str, Newer], cancelled: Cancel | None = None) -> list[str]:
@@ -252,18 +258,18 @@ def gone(client: SiloClient, announced: Mapping[str, Newer], cancelled: Cancel |
     from silo.api.files import newest_number
     from silo.api.transport import stop_if
 
-    found = []
+    result = []
     for identity, newer in announced.items():
         stop_if(cancelled)
         try:
-            known = client.revisions(newer.part_number, newest=1)
+            revisions = client.revisions(newer.part_number, newest=1)
         except RouteMissingError:
             continue
         except NotFoundError:
-            known = []
-        if newest_number(known) < newer.revision:
-            found.append(identity)
-    return found
+            revisions = []
+        if newest_number(revisions) < newer.revision:
+            result.append(identity)
+    return result
 
 
 def look_held(
@@ -304,12 +310,12 @@ class _File:
         # The newest one decides it nearly always; an item may have hundreds.
         if is_newest(self.origin, client.revisions(self.part_number, newest=1)):
             return None
-        known = outbox.known_revision(client.base_url, self.origin, self.identity)
-        stands = standing(client.revisions(self.part_number), self.origin, known)
+        revision = outbox.known_revision(client.base_url, self.origin, self.identity)
+        stands = standing(client.revisions(self.part_number), self.origin, revision)
         return None if stands.newer is None else stands
 
     def lines(
-        self, client: SiloClient, stands: Standing, mine: Assembly | None, cancelled: Cancel | None
+        self, client: SiloClient, stands: Standing, mine: ComparedAssembly | None, cancelled: Cancel | None
     ) -> tuple[ThreeLines, ...]:
         from silo.vault.pull import RevisionBoms
 
@@ -338,7 +344,7 @@ Look = Callable[[Callable[[Mapping[str, Theirs]], None]], object]
 
 
 @dataclass(frozen=True)
-class Answer:
+class CommitAnswer:
     """What a person says in the commit dialog.
 
     register
@@ -347,14 +353,14 @@ class Answer:
         what to do about files that colleagues have changed, beside committing.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[DocumentRow, ...]
     comment: str = ""
     register: bool = False
-    choices: tuple[tuple[Row, Theirs, Choice], ...] = ()
+    choices: tuple[tuple[DocumentRow, Theirs, Choice], ...] = ()
 
 
-class Account(Protocol):
-    """One assembly's solids (:class:`silo.workbench.freecad.witness.Account`)."""
+class CountedSolids(Protocol):
+    """One assembly's solids (:class:`silo.workbench.freecad.live.SolidCount`)."""
 
     @property
     def doc_path(self) -> str: ...
@@ -386,7 +392,7 @@ class Desk(Protocol):
     def identity(self, doc: Any, /) -> str | None:
         """The item that a document belongs to, without looking at its components."""
 
-    def ask(self, planned: Plan, note: str, comment: str, look: Look, /) -> Answer | None:
+    def ask(self, planned: CommitPlan, note: str, comment: str, look: Look, /) -> CommitAnswer | None:
         """Which documents to commit, with which comment; None where the person does not want to.
 
         comment
@@ -423,7 +429,7 @@ class Desk(Protocol):
     def preview_window(self, title: str, path: str, flow: PreviewFlow, /) -> Preview:
         """Open the preview of a document."""
 
-    def accounts(self, extraction: Extraction, /) -> Sequence[Account]:
+    def accounts(self, extraction: Extraction, /) -> Sequence[CountedSolids]:
         """The solids that FreeCAD shows, for the assembly and each sub-assembly."""
 
     def why(self, doc: Any, assembly: str, parts: Collection[Key], /) -> list[str]:
@@ -432,12 +438,21 @@ class Desk(Protocol):
     def relink(self, finding: Finding, /) -> list[str]:
         """Set the live links of a finding to the file that was meant; their labels."""
 
+    def light(self, doc: Any, names: Sequence[str], /) -> int:
+        """Select objects and draw them through what covers them; how many there are."""
+
+    def compare(self, path: str, revision: int, theirs: Sequence[Ghost], /) -> Differences | None:
+        """Draw another revision as a ghost beside a document; None: it was there, and is removed.
+
+        Raises DocumentError where the document is not open.
+        """
+
     # -- registering ------------------------------------------------------------------------------------
 
     def register_window(self, title: str, path: str, flow: RegisterFlow, /, *, asks: bool) -> Registering:
         """Open the Register Parts dialog of a document."""
 
-    def look_at(self, paths: Iterable[str], /) -> dict[str, Seen]:
+    def look_at(self, paths: Iterable[str], /) -> dict[str, OpenedFile]:
         """How the files of components stand."""
 
     def write_identity(self, candidate: Candidate, identity: str, /) -> None:
@@ -446,6 +461,9 @@ class Desk(Protocol):
     def remove_identity(self, candidate: Candidate, /, *, no_part: bool) -> None:
         """Take the identity from what is modelled in an assembly's own file, and save it; with or without the
         mark that it is no part."""
+
+    def restore_identity(self, candidate: Candidate, /) -> None:
+        """Give a component's file the identity that it had before it was registered, or none, and save it."""
 
     def unedited(self) -> list[Any]:
         """The documents without unsaved edits, each after those that it links to."""
@@ -475,7 +493,7 @@ class CommitFlow:
         self._register = register
         self.decisions = Decisions(path)
         self.choose = choose
-        self._turns: deque[tuple[Iterator[Taken], str]] = deque()
+        self._turns: deque[tuple[Iterator[CommittedDocument], str]] = deque()
         self._asked_for: set[str] = set()
         # Path → what a person wrote about a file that has no item yet.
         self._comments: dict[str, str] = {}
@@ -521,10 +539,10 @@ class CommitFlow:
         )
         planned = plan(doc, self._desk.documents, unregistered=unregistered)
         if text := refusal(planned):
-            if planned.top.state is not State.UNNAMED:
+            if planned.top.state is not DocumentState.UNNAMED:
                 self._desk.warn(translate("Silo", "Commit to Silo"), text)
             return
-        answer: Answer | None = Answer(planned.wanted)
+        answer: CommitAnswer | None = CommitAnswer(planned.wanted)
         if self._preferences.flag("AskComment") or not planned.is_simple or self._heard(planned):
             comment = self._comments.get(planned.top.path, "")
             answer = self._desk.ask(
@@ -538,15 +556,43 @@ class CommitFlow:
             top = planned.top.path
             # The top too, if it is no item: nothing else sends it.
             skip = decided if self._desk.identity(doc) else decided - {top}
-            self._turns.append((self._along(top, skip, answer.comment), ""))
+            self.send_linked(top, skip, answer.comment)
         for row, theirs, choice in answer.choices:
             self.choose(row.path, theirs, choice)
         if answer.register:
             self._turns.append((self._registering(planned.top.path), ""))
 
-    def _along(self, path: str, skip: set[str], comment: str) -> Iterator[Taken]:
+    def commit_folder(self, root: str, paths: Iterable[str], comment: str) -> None:
+        """Save what is edited of these open files of a project, then send what Silo does not have of it."""
+        rows: dict[str, DocumentRow] = {}
+        wanted = set(paths)
+        for doc in filter(None, map(self._desk.find, wanted)):
+            document_rows = (row for row in plan(doc, self._desk.documents).rows if row.path in wanted)
+            rows.update((row.path, row) for row in document_rows if row.path not in rows)
+        left = [row for row in rows.values() if not row.wanted and row.state is not DocumentState.RECOMPUTED]
+        for row in left:
+            self._tell_error(row.label, row.note)
+        ready = tuple(row for row in rows.values() if row.wanted and row.state is DocumentState.CHANGED)
+        self.run(ready, comment)
+        sent = {row.path for row in ready if self._desk.identity(row.document)}
+        self.send_linked(root, {*sent, *(row.path for row in left)}, comment)
+
+    def send_linked(self, path: str, skip: set[str], comment: str, over: Collection[str] = ()) -> None:
+        """Send what a file links to, or a folder holds, and Silo does not have, once the documents are saved.
+
+        over
+            files that go on top of a colleague's newer revision.
+        """
+        self._turns.append((self._along(path, skip, comment, over), ""))
+        if len(self._turns) == 1:
+            self._desk.later(self._turn)
+
+    def _along(
+        self, path: str, skip: set[str], comment: str, over: Collection[str] = ()
+    ) -> Iterator[CommittedDocument]:
         """A turn after the documents are saved: what they link to goes along, if Silo does not have it."""
-        how = {"comment": comment, "allow_missing": self._preferences.text("MissingLinks") == ALLOW}
+        how: dict[str, Any] = {"comment": comment, "over_newer": over}
+        how["allow_missing"] = self._preferences.text("MissingLinks") == ALLOW
         title = translate("Silo", "Looking at the linked files")
 
         def work(client: Any, server: str) -> int:
@@ -572,7 +618,7 @@ class CommitFlow:
         self._session.after_keeping(ask)
         yield from ()
 
-    def _registering(self, path: str) -> Iterator[Taken]:
+    def _registering(self, path: str) -> Iterator[CommittedDocument]:
         """A turn after the documents are saved."""
         self._register(path)
         yield from ()
@@ -581,41 +627,44 @@ class CommitFlow:
         """What a person wrote about a file when it had no item yet; told once."""
         return self._comments.pop(path, "")
 
-    def _heard(self, planned: Plan) -> bool:
+    def _heard(self, planned: CommitPlan) -> bool:
         """True where the server has announced a colleague's commit of one of these documents."""
         return bool(self._session.shown.newer) and any(
-            self._session.newer_than(one.identity, one.base.since) for one in self._asked(planned)
+            self._session.newer_than(check.identity, check.base.since)
+            for check in self._files_to_check(planned)
         )
 
-    def _asked(self, planned: Plan) -> list[Asked]:
+    def _files_to_check(self, planned: CommitPlan) -> list[FileToCheck]:
         return [
-            Asked(row.path, self._desk.identity(row.document) or "", self._desk.documents.base(row.document))
+            FileToCheck(
+                row.path, self._desk.identity(row.document) or "", self._desk.documents.base(row.document)
+            )
             for row in planned.rows
             if row.path
         ]
 
-    def _look(self, planned: Plan, back: Callable[[Mapping[str, Theirs]], None]) -> None:
+    def _look(self, planned: CommitPlan, back: Callable[[Mapping[str, Theirs]], None]) -> None:
         """Ask Silo, in a worker, what colleagues committed since. What it cannot be asked now is caught when
         the commit is sent."""
         local = {row.path: Theirs(row.path) for row in planned.rows if row.replaced}
         if local:
             back(local)
-        asked, documents = self._asked(planned), {row.path: row.document for row in planned.rows}
+        asked, documents = self._files_to_check(planned), {row.path: row.document for row in planned.rows}
         announced = self._session.shown.newer
 
         def question(client: Any, control: Any) -> dict[str, Theirs]:
             from silo.vault.pull import top_of
 
-            def mine(path: str) -> Assembly | None:
+            def mine(path: str) -> ComparedAssembly | None:
                 taken = self._session.in_gui(lambda: self._desk.snapshot(documents[path]), control)
                 return top_of(taken.extraction) if taken.extraction is not None else None
 
             return look(client, self._session.outbox, asked, mine, control.cancelled)
 
-        def done(found: dict[str, Theirs]) -> None:
-            news = {one.identity for one in asked if one.path in found}  # copies have one identity
-            self._session.no_news(announced, {one.identity for one in asked} - news)
-            back({**local, **found})
+        def done(theirs: dict[str, Theirs]) -> None:
+            news = {check.identity for check in asked if check.path in theirs}  # copies have one identity
+            self._session.no_news(announced, {check.identity for check in asked} - news)
+            back({**local, **theirs})
 
         self._session.ask(
             translate("Silo", "Looking for colleagues' commits"),
@@ -624,7 +673,7 @@ class CommitFlow:
             failed=lambda _error: back(local),
         )
 
-    def run(self, rows: tuple[Row, ...], comment: str = "") -> None:
+    def run(self, rows: tuple[DocumentRow, ...], comment: str = "") -> None:
         """Commit these documents, in order, after those of an earlier commit."""
         turns = take_each(rows, self._desk.documents, self.snapshot, self._session.outbox)
         self._turns.append((turns, comment))
@@ -650,10 +699,10 @@ class CommitFlow:
             if not by_fork:
                 commit = self.made_from(commit, doc)
                 if not commit.sha256:
-                    told = translate(
+                    text = translate(
                         "Silo", "Its BOM was not synced: it is not as it was committed. Commit it."
                     )
-                    raise DocumentError(taken.path, told)
+                    raise DocumentError(taken.path, text)
         except SiloError as error:
             self._tell_error(str(doc.Label), str(error))
         else:
@@ -676,7 +725,7 @@ class CommitFlow:
     def send(self, doc: Any, comment: str) -> None:
         """Send a document that has just been saved, as it is."""
         path = one_path(doc.FileName)
-        self.run((Row(doc, path, str(doc.Label), State.SAVED, is_new=True),), comment)
+        self.run((DocumentRow(doc, path, str(doc.Label), DocumentState.SAVED, is_new=True),), comment)
 
     def _turn(self) -> None:
         try:
@@ -693,9 +742,9 @@ class CommitFlow:
         if taken is None:
             self._turns.popleft()
         else:
-            self._done(taken, comment)
+            self._keep_saved(taken, comment)
 
-    def _done(self, taken: Taken, comment: str) -> None:
+    def _keep_saved(self, taken: CommittedDocument, comment: str) -> None:
         if taken.error is not None:
             self._tell_error(taken.row.label, str(taken.error))
         elif taken.snapshot is not None and not taken.snapshot.identity:
@@ -706,7 +755,7 @@ class CommitFlow:
         else:
             self._keep(taken, comment)
 
-    def _keep(self, taken: Taken, comment: str) -> None:
+    def _keep(self, taken: CommittedDocument, comment: str) -> None:
         if taken.snapshot is None:
             return
         row, base = taken.row, taken.base
@@ -719,7 +768,7 @@ class CommitFlow:
         if base is not None and not row.is_new:
             commit = replace(commit, origin=base.origin or UNKNOWN)
         if newer := row.on_top:
-            commit = replace(commit, on_top_of=seen(newer), comment=on_top(comment, newer))
+            commit = replace(commit, **on_top(comment, newer))
         self._session.keep(commit, failed=lambda error: self._tell_error(row.label, str(error)), base=base)
 
     def _commit_of(
@@ -736,7 +785,7 @@ class CommitFlow:
 
     def _tell_error(self, label: str, text: str) -> None:
         self._session.add(
-            Entry(
+            PaneEntry(
                 key=f"commit-error:{label}:{time.time()}",
                 title=translate("Silo", "Not committed: {name}").replace("{name}", label),
                 when=time.time(),
@@ -747,7 +796,7 @@ class CommitFlow:
             )
         )
 
-    def _note(self, planned: Plan) -> str:
+    def _note(self, planned: CommitPlan) -> str:
         if not self._session.shown.server.configured:
             return translate("Silo", "No Silo server is set up: the files are saved, and wait to be sent.")
         if self._session.shown.connection == "offline":
@@ -781,13 +830,13 @@ def commit_of(
     )
 
 
-def not_in_silo(taken: Snapshot) -> Entry:
+def not_in_silo(taken: Snapshot) -> PaneEntry:
     """The box for a document that has no item yet."""
     name = taken.label or os.path.basename(taken.path)
     text = taken.problem or translate("Silo", "It has no Silo part number yet, so it was not sent.")
     tone = Tone.PLAIN if taken.problem else Tone.WARNING
     register = Action(Do.REGISTER, translate("Silo", "Register Parts…"), document=taken.path)
-    return Entry(
+    return PaneEntry(
         key=not_in_silo_key(taken.path),
         title=translate("Silo", "Saved, but not in Silo: {name}").replace("{name}", name),
         when=time.time(),

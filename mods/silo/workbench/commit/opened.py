@@ -12,7 +12,6 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
@@ -34,7 +33,6 @@ class Origins(Protocol):
     def derived(self, sha256: str, origin: str, /) -> None: ...
 
 
-@dataclass(eq=False)
 class Base:
     """What one document was made from.
 
@@ -46,14 +44,14 @@ class Base:
         seconds of :func:`time.monotonic`: when it was opened, or committed last.
     """
 
-    path: str
-    stamp: Stamp | None
-    origin: str = ""
-    since: float = field(default_factory=time.monotonic)
-    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    # No dataclass: to make one costs FreeCAD's start a millisecond.
+    def __init__(self, path: str, stamp: Stamp | None, origin: str = "", since: float | None = None) -> None:
+        self.path, self.stamp, self.origin = path, stamp, origin
+        self.since = time.monotonic() if since is None else since
+        self._lock = threading.Lock()
 
     def settle(self, origins: Origins) -> str:
-        """The origin, found out where that is still to do. Any thread; reads the file once."""
+        """The origin, determined if that is still to do. Any thread; reads the file once."""
         with self._lock:
             if not self.origin:
                 from silo.outbox.entry import UNKNOWN
@@ -110,10 +108,10 @@ class Opened:
 
     def of(self, doc: Any) -> Base:
         """The base of a document, also of one that was opened before we looked."""
-        known = self._bases.get(doc.Name)
-        if known is None:
-            known = self._bases[doc.Name] = Base(doc.FileName, _stamp(doc.FileName))
-        return known
+        base = self._bases.get(doc.Name)
+        if base is None:
+            base = self._bases[doc.Name] = Base(doc.FileName, _stamp(doc.FileName))
+        return base
 
     def forget(self, doc: Any) -> None:
         """The document is closed, or read again."""
@@ -134,11 +132,11 @@ class Opened:
         """FreeCAD names the file before it reads it."""
         if prop != "FileName" or not doc.FileName:
             return
-        known = self._bases.get(doc.Name)
-        if known is not None:
-            if known.path != doc.FileName:  # saved under another name; what it was made from stays
-                self._settle(known)
-                known.path, known.stamp = doc.FileName, None
+        base_now = self._bases.get(doc.Name)
+        if base_now is not None:
+            if base_now.path != doc.FileName:  # saved under another name; what it was made from stays
+                self._settle(base_now)
+                base_now.path, base_now.stamp = doc.FileName, None
             return
         stamp = _stamp(doc.FileName)
         # A document that has objects before it has a file was made here.

@@ -60,7 +60,7 @@ class Snapshot:
 
     def is_as(self, other: Snapshot) -> bool:
         """True where both are of one state: the same item, and the same BOM with all below it."""
-        mine, its = (one.extraction and to_plain(one.extraction) for one in (self, other))
+        mine, its = (snapshot.extraction and to_plain(snapshot.extraction) for snapshot in (self, other))
         return (self.path, self.identity, mine) == (other.path, other.identity, its)
 
 
@@ -78,12 +78,12 @@ def take(doc: Any, *, assembly: Any = None, walk: Walk = extract) -> Snapshot:
     path = one_path(doc.FileName) if doc.FileName else ""
     label = str(getattr(doc, "Label", "") or os.path.basename(path))
     try:
-        found, extraction = file_bom(doc, assembly, walk)
+        sha256, extraction = file_bom(doc, assembly, walk)
     except SeveralAssembliesError as error:
         here = translate("Silo", "Make the one that is meant active: double-click it in the tree.")
         return Snapshot(path, label, sole_identity(doc), problem=str(error).replace(NAME_ONE, here))
-    several = not found and len({identity for identity, _ in held_items(doc)}) > 1
-    return Snapshot(path, label, found, extraction, several=several)
+    several = not sha256 and len({identity for identity, _ in held_items(doc)}) > 1
+    return Snapshot(path, label, sha256, extraction, several=several)
 
 
 # Seconds of the GUI thread; what has not been compared with its file by then counts as edited.
@@ -117,7 +117,7 @@ def is_edited(documents: Documents, doc: Any) -> bool:
     return documents.is_modified(doc) and documents.is_edited(doc, time.thread_time() + MOST_S)
 
 
-class State(StrEnum):
+class DocumentState(StrEnum):
     """How a document stands before a commit."""
 
     CHANGED = "changed"  # has edits; will be saved
@@ -131,7 +131,7 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True)
-class Row:
+class DocumentRow:
     """A document of the plan. ``document`` is alive and belongs in the GUI thread.
 
     replaced
@@ -147,7 +147,7 @@ class Row:
     document: Any
     path: str
     label: str
-    state: State
+    state: DocumentState
     is_top: bool = False
     replaced: bool = False
     on_top: Mapping[str, Any] = field(default_factory=dict)
@@ -157,12 +157,12 @@ class Row:
     @property
     def can_commit(self) -> bool:
         """True where the file can be brought up to date and sent."""
-        return self.state in (State.CHANGED, State.RECOMPUTED, State.SAVED)
+        return self.state in (DocumentState.CHANGED, DocumentState.RECOMPUTED, DocumentState.SAVED)
 
     @property
     def wanted(self) -> bool:
         """Checked to begin with? What was only recomputed is as it is in Silo."""
-        asked = self.is_top or self.state is not State.RECOMPUTED
+        asked = self.is_top or self.state is not DocumentState.RECOMPUTED
         return self.can_commit and asked and not self.replaced
 
     @property
@@ -172,24 +172,24 @@ class Row:
         return _words()[self.state].replace("{lost}", lost)
 
 
-def _words() -> dict[State, str]:
+def _words() -> dict[DocumentState, str]:
     return {
-        State.CHANGED: translate("Silo", "unsaved edits: will be saved"),
-        State.RECOMPUTED: translate("Silo", "recomputed only: nothing differs from the file"),
-        State.SAVED: translate("Silo", "saved already"),
-        State.UNNAMED: translate("Silo", "has no file yet: save it under a name first"),
-        State.PARTIAL: translate(
+        DocumentState.CHANGED: translate("Silo", "unsaved edits: will be saved"),
+        DocumentState.RECOMPUTED: translate("Silo", "recomputed only: nothing differs from the file"),
+        DocumentState.SAVED: translate("Silo", "saved already"),
+        DocumentState.UNNAMED: translate("Silo", "has no file yet: save it under a name first"),
+        DocumentState.PARTIAL: translate(
             "Silo",
             "FreeCAD has loaded it only in part and cannot save these edits: open the file itself and "
             "make them there",
         ),
-        State.READ_ONLY: translate("Silo", "the file is read-only: these edits are not saved"),
-        State.LOST: translate(
+        DocumentState.READ_ONLY: translate("Silo", "the file is read-only: these edits are not saved"),
+        DocumentState.LOST: translate(
             "Silo",
             "made by a newer FreeCAD: saving it here would destroy {lost}, so it is not saved. Make these "
             "edits in the newer FreeCAD",
         ),
-        State.DAMAGED: translate(
+        DocumentState.DAMAGED: translate(
             "Silo",
             "the file is damaged, and FreeCAD has opened what it could read of it: fetch the file again, or "
             "check that nothing is missing and save it in FreeCAD yourself",
@@ -198,35 +198,35 @@ def _words() -> dict[State, str]:
 
 
 @dataclass(frozen=True)
-class Plan:
+class CommitPlan:
     """The documents of a commit, leaves first, the one that was asked for last.
 
     unregistered
         the one that was asked for has no item in Silo yet.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[DocumentRow, ...]
     unregistered: bool = False
 
     @property
-    def wanted(self) -> tuple[Row, ...]:
+    def wanted(self) -> tuple[DocumentRow, ...]:
         """What is committed unless a person says otherwise."""
         return tuple(row for row in self.rows if row.wanted)
 
     @property
-    def top(self) -> Row:
+    def top(self) -> DocumentRow:
         """The document that the person works in."""
         return self.rows[-1]
 
     @property
     def is_simple(self) -> bool:
         """True where there is nothing to ask: one document that can be committed, the others unchanged."""
-        others = all(row.state is State.RECOMPUTED for row in self.rows[:-1])
+        others = all(row.state is DocumentState.RECOMPUTED for row in self.rows[:-1])
         replaced = any(row.replaced for row in self.rows)
         return others and self.top.can_commit and not self.unregistered and not replaced
 
 
-def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> Plan:
+def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> CommitPlan:
     """Plan the commit of a document."""
     until = time.thread_time() + MOST_S
     changed = {doc.Name for doc in documents.linked(top) if documents.is_modified(doc)} - {top.Name}
@@ -238,20 +238,20 @@ def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> Plan:
             path = one_path(doc.FileName) if doc.FileName else ""
             state = _state(doc, documents, until)
             # What was only recomputed, and cannot be saved anyway, is nobody's concern.
-            if is_top or state is not State.SAVED:
+            if is_top or state is not DocumentState.SAVED:
                 replaced = bool(path) and documents.base(doc).replaced
-                lost = tuple(documents.lost_objects(doc)) if state is State.LOST else ()
-                rows.append(Row(doc, path, str(doc.Label), state, is_top, replaced, lost=lost))
-    return Plan(tuple(rows), unregistered)
+                lost = tuple(documents.lost_objects(doc)) if state is DocumentState.LOST else ()
+                rows.append(DocumentRow(doc, path, str(doc.Label), state, is_top, replaced, lost=lost))
+    return CommitPlan(tuple(rows), unregistered)
 
 
-def refusal(plan: Plan) -> str:
+def refusal(plan: CommitPlan) -> str:
     """Why the document itself cannot be committed; "" where it can."""
     top = plan.top
     if top.can_commit:
         return ""
     name = plain(os.path.basename(top.path) or top.label, 80)
-    if top.state is State.UNNAMED:
+    if top.state is DocumentState.UNNAMED:
         return translate("Silo", "{name} has no file yet. Save it under a name first.").replace(
             "{name}", name
         )
@@ -292,31 +292,31 @@ def _walked(top: Any) -> Iterator[Any]:
             yield doc
 
 
-def _state(doc: Any, documents: Documents, until: float) -> State:
+def _state(doc: Any, documents: Documents, until: float) -> DocumentState:
     if not doc.FileName:
-        return State.UNNAMED
+        return DocumentState.UNNAMED
     if documents.is_damaged(doc):
-        return State.DAMAGED
+        return DocumentState.DAMAGED
     if not documents.is_modified(doc):
-        return State.SAVED
+        return DocumentState.SAVED
     edited = documents.is_edited(doc, until)
     held = _held(doc, documents)
     if held is not None:
-        return held if edited else State.SAVED
-    return State.CHANGED if edited else State.RECOMPUTED
+        return held if edited else DocumentState.SAVED
+    return DocumentState.CHANGED if edited else DocumentState.RECOMPUTED
 
 
-def _held(doc: Any, documents: Documents) -> State | None:
+def _held(doc: Any, documents: Documents) -> DocumentState | None:
     """Why a document cannot be saved; None where it can."""
     if documents.is_partial(doc):
-        return State.PARTIAL
+        return DocumentState.PARTIAL
     if documents.lost_objects(doc):
-        return State.LOST
-    return None if documents.is_writable(doc.FileName) else State.READ_ONLY
+        return DocumentState.LOST
+    return None if documents.is_writable(doc.FileName) else DocumentState.READ_ONLY
 
 
 @dataclass(frozen=True)
-class Taken:
+class CommittedDocument:
     """One document of a commit is done, as far as the GUI thread is concerned.
 
     base
@@ -329,7 +329,7 @@ class Taken:
         why there is nothing to send.
     """
 
-    row: Row
+    row: DocumentRow
     snapshot: Snapshot | None = None
     key: str = ""
     held: Path | None = None
@@ -347,37 +347,41 @@ class Keeping(Protocol):
 
 
 def take_each(
-    rows: Iterable[Row], documents: Documents, take: Callable[[Any], Snapshot], outbox: Keeping
-) -> Iterator[Taken]:
+    rows: Iterable[DocumentRow], documents: Documents, take: Callable[[Any], Snapshot], outbox: Keeping
+) -> Iterator[CommittedDocument]:
     """Save one document after another and take snapshots; a failure does not stop the others. GUI thread."""
     for row in rows:
         try:
             taken = _take(row, documents, take, outbox)
         except SiloError as error:
-            taken = Taken(row, error=error)
+            taken = CommittedDocument(row, error=error)
         except ReferenceError:
             text = translate("Silo", "It was closed before it was saved: open it and commit it again.")
-            taken = Taken(row, error=SiloError(text))
+            taken = CommittedDocument(row, error=SiloError(text))
         except Exception as error:  # noqa: BLE001  # one document's trouble is not that of the others
-            taken = Taken(row, error=SiloError(f"unexpected problem ({type(error).__name__}: {error})"))
+            taken = CommittedDocument(
+                row, error=SiloError(f"unexpected problem ({type(error).__name__}: {error})")
+            )
         yield taken
 
 
-def _take(row: Row, documents: Documents, take: Callable[[Any], Snapshot], outbox: Keeping) -> Taken:
+def _take(
+    row: DocumentRow, documents: Documents, take: Callable[[Any], Snapshot], outbox: Keeping
+) -> CommittedDocument:
     base = documents.base(row.document)
     if one_path(row.document.FileName) != row.path:
-        told = "it was saved under another name since this commit was asked for; commit it again"
-        raise DocumentError(row.path, told)
-    # What somebody else has written is no file of ours: ours is written anew, at a person's word. What
+        text = "it was saved under another name since this commit was asked for; commit it again"
+        raise DocumentError(row.path, text)
+    # What somebody else has written is no file of ours: ours is written again, at a person's word. What
     # was edited while documents before it were saved goes along: the BOM is that of the file.
-    if row.state is not State.SAVED or base.replaced or is_edited(documents, row.document):
+    if row.state is not DocumentState.SAVED or base.replaced or is_edited(documents, row.document):
         if base.replaced and not row.replaced:
-            told = "somebody has written it since this commit was asked for; nothing was saved over it. "
-            raise DocumentError(row.path, told + "Commit it again, and choose which one counts")
+            text = "somebody has written it since this commit was asked for; nothing was saved over it. "
+            raise DocumentError(row.path, text + "Commit it again, and choose which one counts")
         if base.replaced:
             outbox.keep_aside(row.path)
         documents.save(row.document)
     stamp = stamp_of(row.path)
     snapshot, key = take(row.document), new_key()
     held = outbox.hold(row.path, key) if snapshot.identity else None
-    return Taken(row, snapshot, key, held, stamp, base=base)
+    return CommittedDocument(row, snapshot, key, held, stamp, base=base)

@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import FreeCAD
@@ -35,8 +36,8 @@ def has_gui() -> bool:
 
 def version() -> tuple[int, int]:
     """Such as (1, 0)."""
-    told = FreeCAD.Version()
-    return int(told[0]), int(told[1])
+    freecad_version = FreeCAD.Version()
+    return int(freecad_version[0]), int(freecad_version[1])
 
 
 def program() -> str:
@@ -68,7 +69,7 @@ def translate(context: str, text: str) -> str:
 
 
 def message(text: str) -> None:
-    """A line in the report view. Like all of these, harmless to a terminal, whoever wrote the text."""
+    """A line in the report view. Like all of these, harmless to a terminal, no matter who wrote the text."""
     FreeCAD.Console.PrintMessage(visible(text) + "\n")
 
 
@@ -110,7 +111,7 @@ class Pieces:
     """
 
     def __init__(self, own_shapes: dict[tuple[str, str], int], top: Any = None) -> None:
-        from silo.bom.walk.kinds import left_out_by
+        from silo.bom.objects import left_out_by
 
         self._left_out_by = left_out_by
         self._own_shapes = own_shapes
@@ -142,32 +143,32 @@ class Pieces:
             if key not in self._own_shapes:
                 self._own_shapes[key] = _solids(obj)
             return (self._own_shapes[key], 0, 0)
-        found = [self.of(one, is_visible) for one, is_visible in inside]
-        visible, hidden, left_out = map(sum, zip(*found, strict=True)) if found else (0, 0, 0)
+        pieces = [self.of(each_obj, is_visible) for each_obj, is_visible in inside]
+        visible, hidden, left_out = map(sum, zip(*pieces, strict=True)) if pieces else (0, 0, 0)
         return (visible, hidden, left_out)
 
 
 def real(obj: Any) -> Any:
-    """FreeCAD's own object for one that is read once (:mod:`silo.workbench.freecad.cached`)."""
+    """FreeCAD's own object for one that is read once (:mod:`silo.workbench.freecad.facts`)."""
     return getattr(obj, "real", obj)
 
 
 def sub_objects(obj: Any) -> list[tuple[Any, bool]] | None:
     """What an object shows within itself, and if it is visible there; None for a shape of its own."""
     if {"BuildShape", "Freeze", "Group"}.issubset(obj.PropertiesList):
-        return [one for group in obj.Group for one in _in_group(group)]
+        return [each_obj for group in obj.Group for each_obj in _in_group(group)]
     names = obj.getSubObjects()
     if not names or (obj.isDerivedFrom("Part::Feature") and not obj.hasExtension("App::LinkBaseExtension")):
         return None
     # A part lists what lies in its folders beside the folders.
     skip_folders = "Group" in obj.PropertiesList and not obj.isDerivedFrom("App::DocumentObjectGroup")
-    found = []
+    objects = []
     for name in names:
         shown = obj.getSubObject(name, retType=1)
         if shown is not None and not (skip_folders and shown.isDerivedFrom("App::DocumentObjectGroup")):
             visible = obj.isElementVisible(name.rstrip("."))
-            found.append((shown, bool(shown.Visibility if visible < 0 else visible)))
-    return found
+            objects.append((shown, bool(shown.Visibility if visible < 0 else visible)))
+    return objects
 
 
 def _in_group(group: Any) -> list[tuple[Any, bool]]:
@@ -179,18 +180,22 @@ def _in_group(group: Any) -> list[tuple[Any, bool]]:
     members = list(group.Group)
     if len(listed) != len(members):
         listed = [group.Visibility] * len(members)
-    return [(one, bool(shown and one.Visibility)) for one, shown in zip(members, listed, strict=True)]
+    return [
+        (member, bool(shown and member.Visibility)) for member, shown in zip(members, listed, strict=True)
+    ]
 
 
 def root_objects(document: Any) -> list[tuple[Any, bool]]:
     """What FreeCAD shows at the root of a document: all that no part, link group, array or body holds."""
-    holders = [one for one in document.Objects if not one.isDerivedFrom("App::DocumentObjectGroup")]
+    holders = [
+        each_obj for each_obj in document.Objects if not each_obj.isDerivedFrom("App::DocumentObjectGroup")
+    ]
     held = {
-        one.Name
+        each_obj.Name
         for holder in holders
         for name in ("Group", "ElementList")
         if name in holder.PropertiesList
-        for one in getattr(holder, name)
+        for each_obj in getattr(holder, name)
     }
     return [(obj, obj.Visibility) for obj in holders if obj.Name not in held]
 
@@ -358,12 +363,12 @@ def add_workbench_manipulator(manipulator: Any) -> bool:
     return True
 
 
-def add_resources(icons: str, translations: str) -> None:
-    """Make folders of icons and of translations known."""
-    gui().addIconPath(icons)
-    # Loading the translations anew takes FreeCAD 10 ms, so it is done where there are any.
-    if any(name.endswith(".qm") for name in os.listdir(translations)):
-        gui().addLanguagePath(translations)
+def add_resources(folder: Path) -> None:
+    """Make the icons and the translations known; the folder of the second may be missing."""
+    gui().addIconPath(str(folder / "icons"))
+    # Loading the translations again takes FreeCAD 10 ms, so it is done where there are any.
+    if any(folder.glob("translations/*.qm")):
+        gui().addLanguagePath(str(folder / "translations"))
         gui().updateLocale()
 
 
@@ -377,10 +382,10 @@ def select(doc: Any, names: Iterable[str]) -> int:
     Of very many, only the first :data:`MOST_SELECTED` are selected.
     """
     gui().Selection.clearSelection()
-    found = [name for name in names if doc.getObject(name) is not None]
-    for name in found[:MOST_SELECTED]:
+    names_there = [name for name in names if doc.getObject(name) is not None]
+    for name in names_there[:MOST_SELECTED]:
         gui().Selection.addSelection(doc.Name, name)
-    return len(found)
+    return len(names_there)
 
 
 def add_selection_observer(observer: Any) -> None:
@@ -390,11 +395,14 @@ def add_selection_observer(observer: Any) -> None:
 
 def selected() -> list[tuple[Any, str]]:
     """Document and name of each selected object, and of each that lies on the way to it: once."""
-    found: dict[tuple[str, str], Any] = {}
-    for one in gui().Selection.getSelectionEx("*", 0):
-        for name in (one.ObjectName, *(part for path in one.SubElementNames for part in path.split("."))):
-            found[one.DocumentName, name] = one.Document
-    return [(doc, name) for (_, name), doc in found.items()]
+    objects: dict[tuple[str, str], Any] = {}
+    for selection in gui().Selection.getSelectionEx("*", 0):
+        for name in (
+            selection.ObjectName,
+            *(part for path in selection.SubElementNames for part in path.split(".")),
+        ):
+            objects[selection.DocumentName, name] = selection.Document
+    return [(doc, name) for (_, name), doc in objects.items()]
 
 
 def active_assembly() -> Any:

@@ -18,9 +18,9 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,25 +31,27 @@ from silo.bom.links import extract, file_item
 from silo.freecads import open_in_any, open_in_others
 from silo.outbox.store import KEPT_ASIDE_DAYS
 from silo.platform import replacing
-from silo.registering.offer import Candidate, Seen, State
+from silo.registering.offer import Candidate, ComponentState, OpenedFile
 from silo.workbench.commit import plan
-from silo.workbench.commit.flow import Answer, Look
+from silo.workbench.commit.flow import CommitAnswer, Look
 from silo.workbench.commit.opened import Opened
-from silo.workbench.commit.plan import Plan, Snapshot, leaves_first
+from silo.workbench.commit.plan import CommitPlan, Snapshot, leaves_first
 from silo.workbench.freecad import host, live, saving
-from silo.workbench.freecad.edits import SHOWN_NUMBER, SHOWN_STATE
+from silo.workbench.freecad.facts import SHOWN_NUMBER, SHOWN_STATE
 from silo.workbench.gui import qt
-from silo.workbench.pane.activity import Entry, Line, Tone
+from silo.workbench.pane.activity import Line, PaneEntry, Tone
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry, Extraction
-    from silo.bom.walk.tree import Key
+    from silo.bom.objects import Key
     from silo.outbox.store import Store
     from silo.workbench.commit.flow import Theirs
-    from silo.workbench.freecad.witness import Account
+    from silo.workbench.freecad.drawing import Overlay
+    from silo.workbench.freecad.live import SolidCount
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
+    from silo.workbench.revisions.flow import Differences, Ghost
 
 
 # Of more objects the property editor shows only what they have in common.
@@ -72,8 +74,8 @@ class SiloGroup:
         doc = host.find_document(path)
         if doc is None:
             return
-        open_now = {one.Name for one in host.documents()}
-        self._known = {name: known for name, known in self._known.items() if name in open_now}
+        open_now = {document.Name for document in host.documents()}
+        self._known = {name: states for name, states in self._known.items() if name in open_now}
         in_silo = translate("Silo", "in Silo")
         left_out = translate("Silo", "not registered: left out of the BOM")
         components = {
@@ -106,7 +108,9 @@ class SiloGroup:
             file, components = self._known.get(doc.Name, ("", {}))
             if name in components and doc.FileName == file:  # another document may have its name by now
                 wanted.append((doc.getObject(name), components[name]))
-        left = [(obj, told) for obj, told in wanted[:MOST] if obj is not None and not _is_shown(obj, *told)]
+        left = [
+            (obj, texts) for obj, texts in wanted[:MOST] if obj is not None and not _is_shown(obj, *texts)
+        ]
         if left:
             with saving.others_unmarked():
                 for obj, (number, state) in left:
@@ -130,36 +134,36 @@ def _put(obj: Any, name: str, value: str, tip: str) -> None:
     setattr(obj, name, value)
 
 
-def look_at(paths: Iterable[str]) -> dict[str, Seen]:
+def look_at(paths: Iterable[str]) -> dict[str, OpenedFile]:
     """How the files of components stand. GUI thread; what needs the disk's content is left to the worker."""
-    known = host.documents_by_path()
-    own = next((str(doc.TransientDir) for doc in known.values()), "")
+    documents = host.documents_by_path()
+    own = next((str(doc.TransientDir) for doc in documents.values()), "")
     elsewhere = open_in_others(own)
     seen = {}
     for path in dict.fromkeys(paths):
-        seen[path] = _look_at(path, known)
-        spelt = known[path].FileName if path in known else ""
+        seen[path] = _look_at(path, documents)
+        spelt = documents[path].FileName if path in documents else ""
         if seen[path].state.usable and elsewhere.has(path, spelt):
-            seen[path] = replace(seen[path], state=State.ELSEWHERE)
+            seen[path] = replace(seen[path], state=ComponentState.ELSEWHERE)
     return seen
 
 
-def _look_at(path: str, known: Mapping[str, Any]) -> Seen:
+def _look_at(path: str, states: Mapping[str, Any]) -> OpenedFile:
     if not path:
-        return Seen(State.UNNAMED)
+        return OpenedFile(ComponentState.UNNAMED)
     if not os.path.isfile(path):
-        return Seen(State.MISSING)
+        return OpenedFile(ComponentState.MISSING)
     if not saving.is_writable(path):
-        return Seen(State.READ_ONLY)
-    doc = known.get(path)
+        return OpenedFile(ComponentState.READ_ONLY)
+    doc = states.get(path)
     if doc is None:
-        return Seen(State.READY)
+        return OpenedFile(ComponentState.READY)
     if saving.lost_objects(doc):
-        return Seen(State.LOST)
+        return OpenedFile(ComponentState.LOST)
     saved_at = str(getattr(doc, "LastModifiedDate", "") or "")
     if not saving.is_modified(doc):
-        return Seen(State.READY, saved_at)
-    return Seen(State.PARTIAL if host.is_partial(doc) else State.EDITED, saved_at)
+        return OpenedFile(ComponentState.READY, saved_at)
+    return OpenedFile(ComponentState.PARTIAL if host.is_partial(doc) else ComponentState.EDITED, saved_at)
 
 
 def write_identity(candidate: Candidate, identity: str) -> None:
@@ -167,23 +171,35 @@ def write_identity(candidate: Candidate, identity: str) -> None:
     entry = candidate.entry
     doc = saving.open_fully(entry.doc_path)
     saving.refuse_loss(doc)
-    whole = not candidate.shares_file
-    for name in candidate.article.objects if candidate.article is not None else (entry.object_name,):
-        saving.write_identity(doc, name, identity, whole_document=whole)
+    for name in _objects(candidate):
+        saving.write_identity(doc, name, identity, whole_document=not candidate.shares_file)
     saving.save(doc, mark_parents=True)
 
 
-def remove_identity(candidate: Candidate, *, no_part: bool) -> None:
-    """Take the identity from what is modelled in an assembly's own file, and save it. GUI thread.
+def remove_identity(candidate: Candidate, *, no_part: bool = False) -> None:
+    """Take the identity from a component's file, and save it. GUI thread.
 
     no_part
         mark it as no part as well; otherwise such a mark goes too.
     """
     doc = saving.open_fully(candidate.entry.doc_path)
     saving.refuse_loss(doc)
-    for name in candidate.article.objects if candidate.article is not None else ():
-        saving.remove_identity(doc, name, no_part=no_part)
+    for name in _objects(candidate):
+        saving.remove_identity(doc, name, no_part=no_part, whole_document=not candidate.shares_file)
     saving.save(doc, mark_parents=True)
+
+
+def restore_identity(candidate: Candidate) -> None:
+    """Give a component's file the identity that it had before it was registered, or none, and save it."""
+    if candidate.entry.silo_uuid:
+        write_identity(candidate, candidate.entry.silo_uuid)
+    else:
+        remove_identity(candidate)
+
+
+def _objects(candidate: Candidate) -> tuple[str, ...]:
+    article = candidate.article
+    return article.objects if article is not None else (candidate.entry.object_name,)
 
 
 def unedited() -> list[Any]:
@@ -227,10 +243,10 @@ def relink(finding: Finding) -> list[str]:
 
 
 def _target(meant: Any, problem: LinkProblem) -> Any:
-    found = meant.getObject(problem.obj)
-    if found is None:
+    result = meant.getObject(problem.obj)
+    if result is None:
         raise DocumentError(meant.FileName, f"it holds no object named {problem.obj!r}; nothing was changed")
-    return found
+    return result
 
 
 class LossGuard:
@@ -248,7 +264,7 @@ class LossGuard:
     """
 
     def __init__(
-        self, outbox: Callable[[], Store], add: Callable[[Entry], None], ask: Callable[[str, str], bool]
+        self, outbox: Callable[[], Store], add: Callable[[PaneEntry], None], ask: Callable[[str, str], bool]
     ) -> None:
         self._outbox, self._add, self._ask = outbox, add, ask
         self._put_back: dict[str, Path] = {}
@@ -264,11 +280,11 @@ class LossGuard:
             qt.later(0, lambda: self._opened(name))
 
     def _opened(self, name: str) -> None:
-        doc = next((one for one in host.documents() if one.Name == name), None)
+        doc = next((document for document in host.documents() if document.Name == name), None)
         if doc is not None and (lost := saving.lost_objects(doc)):
-            told = translate("Silo", "This FreeCAD {here} does not know, and has not loaded: {lost}.")
+            text = translate("Silo", "This FreeCAD {here} does not know, and has not loaded: {lost}.")
             advice = translate("Silo", "Saving the file here would remove them from it: change it there.")
-            self._tell(doc, _words(told, doc, lost), advice)
+            self._tell(doc, _words(text, doc, lost), advice)
 
     def slotStartSaveDocument(self, doc: Any, filename: str) -> None:
         """The file is about to be replaced."""
@@ -287,9 +303,9 @@ class LossGuard:
             "the file: {lost}.",
         )
         if kept is None or self._ask(translate("Silo", "Newer file"), _words(question, doc, lost)):
-            told = translate("Silo", "Saved over the newer file, without {lost}.")
+            text = translate("Silo", "Saved over the newer file, without {lost}.")
             where = translate("Silo", "The newer file is kept for {n} days at {path}")
-            self._tell(doc, _words(told, doc, lost), *([_kept_words(where, kept)] if kept else []))
+            self._tell(doc, _words(text, doc, lost), *([_kept_words(where, kept)] if kept else []))
         else:
             self._put_back[doc.Name] = kept
 
@@ -310,7 +326,7 @@ class LossGuard:
     def _tell(self, doc: Any, *lines: str) -> None:
         title = translate("Silo", "Made by a newer FreeCAD: {name}")
         self._add(
-            Entry(
+            PaneEntry(
                 key=f"newer-freecad:{doc.FileName}",
                 title=title.replace("{name}", os.path.basename(doc.FileName)),
                 when=time.time(),
@@ -389,15 +405,14 @@ class LiveDesk:
     look_at = staticmethod(look_at)
     write_identity = staticmethod(write_identity)
     remove_identity = staticmethod(remove_identity)
+    restore_identity = staticmethod(restore_identity)
     unedited = staticmethod(unedited)
     save_marked = staticmethod(save_marked)
 
-    def accounts(self, extraction: Extraction) -> list[Account]:
+    def accounts(self, extraction: Extraction) -> list[SolidCount]:
         """The solids that FreeCAD shows, against those that the BOM explains."""
-        from silo.workbench.freecad import witness
-
         with qt.wait_cursor():
-            return witness.accounts(extraction, hardware=self._count_hardware())
+            return live.accounts(extraction, hardware=self._count_hardware())
 
     def why(self, doc: Any, assembly: str, parts: Collection[Key]) -> list[str]:
         """Each chain from an assembly to a part of it."""
@@ -417,16 +432,16 @@ class LiveDesk:
         cached = live.cached_document(doc)
         return file_item(cached, self._hint(doc, cached))
 
-    def ask(self, planned: Plan, note: str, comment: str, look: Look) -> Answer | None:
+    def ask(self, planned: CommitPlan, note: str, comment: str, look: Look) -> CommitAnswer | None:
         """The commit dialog."""
         from silo.workbench.commit.dialog import CommitDialog
 
         dialog = CommitDialog(planned, host.main_window(), note=note, comment=comment)
         shown = [dialog]
 
-        def back(found: Mapping[str, Theirs]) -> None:
-            for one in shown:  # the look at Silo may end after the person has answered
-                one.show_theirs(found)
+        def back(theirs: Mapping[str, Theirs]) -> None:
+            for commit_dialog in shown:  # the look at Silo may end after the person has answered
+                commit_dialog.show_theirs(theirs)
 
         look(back)
         try:
@@ -442,6 +457,32 @@ class LiveDesk:
         window = PreviewDialog(title, path, flow, host.main_window())
         window.show()
         return window
+
+    def light(self, doc: Any, names: Sequence[str]) -> int:
+        """Select objects and draw them through what covers them."""
+        return self._overlay.light(doc, names)
+
+    def compare(self, path: str, revision: int, theirs: Sequence[Ghost]) -> Differences | None:
+        """Draw another revision as a ghost beside a document, or remove it."""
+        doc = host.find_document(path)
+        if doc is None:
+            raise DocumentError(path, "it is not open any more")
+        if self._overlay.ghost_of == (path, revision):
+            self._overlay.clear()
+            return None
+        extraction = self.snapshot(doc).extraction
+        if extraction is None:
+            raise DocumentError(path, "it holds no assembly, so nothing in it has another place")
+        mine = [name for entry in extraction.entries for name in entry.instances]
+        differences = self._overlay.compare(doc, extraction.assembly.object_name, mine, theirs)
+        self._overlay.ghost_of = (path, revision)
+        return differences
+
+    @cached_property
+    def _overlay(self) -> Overlay:
+        from silo.workbench.freecad.drawing import Overlay
+
+        return Overlay()
 
     def register_window(self, title: str, path: str, flow: RegisterFlow, *, asks: bool) -> Any:
         """The Register Parts dialog."""

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.platform import stamp_of
 from silo.workbench.freecad import host
-from silo.workbench.freecad.edits import EditWatch
+from silo.workbench.freecad.facts import EditWatch
 
 if TYPE_CHECKING:
     from silo.fcstd.container import FcstdError
@@ -66,16 +66,16 @@ def open_fully(path: str) -> Any:
     """
     from silo.bom.errors import DocumentError
 
-    known = host.find_document(path)
-    if known is not None and not host.is_partial(known):
-        return known
-    if known is not None and is_modified(known):
+    document = host.find_document(path)
+    if document is not None and not host.is_partial(document):
+        return document
+    if document is not None and is_modified(document):
         raise DocumentError(
             path, "FreeCAD has loaded it only in part and it has unsaved edits, which opening it would lose"
         )
     with host.same_active_document():
         try:
-            return host.open_document(known.FileName if known is not None else path)
+            return host.open_document(document.FileName if document is not None else path)
         except (OSError, RuntimeError) as problem:
             raise DocumentError(path, f"FreeCAD cannot open it: {problem}") from problem
 
@@ -102,8 +102,8 @@ def damage(path: str, name: str = "") -> FcstdError | None:
             document = library.glance(path)
             if not name:
                 document.complete()
-            elif (found := document.getObject(name)) is not None:
-                document.check(found)
+            elif (fcstd_object := document.getObject(name)) is not None:
+                document.check(fcstd_object)
     except FcstdError as error:
         sound = error.finding is FindingCode.MISSING_FILE or isinstance(error.__cause__, Refused)
         return None if sound else error
@@ -140,8 +140,8 @@ def refuse_loss(doc: Any) -> None:
     from silo.bom.errors import DocumentError
 
     if lost := lost_objects(doc):
-        told = f"made by a newer FreeCAD; saving it here would destroy {', '.join(lost)}"
-        raise DocumentError(doc.FileName, f"{told}. Open and change it in the newer FreeCAD")
+        text = f"made by a newer FreeCAD; saving it here would destroy {', '.join(lost)}"
+        raise DocumentError(doc.FileName, f"{text}. Open and change it in the newer FreeCAD")
 
 
 def _is_ours(program: str) -> bool:
@@ -159,17 +159,19 @@ def _of_unknown_types(doc: Any) -> dict[str, tuple[str, str]]:
     path = doc.FileName
     try:
         state = FileState.of(os.stat(path))
-        if (known := _UNKNOWN.get(path)) is not None and known[0] == state:
-            return known[1]
+        if (types_unknown := _UNKNOWN.get(path)) is not None and types_unknown[0] == state:
+            return types_unknown[1]
         with Library(limits=ANY_SIZE) as library:
             document = library.open(path)
             types = frozenset(() if _is_ours(document.ProgramVersion) else doc.supportedTypes())
             objects = [obj for obj in document.Objects if types and obj.TypeId not in types]
-            found = {obj.Name: (obj.Label, obj.TypeId) for obj in objects if not _is_made_again(obj, objects)}
+            result = {
+                obj.Name: (obj.Label, obj.TypeId) for obj in objects if not _is_made_again(obj, objects)
+            }
     except (OSError, DocumentError):
         return {}
-    _UNKNOWN[path] = state, found
-    return found
+    _UNKNOWN[path] = state, result
+    return result
 
 
 def _is_made_again(obj: Any, unknown: list[Any]) -> bool:
@@ -180,7 +182,7 @@ def _is_made_again(obj: Any, unknown: list[Any]) -> bool:
     if obj.TypeId != "App::Point":
         return False
     # A coordinate system that is lost as well is named itself.
-    lost = {one.Name for one in unknown}
+    lost = {each_name.Name for each_name in unknown}
     others = [obj.Document.getObject(name) for name in obj.Document.mentioning(obj.Name) if name not in lost]
     return all(other.TypeId == "App::Origin" for other in others)
 
@@ -189,7 +191,7 @@ def save(doc: Any, *, mark_parents: bool = False) -> None:
     """Save a document to its file; :class:`DocumentError` unless the file really was written.
 
     mark_parents
-        let FreeCAD mark the documents that link to this one; whoever asks for it saves them as well.
+        let FreeCAD mark the documents that link to this one; the caller saves them as well.
     """
     from silo.bom.errors import DocumentError
 
@@ -231,7 +233,7 @@ def _save(doc: Any) -> None:
 
 def mark_modified(name: str) -> None:
     """Mark the document of this name as one with edits that are not on disk."""
-    for doc in (one for one in host.documents() if one.Name == name):
+    for doc in (document for document in host.documents() if document.Name == name):
         if host.version() < (0, 21):
             for obj in doc.Objects[:1]:
                 obj.touch()  # 0.20 takes no mark, and marks a document for this
@@ -306,7 +308,7 @@ def save_marked(doc: Any) -> None:
 
 
 def is_writable(path: str) -> bool:
-    """True where the file may be replaced; a file marked read-only may not, whoever asks."""
+    """True where the file may be replaced; a file marked read-only may not."""
     folder = os.path.dirname(path) or "."
     if not os.path.exists(path):
         return os.access(folder, os.W_OK)
@@ -340,11 +342,13 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
             _set(doc, "SiloUUID", identity)
 
 
-def remove_identity(doc: Any, name: str, *, no_part: bool) -> None:
-    """Take the identity of one object out of every place; the document's own stays. The caller saves.
+def remove_identity(doc: Any, name: str, *, no_part: bool = False, whole_document: bool = False) -> None:
+    """Take the identity of one object out of every place. The caller saves.
 
     no_part
         the object gets ``SiloBomExclude``: a person says that it is no part. Otherwise it has none then.
+    whole_document
+        the document's own goes too; otherwise it stays.
     """
     from silo.bom.model import meta_key
 
@@ -355,7 +359,10 @@ def remove_identity(doc: Any, name: str, *, no_part: bool) -> None:
                 _set(obj, place, type(obj.getPropertyByName(place))())
         if obj is not None and no_part:
             _set(obj, "SiloBomExclude", True, "App::PropertyBool", "True: no part of any BOM", locked=False)
-        doc.Meta = {key: value for key, value in doc.Meta.items() if key != meta_key(name)}
+        gone = {meta_key(name), *([meta_key()] if whole_document else [])}
+        doc.Meta = {key: value for key, value in doc.Meta.items() if key not in gone}
+        if whole_document and "SiloUUID" in getattr(doc, "PropertiesList", ()):
+            _set(doc, "SiloUUID", "")
 
 
 # FreeCAD's number for "a change of it asks for no recompute" (Prop_Output of App::PropertyType).

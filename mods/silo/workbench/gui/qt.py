@@ -15,8 +15,6 @@ from typing import Any
 
 from PySide import QtCore, QtGui
 
-from silo.workbench.session.gui_thread_gc import collect_due
-
 try:
     from PySide import QtWidgets
 except ImportError:
@@ -65,6 +63,8 @@ class Relay(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
         except Exception as error:  # noqa: BLE001  # an exception may not pass through Qt's event loop
             if self._on_error is not None:
                 self._on_error(error)
+        from silo.workbench.session import collect_due  # late: FreeCAD's start waits for this module
+
         # Long work reports its progress through here, so garbage does not pile up meanwhile.
         collect_due()
 

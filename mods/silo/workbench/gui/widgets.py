@@ -10,13 +10,13 @@ FreeCAD is about to close: what must be done before its documents are gone, and 
 FreeCAD 0.20's own save, for any document: the one way there to take the mark of unsaved edits away.
 
 It is a message to a 3D view. A document that a link has loaded has no view, so it gets one for the moment
-(0.3 s, measured). FreeCAD asks whether to save the files below as well; the answer is no, for whoever calls
+(0.3 s, measured). FreeCAD asks whether to save the files below as well; the answer is no, for the caller
 this decides about each file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -138,12 +138,13 @@ def lay_out(window: Any, name: str, title: str, width: int, height: int, *, moda
     """Name and size of a window; the layout of its content.
 
     modal
-        whoever waits for the window deletes it afterwards; others are gone once they are closed.
+        the caller that waits for the window deletes it afterwards; others are gone once they are closed.
     """
     window.setObjectName(name)
     window.setWindowTitle(title)
     window.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose, not modal)
-    window.resize(width, height)
+    screen = QtGui.QGuiApplication.primaryScreen().availableGeometry()
+    window.resize(min(width, screen.width() - 20), min(height, screen.height() - 40))
     layout = QtWidgets.QVBoxLayout(window)
     layout.setSpacing(8)
     return layout
@@ -312,6 +313,38 @@ class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no type
         return int(y + line - area.y())
 
 
+def choice_box(parent: Any, choices: Mapping[str, str], *, search: bool = False, name: str = "") -> Any:
+    """A list to choose from, no longer than the screen; ``search``: typed letters filter it."""
+    box = QtWidgets.QComboBox(parent)
+    box.setObjectName(name)
+    box.setMaxVisibleItems(14)
+    box.setStyleSheet("QComboBox { combobox-popup: 0; }")  # else some styles show all of them at once
+    fill_choices(box, choices)
+    if search:
+        box.setEditable(True)
+        box.setInsertPolicy(QtWidgets.QComboBox.InsertPolicy.NoInsert)
+        box.completer().setFilterMode(QtCore.Qt.MatchFlag.MatchContains)
+        box.completer().setCompletionMode(QtWidgets.QCompleter.CompletionMode.PopupCompletion)
+    return box
+
+
+def fill_choices(box: Any, choices: Mapping[str, str]) -> None:
+    """Let a list have these choices."""
+    box.clear()
+    for key, text in choices.items():
+        box.addItem(text, key)
+
+
+def chosen_key(box: Any) -> Any:
+    """Return the key of what is chosen or typed; None where the letters fit several, or none."""
+    typed = box.currentText()
+    if not box.isEditable() or typed == box.itemText(box.currentIndex()):
+        return box.currentData()
+    texts = [box.itemText(number) for number in range(box.count())]
+    fitting = [number for number, text in enumerate(texts) if typed and typed.casefold() in text.casefold()]
+    return box.itemData(fitting[0]) if len(fitting) == 1 else None
+
+
 # The cell's data that holds the key of what is chosen now.
 KEY = QtCore.Qt.ItemDataRole.UserRole + 1
 
@@ -323,19 +356,30 @@ class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # Py
 
     choices
         row → {key: text}.
+    search
+        typed letters filter the choices.
     """
 
-    def __init__(self, choices: Callable[[int], dict[str, str]], parent: Any) -> None:
+    def __init__(
+        self, choices: Callable[[int], dict[str, str]], parent: Any, *, search: bool = False
+    ) -> None:
         super().__init__(parent)
-        self._choices = choices
+        self._choices, self._search = choices, search
 
     def createEditor(self, parent: Any, _option: Any, index: Any) -> Any:
         """A list of the choices, opened at once."""
-        box = QtWidgets.QComboBox(parent)
-        for key, text in self._choices(index.row()).items():
-            box.addItem(text, key)
+        box = choice_box(parent, self._choices(index.row()), search=self._search)
         box.activated.connect(lambda _number: self._chosen(box))
-        QtCore.QTimer.singleShot(0, box.showPopup)
+
+        def show() -> None:
+            if self._search:
+                box.lineEdit().selectAll()
+                box.completer().setCompletionPrefix("")
+                box.completer().complete()
+            else:
+                box.showPopup()
+
+        QtCore.QTimer.singleShot(0, show)
         return box
 
     def setEditorData(self, editor: Any, index: Any) -> None:
@@ -344,7 +388,7 @@ class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # Py
 
     def setModelData(self, editor: Any, model: Any, index: Any) -> None:
         """Take over the choice."""
-        key = editor.currentData()
+        key = chosen_key(editor)
         if key is not None and key != index.data(KEY):
             model.setData(index, key, QtCore.Qt.ItemDataRole.UserRole)
 
@@ -396,7 +440,7 @@ class CloseWatch(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
 
 
 def wait_for_disk(left: Callable[[float], int]) -> None:
-    """Wait until nothing is left, with a bar after a moment and a button to close all the same.
+    """Wait until nothing is left, with a bar after a moment and a button to close anyway.
 
     left
         waits for at most so many seconds, and returns how many things the disk still has to do.
@@ -451,12 +495,12 @@ def _passing_view(doc: Any) -> Iterator[None]:
         before, was = area.subWindowList(), area.activeSubWindow()
         host.activate(doc)
         host.run_command("Std_ViewCreate")
-        made = [one for one in area.subWindowList() if one not in before]
+        made = [each_window for each_window in area.subWindowList() if each_window not in before]
         try:
             yield
         finally:
-            for one in made:
-                one.close()
+            for each_window in made:
+                each_window.close()
             if was is not None:
                 area.setActiveSubWindow(was)
     finally:

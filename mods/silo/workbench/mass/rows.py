@@ -10,7 +10,7 @@ from silo.workbench.words import counted, translate
 
 
 @dataclass(frozen=True)
-class Row:
+class MassRow:
     """One line of the table: equal pieces of one part. Masses [kg]; ``doubtful`` has a reason in ``why``."""
 
     name: str
@@ -36,13 +36,13 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Shown:
+class MassView:
     """Everything in the window. ``notes`` are about the assembly as a whole."""
 
     title: str
     summary: str
     incomplete: str
-    rows: tuple[Row, ...]
+    rows: tuple[MassRow, ...]
     notes: tuple[str, ...]
 
     def table(self, headings: tuple[str, ...]) -> str:
@@ -54,7 +54,7 @@ class Shown:
         return "\n".join(lines) + "\n"
 
 
-def shown(report: InertiaReport) -> Shown:
+def shown(report: InertiaReport) -> MassView:
     """The window's content; the heaviest part first, those without a mass last."""
     parts = [part for link in report.links.values() for part in link.parts]
     rows = sorted((_row(part) for part in parts), key=lambda row: (-row.total, row.name))
@@ -67,7 +67,7 @@ def shown(report: InertiaReport) -> Shown:
             translate("Silo", "{n} parts have no mass; they are missing from the sum."),
         )
     notes = tuple(w.message for w in report.warnings if not w.part_name)
-    return Shown(report.assembly, _summary(report, parts), incomplete, tuple(rows), notes)
+    return MassView(report.assembly, _summary(report, parts), incomplete, tuple(rows), notes)
 
 
 def _summary(report: InertiaReport, parts: list[PartResult]) -> str:
@@ -82,14 +82,14 @@ def _summary(report: InertiaReport, parts: list[PartResult]) -> str:
     return text.replace("{x}", x).replace("{y}", y).replace("{z}", z)
 
 
-def _row(part: PartResult) -> Row:
+def _row(part: PartResult) -> MassRow:
     reasons = [w.message for w in part.warnings if str(w.code) != MassCode.NO_MASS_NO_MATERIAL]
     if part.source is Source.ZERO and part.volume > 0:
         reasons.insert(0, translate("Silo", "no material with a density"))
     material = part.material_name or part.material or ""
     if part.density and part.mass > 0:
         material = f"{material} ({part.density:.5g} kg/m³)".strip()
-    return Row(
+    return MassRow(
         part.name,
         part.quantity,
         part.mass,

@@ -23,9 +23,7 @@ import numpy as np
 
 from silo.bom.document import LinkProblem, own
 from silo.bom.errors import DocumentError
-from silo.inertia.core import place
 from silo.inertia.geometry.exact import (
-    Asked,
     Basis,
     Curve,
     Elementary,
@@ -33,15 +31,16 @@ from silo.inertia.geometry.exact import (
     Floats,
     Moments,
     Nurbs,
+    SampledSurface,
     Surface,
     Turned,
     integrate,
 )
-from silo.inertia.geometry.freecad.walk import (
+from silo.inertia.geometry.freecad import (
     NO_MATERIAL,
     NOTHING,
     Leaf,
-    Material,
+    StatedMaterial,
     Walk,
     assembled,
     linked_material,
@@ -61,7 +60,7 @@ from silo.inertia.geometry.measured import (
     shell_note,
 )
 from silo.inertia.geometry.together import Body, Mesh, mesh_volume, together
-from silo.inertia.model import Assembly, GeometryCode, Note, SolidProps
+from silo.inertia.model import Assembly, GeometryCode, Note, SolidProps, place
 from silo.workbench.freecad import live
 
 _ELEMENTARY = {
@@ -110,25 +109,25 @@ def _edges(face: Any, wire: Any) -> Iterator[Any]:
 
 
 def _curve(face: Any, edge: Any) -> Curve:
-    found = face.curveOnSurface(edge)
-    if found is None:
+    curve_on_surface = face.curveOnSurface(edge)
+    if curve_on_surface is None:
         raise ValueError("an edge has no curve on its face")
-    curve, first, last = found
+    curve, first, last = curve_on_surface
     kind = type(curve).__name__
     sign = -1.0 if edge.Orientation == _BACKWARDS else 1.0
     line = kind == "Line2d"
-    at = _fitted(curve, Basis.LINEAR if line else Basis.CIRCULAR) if kind in _FITTED else _asked(curve)
+    at = _fitted(curve, Basis.LINEAR if line else Basis.CIRCULAR) if kind in _FITTED else _sampled(curve)
     return Curve(at, _breaks(curve, kind, first, last), sign, line)
 
 
 def _fitted(curve: Any, basis: Basis) -> Callable[[Floats], Floats]:
     """A line, circle or ellipse, from a few of its points."""
-    points = _asked(curve)(basis.samples)
+    points = _sampled(curve)(basis.samples)
     coefficients = np.linalg.solve(basis.at(basis.samples), points)
     return lambda t: basis.at(t) @ coefficients
 
 
-def _asked(curve: Any) -> Callable[[Floats], Floats]:
+def _sampled(curve: Any) -> Callable[[Floats], Floats]:
     value = curve.value
 
     def at(t: Floats) -> Floats:
@@ -159,7 +158,7 @@ def _surface(face: Any) -> Surface:
     for form in _forms(surface, kind, face, value):
         if all(_same(form, value, u, v, size) for u, v in corners):
             return form
-    return Asked(_asker(face), np.linspace(u_low, u_high, 5))
+    return SampledSurface(_asker(face), np.linspace(u_low, u_high, 5))
 
 
 def _forms(surface: Any, kind: str, face: Any, value: Value) -> Iterator[Surface]:
@@ -235,7 +234,7 @@ def _nurbs(surface: Any, u_range: tuple[float, float], v_range: tuple[float, flo
     weights = None
     if surface.isURational() or surface.isVRational():
         weights = np.array(surface.getWeights(), dtype=np.float64)
-    found = Nurbs(
+    nurbs = Nurbs(
         np.array([[tuple(pole) for pole in row] for row in surface.getPoles()], dtype=np.float64),
         weights,
         np.array(surface.UKnotSequence, dtype=np.float64),
@@ -243,7 +242,7 @@ def _nurbs(surface: Any, u_range: tuple[float, float], v_range: tuple[float, flo
         surface.UDegree,
         surface.VDegree,
     )
-    return found.unrolled(u_range if u_periodic else None, v_range if v_periodic else None)
+    return nurbs.unrolled(u_range if u_periodic else None, v_range if v_periodic else None)
 
 
 MM = 1e-3
@@ -267,31 +266,36 @@ def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
     top = walk.top(cached, options.object_name)
 
     def measured(leaf: Leaf) -> Measured:
-        return _Product(options.eps, report).measured(leaf)
+        return measure(leaf, options.eps, report)
 
     return assembled(walk, top, source, options, one_by_one(measured), report)
 
 
+def measure(leaf: Leaf, eps: float, report: Report) -> Measured:
+    """All solids of a leaf whose handles are FreeCAD's shapes, in its axes."""
+    return _Product(eps, report).measured(leaf)
+
+
 class LiveFacts:
-    """The facts of :class:`silo.inertia.geometry.freecad.walk.Facts` from FreeCAD itself."""
+    """The facts of :class:`silo.inertia.geometry.freecad.ShapeSource` from FreeCAD itself."""
 
     def __init__(self) -> None:
         self._inspect = live.LinkInspector()
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
         """(4, 4) [mm] of an object's own placement; the identity where it has none."""
-        found = own(obj, name)
-        return np.eye(4) if found is None else matrix_of(found)
+        value = own(obj, name)
+        return np.eye(4) if value is None else matrix_of(value)
 
     def places(self, obj: Any) -> list[Floats]:
         """(4, 4) [mm] each, the object's own ``PlacementList``."""
-        return [matrix_of(one) for one in own(obj, "PlacementList") or ()]
+        return [matrix_of(each_place) for each_place in own(obj, "PlacementList") or ()]
 
     def shape(self, obj: Any) -> Any:
         """FreeCAD's shape of the object; None where it has none, or an empty one."""
         return obj.Shape if "Shape" in obj.PropertiesList and not obj.Shape.isNull() else None
 
-    def material(self, obj: Any) -> Material:
+    def material(self, obj: Any) -> StatedMaterial:
         """The material object linked to it, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
         linked = linked_material(obj)
         if linked is not None:
@@ -366,9 +370,9 @@ class _Product:
         bodies: list[Body] = []
         for number, (solid, matrix) in enumerate(solids, start=1):
             where = f"solid {number} of {len(solids)}: " if len(solids) > 1 else ""
-            found, moved = self._find(solid, where)
-            if found.props is not None:
-                bodies.append(_placed(found, matrix @ moved, solid, matrix))
+            solid_and_place, moved = self._find(solid, where)
+            if solid_and_place.props is not None:
+                bodies.append(_placed(solid_and_place, matrix @ moved, solid, matrix))
         faces = any(shape.Faces for shape, _ in shapes)
         settled = together(bodies, _common, self.problems)
         if settled.mixed:
@@ -380,14 +384,14 @@ class _Product:
     def _find(self, solid: Any, where: str) -> tuple[_Solid, Floats]:
         """The solid or an equal one that was measured before, and (4, 4) [mm] from there to here."""
         here = matrix_of(solid.Placement)
-        for one in self.known:
-            if solid.isPartner(one.shape) and solid.Orientation == one.shape.Orientation:
-                return one, here @ np.linalg.inv(matrix_of(one.shape.Placement))
+        for each_solid in self.known:
+            if solid.isPartner(each_solid.shape) and solid.Orientation == each_solid.shape.Orientation:
+                return each_solid, here @ np.linalg.inv(matrix_of(each_solid.shape.Placement))
         notes: list[Note] = []
-        found = self._measure(solid, notes)
+        measured_solid = self._measure(solid, notes)
         self.problems += [replace(note, message=where + note.message) for note in notes]
-        self.known.append(found)
-        return found, np.eye(4)
+        self.known.append(measured_solid)
+        return measured_solid, np.eye(4)
 
     def _measure(self, solid: Any, notes: list[Note]) -> _Solid:
         box = solid.BoundBox
@@ -461,10 +465,10 @@ def _meshed(shape: Any) -> Mesh:
     return Mesh(np.array([(p.x, p.y, p.z) for p in points]), np.array(facets, dtype=np.int64))
 
 
-def _placed(found: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
+def _placed(solid_placed: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
     """A measured solid after ``moved``; ``solid`` after ``matrix`` ((4, 4) [mm]) is the same."""
-    assert found.props is not None
-    props, metres = found.props, in_metres(moved)
+    assert solid_placed.props is not None
+    props, metres = solid_placed.props, in_metres(moved)
     volumes, coms, units = place([props.volume_m3], [props.com_m], [props.inertia_unit], [metres])
     there = SolidProps(float(volumes[0]), coms[0], units[0], props.reversed)
     box = solid.BoundBox
@@ -478,8 +482,8 @@ def _surfaces(shape: Any) -> tuple[list[Any], list[Any]]:
     """The surfaces of a shape that stand in no solid: those that close, as solids, and the others."""
     inside = {shell.hashCode() for solid in shape.Solids for shell in solid.Shells}
     loose = [shell for shell in shape.Shells if shell.hashCode() not in inside]
-    known = {face.hashCode() for shell in shape.Shells for face in shell.Faces}
-    faces = [face for face in shape.Faces if face.hashCode() not in known]
+    face_codes = {face.hashCode() for shell in shape.Shells for face in shell.Faces}
+    faces = [face for face in shape.Faces if face.hashCode() not in face_codes]
     if not loose and not faces:
         return [], []
     import Part
@@ -495,11 +499,11 @@ def _surfaces(shape: Any) -> tuple[list[Any], list[Any]]:
     )
 
 
-def _common(one: Body, other: Body) -> SolidProps | None:
+def _common(body: Body, other: Body) -> SolidProps | None:
     """What two solids have in common, by FreeCAD's boolean operation; None where that fails."""
     try:
-        both = _shape(one).common(_shape(other))
-        least = min(one.props.volume_m3, other.props.volume_m3)
+        both = _shape(body).common(_shape(other))
+        least = min(body.props.volume_m3, other.props.volume_m3)
         volume = float(both.Volume) * MM**3 if both.Solids else 0.0
         if not 0 <= volume <= (1 + 1e-5) * least:
             return None

@@ -1,17 +1,34 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What the Database Activity pane shows, as plain values; the widgets only draw them (spec bom-sync §6).
 
-An :class:`Entry` is one box. Its texts are shown as text, never as markup, and are made safe here, once: the
+A :class:`PaneEntry` is a box. Its texts are shown as text, never as markup, and are made safe here, once: the
 fields of an entry hold no control characters and are never longer than can be read.
+
+What is in the outbox, as rows of the pane: each with its reason, and what a person can do about it.
+Pure.
+
+The line at the top of the pane: how the connection is, in words and colours. Pure.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
+from silo.api.config import canonical
+from silo.outbox.entry import ASKED, State, host_of, parts, words
+from silo.outbox.entry import Entry as QueueEntry
 from silo.workbench.words import counted, plain, translate
+
+if TYPE_CHECKING:
+    from silo.api.config import Pause
+    from silo.workbench.commit.flow import Theirs
+    from silo.workbench.session.session import Newer, PaneState
+
 
 MOST_ENTRIES = 300
 MOST_LINES = 16
@@ -53,6 +70,7 @@ class Do(StrEnum):
     DECIDE = "decide"  # a new part: opens the Register Parts dialog
     RETRY = "retry"  # send what waits in the outbox
     OPEN_THEIRS = "open theirs"  # open the colleague's revision that a held commit would undo
+    COMPARE = "compare"  # show it as a ghost beside one's own
     TAKE_THEIRS = "take theirs"  # and take it in the place of one's own
     SEND_HERE = "send here"  # send what waits for another address to the server in use
     SAVE_COPY = "save copy"  # write the file of what waits somewhere else
@@ -60,6 +78,7 @@ class Do(StrEnum):
     DETAILS = "details"  # show all lines of the BOM difference for which a commit is held
     STOP = "stop"  # end what a worker is doing
     SETTINGS = "settings"  # open the preferences
+    INSTALL = "install"  # install the Python packages that are missing
 
 
 @dataclass(frozen=True)
@@ -86,7 +105,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Entry:
+class PaneEntry:
     """One box of the pane.
 
     key
@@ -126,7 +145,7 @@ class Entry:
         if len(self.lines) > MOST_LINES:
             object.__setattr__(self, "lines", shortened(self.lines))
 
-    def without_questions(self, is_answered: Callable[[Action], bool] = lambda _same: True) -> Entry:
+    def without_questions(self, is_answered: Callable[[Action], bool] = lambda _same: True) -> PaneEntry:
         """Without the buttons of the questions about copied identities that have their answer.
 
         is_answered
@@ -150,14 +169,14 @@ def not_in_silo_key(path: str) -> str:
     return f"not-in-silo:{path}"
 
 
-def gathered(entries: Iterable[Entry]) -> tuple[Entry, ...]:
+def gathered(entries: Iterable[PaneEntry]) -> tuple[PaneEntry, ...]:
     """With one box for each batch: 54 registered parts are one piece of news, and bury nothing.
 
     A batch is of one kind and one person, and has no pause of more than :data:`PAUSE_S` in it. Its box stands
     where its newest one would.
     """
-    made: list[list[Entry]] = []
-    last: dict[tuple[str, str], list[Entry]] = {}
+    made: list[list[PaneEntry]] = []
+    last: dict[tuple[str, str], list[PaneEntry]] = {}
     for entry in entries:
         group = last.get((entry.part_of, entry.who)) if entry.part_of else None
         if group is not None and group[-1].when - entry.when <= PAUSE_S:
@@ -167,13 +186,13 @@ def gathered(entries: Iterable[Entry]) -> tuple[Entry, ...]:
         made.append(group)
         if entry.part_of:
             last[entry.part_of, entry.who] = group
-    told: list[Entry] = []
+    pane_entries: list[PaneEntry] = []
     for group in made:
-        told += group if len(group) < FEWEST else [_together(group)]
-    return tuple(sorted(told, key=lambda entry: -entry.when))
+        pane_entries += group if len(group) < FEWEST else [_together(group)]
+    return tuple(sorted(pane_entries, key=lambda entry: -entry.when))
 
 
-def _together(group: list[Entry]) -> Entry:
+def _together(group: list[PaneEntry]) -> PaneEntry:
     newest = group[0]
     words = {
         Batch.COMMITTED: translate("Silo", "{n} items committed"),
@@ -184,7 +203,7 @@ def _together(group: list[Entry]) -> Entry:
     shown = ", ".join(names[:MOST_NAMES]) + (", …" if len(names) > MOST_NAMES else "")
     comments = dict.fromkeys(line.text for entry in group for line in entry.lines if line.tone is Tone.PLAIN)
     assert newest.part_of is not None
-    return Entry(
+    return PaneEntry(
         key=f"batch:{group[-1].key}",
         title=words[newest.part_of].replace("{n}", str(len(group))),
         when=newest.when,
@@ -214,9 +233,9 @@ def shortened(
 class Activity:
     """All boxes, newest first; immutable, :meth:`add` gives the next state."""
 
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[PaneEntry, ...] = ()
 
-    def add(self, entry: Entry) -> Activity:
+    def add(self, entry: PaneEntry) -> Activity:
         """With one more entry. One with the same key and a higher rank stays as it is."""
         mine = {entry.key, *entry.also}
         # Events may come by the thousand, and hardly one has to do with another.
@@ -233,5 +252,223 @@ class Activity:
         return replace(self, entries=(*rest[:place], entry, *rest[place:])[:MOST_ENTRIES])
 
     def answered(self, is_answered: Callable[[Action], bool]) -> Activity:
-        """Without the buttons of questions that have their answer (:meth:`Entry.without_questions`)."""
+        """Without the buttons of questions that have their answer (:meth:`PaneEntry.without_questions`)."""
         return replace(self, entries=tuple(e.without_questions(is_answered) for e in self.entries))
+
+
+# Ground and ink; yellow read-only, orange degraded, red offline, as the Kindred workbench has them.
+_YELLOW, _ORANGE, _RED = ("#ffe08a", "#4a3b00"), ("#ffc078", "#5c2b00"), ("#f8b4b9", "#5f0a12")
+
+_MOST_PRESENT = 5
+
+
+@dataclass(frozen=True)
+class Banner:
+    """What the banner says; ``ground`` is "" where it should not stand out."""
+
+    text: str
+    tone: Tone = Tone.PLAIN
+    ground: str = ""
+    ink: str = ""
+    actions: tuple[Action, ...] = ()
+
+
+def presence_text(newer: Newer, label: str) -> str:
+    """That a colleague committed a document since it was opened."""
+    text = translate("Silo", "{who} committed {name} (revision {n}) since you opened it.")
+    for key, value in (
+        ("{who}", newer.who or translate("Silo", "Somebody")),
+        ("{name}", plain(f"{newer.part_number} {label}", 60)),
+        ("{n}", str(newer.revision)),
+    ):
+        text = text.replace(key, value)
+    return text
+
+
+def banner(shown: PaneState) -> Banner:
+    """The banner for a state: the connection, and what colleagues committed of the open documents."""
+    made = _connection(shown)
+    if not shown.presence:
+        return made
+    more = shown.presence[:_MOST_PRESENT]
+    left = len(shown.presence) - len(more)
+    if left:
+        more = (*more, translate("Silo", "… and {n} more").replace("{n}", str(left)))
+    ground, ink = (made.ground, made.ink) if made.ground else _YELLOW
+    return replace(made, text="\n".join((made.text, *more)), ground=ground, ink=ink)
+
+
+def _connection(shown: PaneState) -> Banner:
+    settings = Action(Do.SETTINGS, translate("Silo", "Settings…"))
+    again = Action(Do.RETRY, translate("Silo", "Try again"))
+    if shown.connection == "packages":
+        mend = Action(Do.INSTALL, translate("Silo", "Install What Silo Needs…"))
+        return Banner(plain(shown.reason, 400), ground=_RED[0], ink=_RED[1], actions=(mend, again))
+    if not shown.server.configured:
+        text = translate("Silo", "No Silo server is set up yet.")
+        return Banner(text, Tone.QUIET, actions=(settings,))
+    host = plain(urlsplit(shown.server.url).netloc or shown.server.url, 80)
+    reason = plain(shown.reason, 300)
+    kind = shown.connection
+    if kind == "online":
+        return Banner("● " + translate("Silo", "Connected to {host}").replace("{host}", host), Tone.GOOD)
+    if kind == "read-only":
+        text = translate("Silo", "{host} is read-only now. Commits wait here until it takes changes again.")
+        return Banner(text.replace("{host}", host), ground=_YELLOW[0], ink=_YELLOW[1])
+    if kind == "degraded":
+        text = translate("Silo", "{host} works only in part. What cannot be sent waits here.")
+        return Banner(text.replace("{host}", host), ground=_ORANGE[0], ink=_ORANGE[1])
+    if kind == "offline":
+        text = translate("Silo", "No connection to {host}. Commits wait here and are sent later.")
+        sentence = "\n".join(filter(None, (text.replace("{host}", host), reason[:1].upper() + reason[1:])))
+        return Banner(sentence, ground=_RED[0], ink=_RED[1], actions=(again,))
+    if kind == "refused":
+        text = translate("Silo", "{host} does not accept the token.").replace("{host}", host)
+        return Banner(text, ground=_RED[0], ink=_RED[1], actions=(settings, again))
+    if kind == "connecting":
+        return Banner(translate("Silo", "Connecting to {host}…").replace("{host}", host), Tone.QUIET)
+    if kind == "unsupported":
+        text = translate("Silo", "{host} sends no live events; what you commit is shown anyway.")
+        return Banner(text.replace("{host}", host), Tone.QUIET)
+    return Banner(translate("Silo", "{host} (live events are off)").replace("{host}", host), Tone.QUIET)
+
+
+# Lines of a BOM difference; a button shows all of them.
+MOST_DETAILS = 3
+
+
+@dataclass(frozen=True)
+class WaitingRow:
+    """One entry.
+
+    urgent
+        a person has to look at it.
+    since
+        seconds since 1970.
+    details, more
+        the BOM base → theirs → mine, for a commit that is held because of a colleague's: its first lines, and
+        the button that shows all.
+    """
+
+    title: str
+    what: str
+    state: str
+    since: float
+    reason: str = ""
+    urgent: bool = False
+    actions: tuple[Action, ...] = ()
+    details: tuple[str, ...] = ()
+    more: tuple[Action, ...] = ()
+
+
+def rows(
+    entries: Iterable[QueueEntry],
+    server_url: str,
+    theirs: Mapping[int, Theirs | None] | None = None,
+    said: str = "",
+    pause: Pause | None = None,
+) -> tuple[WaitingRow, ...]:
+    """The entries, those first that a person has to look at.
+
+    said
+        the reason that the pane shows above them; no row repeats it.
+    """
+    here = _address(server_url)
+    made = [_row(entry, here, (theirs or {}).get(entry.id), pause, said) for entry in entries]
+    return tuple(sorted(made, key=lambda row: not row.urgent))
+
+
+def can_send(entries: Iterable[QueueEntry], server_url: str) -> bool:
+    """True where *Send now* would send something: not all waits for a person, an address or settings."""
+    here = _address(server_url)
+    # What a server that was set back has lost is sent by the same press.
+    return bool(here) and not all(
+        _is_urgent(entry, here) and (entry.is_away(here) or not entry.newer.get("set_back"))
+        for entry in entries
+    )
+
+
+def heading(entries: Sequence[QueueEntry], server_url: str) -> str:
+    """How many things wait, and for whom."""
+    here = _address(server_url)
+    urgent = sum(_is_urgent(entry, here) for entry in entries)
+    text, many = (
+        translate("Silo", "{n} thing waits to be sent"),
+        translate("Silo", "{n} things wait to be sent"),
+    )
+    if urgent == len(entries):
+        text = translate("Silo", "{n} thing waits for your choice")
+        many = translate("Silo", "{n} things wait for your choice")
+    elif urgent:
+        many += translate("Silo", ", {urgent} of them for your choice").replace("{urgent}", str(urgent))
+    return counted(len(entries), text, many)
+
+
+def meant_for_another(entries: Iterable[QueueEntry], server_url: str) -> tuple[int, ...]:
+    """Entries that wait for another address than the one in use."""
+    here = _address(server_url)
+    return tuple(entry.id for entry in entries if entry.is_away(here))
+
+
+def _address(server_url: str) -> str:
+    """The address in use, as entries have theirs; "" for none."""
+    return canonical(server_url) if server_url else ""
+
+
+def _is_urgent(entry: QueueEntry, here: str) -> bool:
+    """It waits for a person, not for the server."""
+    return entry.state is State.HELD or entry.is_away(here)
+
+
+def _row(entry: QueueEntry, here: str, theirs: Theirs | None, pause: Pause | None, said: str) -> WaitingRow:
+    row_words = words(entry, here, is_paused=pause is not None, translate=translate)
+    text = "" if row_words.reason == said else row_words.reason
+    details: list[str] = []
+    more: tuple[Action, ...] = ()
+    if theirs is not None and theirs.lines:
+        # Late: FreeCAD's start waits for this module.
+        from silo.workbench.commit.flow import line_texts, more_text
+
+        details = line_texts(theirs, MOST_DETAILS)
+        names = tuple(name for line in theirs.lines for name in line.entry.instances)
+        if names:
+            more = (Action(Do.SHOW, translate("Silo", "Show"), document=entry.path, objects=names),)
+        if (left := len(theirs.lines) - MOST_DETAILS) > 0:
+            more += (Action(Do.DETAILS, more_text(left), target=str(entry.id)),)
+    return WaitingRow(
+        title=plain(" ".join(filter(None, (entry.part_number, entry.label or entry.file_name))), 80),
+        what=parts(entry, translate),
+        state=row_words.state,
+        since=entry.taken_at,
+        reason=plain(text, 400),
+        urgent=row_words.urgent,
+        actions=tuple(_actions(entry, here)) if row_words.urgent or entry.reason else (),
+        details=tuple(details),
+        more=more,
+    )
+
+
+def _actions(entry: QueueEntry, here: str) -> Iterable[Action]:
+    target = str(entry.id)
+    if entry.is_away(here):
+        text = translate("Silo", "Send to {host}").replace("{host}", plain(host_of(here), 80))
+        yield Action(Do.SEND_HERE, text, target=target)
+    elif entry.state is State.HELD and not entry.superseded:
+        asked = entry.renamed == ASKED
+        text = translate("Silo", "Same part") if asked else translate("Silo", "Retry")
+        if entry.newer and not entry.newer.get("set_back"):
+            # The choices of the commit dialog.
+            if entry.path:
+                yield Action(Do.OPEN_THEIRS, translate("Silo", "Open theirs beside mine"), target=target)
+                text = translate("Silo", "Compare with revision {n}")
+                text = text.replace("{n}", str(entry.newer.get("revision_number", "")))
+                yield Action(Do.COMPARE, text, target=target)
+                yield Action(Do.TAKE_THEIRS, translate("Silo", "Take theirs"), target=target)
+            text = translate("Silo", "Commit mine on top")
+        yield Action(Do.RETRY, text, target=target)
+        if asked:
+            yield Action(Do.DECIDE, translate("Silo", "New part…"), document=entry.path)
+    if entry.file_left:
+        name = os.path.basename(entry.path) or entry.file_name
+        yield Action(Do.SAVE_COPY, translate("Silo", "Save a copy…"), target=target, document=name)
+    yield Action(Do.DISCARD, translate("Silo", "Discard"), target=target)

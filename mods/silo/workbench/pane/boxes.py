@@ -14,24 +14,29 @@ from typing import Any
 from silo.outbox.entry import host_of, pause_text
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
-from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, gathered
-from silo.workbench.pane.waiting import (
+from silo.workbench.pane.activity import (
+    Action,
     Banner,
-    Row,
+    Do,
+    Line,
+    PaneEntry,
+    Tone,
+    WaitingRow,
     banner,
     can_send,
+    gathered,
     heading,
     meant_for_another,
     rows,
 )
-from silo.workbench.session.session import Shown
+from silo.workbench.session.session import PaneState
 from silo.workbench.words import plain, translate
 
 # More boxes than this are made only when somebody asks for them: widgets cost time, values do not.
 FIRST, MORE = 40, 60
 
 
-def _waits(shown: Shown) -> object:
+def _waits(shown: PaneState) -> object:
     """What is drawn of what waits."""
     return shown.waiting, shown.server, shown.theirs, shown.reason
 
@@ -43,8 +48,8 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
     def __init__(self, on_action: OnAction) -> None:
         super().__init__()
         self._on_action = on_action
-        self._shown: Shown | None = None
-        self._boxes: dict[str, tuple[Entry, Any]] = {}
+        self._shown: PaneState | None = None
+        self._boxes: dict[str, tuple[PaneEntry, Any]] = {}
         self._most = FIRST
         self._day = ""
         self.setMinimumWidth(240)
@@ -84,8 +89,8 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
         area.setWidget(inside)
         return area
 
-    def draw(self, shown: Shown) -> None:
-        """Show a state; only what changed is made anew."""
+    def draw(self, shown: PaneState) -> None:
+        """Show a state; only what changed is made again."""
         before, self._shown = self._shown, shown
         self._banner.draw(banner(shown))
         self._busy.draw(shown)
@@ -100,20 +105,20 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
             self._draw_entries(gathered(shown.activity.entries))
 
     def changeEvent(self, event: Any) -> None:
-        """Another theme: what is coloured is made anew."""
+        """Another theme: what is coloured is made again."""
         super().changeEvent(event)
         if event.type() in (QtCore.QEvent.Type.StyleChange, QtCore.QEvent.Type.PaletteChange):
             shown, self._shown = self._shown, None
             if shown is not None:
                 QtCore.QTimer.singleShot(0, lambda: self._draw_anew(shown))
 
-    def _draw_anew(self, shown: Shown) -> None:
+    def _draw_anew(self, shown: PaneState) -> None:
         if self._shown is None:
             self._banner.forget()
             self._drop(tuple(self._boxes))
             self.draw(shown)
 
-    def _draw_entries(self, entries: tuple[Entry, ...]) -> None:
+    def _draw_entries(self, entries: tuple[PaneEntry, ...]) -> None:
         wanted = entries[: self._most]
         keys = {entry.key for entry in wanted}
         changed = [e.key for e in wanted if e.key in self._boxes and self._boxes[e.key][0] != e]
@@ -122,7 +127,7 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
             if entry.key not in self._boxes:
                 box = Box(entry, self._on_action)
                 self._boxes[entry.key] = (entry, box)
-                # What waits and the empty text stand first.
+                # What waits and the empty text are on top.
                 self._list.insertWidget(place + 2, box)
         self._empty.setVisible(not entries)
         self._older.setVisible(len(entries) > len(wanted))
@@ -155,7 +160,7 @@ def buttons(actions: Iterable[Action], on_action: OnAction) -> Any:
 class Box(QtWidgets.QFrame):  # type: ignore[misc]
     """One entry."""
 
-    def __init__(self, entry: Entry, on_action: OnAction) -> None:
+    def __init__(self, entry: PaneEntry, on_action: OnAction) -> None:
         super().__init__()
         self._on_action = on_action
         self.setObjectName("siloBox")
@@ -176,7 +181,7 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
         if entry.actions:
             layout.addLayout(buttons(entry.actions, self._on_action))
 
-    def _head(self, entry: Entry) -> Any:
+    def _head(self, entry: PaneEntry) -> Any:
         layout = QtWidgets.QHBoxLayout()
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(6)
@@ -228,30 +233,30 @@ class BannerWidget(QtWidgets.QFrame):  # type: ignore[misc]
         self._layout.setSpacing(2)
 
     def forget(self) -> None:
-        """Draw anew next time, whatever the state."""
+        """Draw again next time, whatever the state."""
         self._drawn = None
 
-    def draw(self, told: Banner) -> None:
+    def draw(self, shown_banner: Banner) -> None:
         """Show a state of the connection."""
-        if told == self._drawn:
+        if shown_banner == self._drawn:
             return
-        self._drawn = told
+        self._drawn = shown_banner
         widgets.clear(self._layout)
         # Else the ground of the boxes, for which the colours are chosen; a theme's own may have any shade.
-        ground = told.ground or _ground(self)
+        ground = shown_banner.ground or _ground(self)
         self.setStyleSheet(f"QFrame#siloBanner {{ background: {ground}; border-radius: 4px; }}")
-        text = widgets.label(told.text)
+        text = widgets.label(shown_banner.text)
         self._layout.addWidget(text)
-        if told.ground:
+        if shown_banner.ground:
             # A theme gives labels a ground of their own.
-            text.setStyleSheet(f"QLabel {{ color: {told.ink}; background: transparent; }}")
+            text.setStyleSheet(f"QLabel {{ color: {shown_banner.ink}; background: transparent; }}")
         else:
-            widgets.paint(text, told.tone)
-        if not told.actions:
+            widgets.paint(text, shown_banner.tone)
+        if not shown_banner.actions:
             return
-        made = [widgets.link_button(a.text, partial(self._on_action, a)) for a in told.actions]
-        for button in made if told.ground else ():
-            button.setStyleSheet(widgets.link_style(told.ink, "text-decoration: underline;"))
+        made = [widgets.link_button(a.text, partial(self._on_action, a)) for a in shown_banner.actions]
+        for button in made if shown_banner.ground else ():
+            button.setStyleSheet(widgets.link_style(shown_banner.ink, "text-decoration: underline;"))
         self._layout.addLayout(widgets.row(*made))
 
 
@@ -273,7 +278,7 @@ class BusyWidget(QtWidgets.QWidget):  # type: ignore[misc]
         layout.addWidget(widgets.link_button(stop.text, partial(on_action, stop)))
         self.hide()
 
-    def draw(self, shown: Shown) -> None:
+    def draw(self, shown: PaneState) -> None:
         """Show the work in progress, if there is any."""
         busy = shown.busy
         self.setVisible(busy is not None)
@@ -302,7 +307,7 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
         self._layout.setSpacing(3)
         self.hide()
 
-    def draw(self, shown: Shown) -> None:
+    def draw(self, shown: PaneState) -> None:
         """Show what waits."""
         widgets.clear(self._layout)
         self.setVisible(bool(shown.waiting))
@@ -311,8 +316,8 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
             return
         self._layout.addWidget(widgets.label(heading(shown.waiting, shown.server.url), bold=True))
         if shown.pause is not None:
-            told = pause_text(shown.pause, shown.server.url, time.time(), translate)
-            self._layout.addWidget(widgets.label(plain(told, 400), wrap=True))
+            pause_sentence = pause_text(shown.pause, shown.server.url, time.time(), translate)
+            self._layout.addWidget(widgets.label(plain(pause_sentence, 400), wrap=True))
         ordered = rows(shown.waiting, shown.server.url, shown.theirs, shown.reason, shown.pause)
         first = ordered[: self._most]
         for row in first:
@@ -334,11 +339,11 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
         if send:
             self._layout.addLayout(buttons(send, self._on_action))
 
-    def _show_all(self, shown: Shown) -> None:
+    def _show_all(self, shown: PaneState) -> None:
         self._most = None
         self.draw(shown)
 
-    def _row(self, row: Row) -> None:
+    def _row(self, row: WaitingRow) -> None:
         what = f"{row.title} · {row.what} · {row.state} · {_clock(row.since)}"
         self._layout.addWidget(widgets.label(what, Tone.ERROR if row.urgent else Tone.PLAIN))
         if row.reason:

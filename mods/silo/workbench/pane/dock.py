@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The Database Activity dock. It is there from FreeCAD's start, or its place would not be restored; its
-content (:mod:`silo.workbench.pane.boxes`) is made when somebody first looks at it.
+"""The docks. Both come after FreeCAD's other add-ons, and get their places back then. Their content is made
+when somebody first looks at it.
 """
 
 from __future__ import annotations
@@ -14,52 +14,98 @@ from silo.workbench.words import translate
 if TYPE_CHECKING:
     from silo.workbench.pane.activity import Action
     from silo.workbench.pane.boxes import Pane
-    from silo.workbench.session.session import Shown
+    from silo.workbench.revisions.dialog import ProjectPane
+    from silo.workbench.revisions.flow import ProjectFlow
+    from silo.workbench.session.session import PaneState
 
 NAME = "Database Activity"
+PROJECT = "Silo Project"
 
 # Pixels.
 NARROW, WIDTH = 260, 320
 
 
-class ActivityDock(QtWidgets.QDockWidget):  # type: ignore[misc]  # PySide has no types
-    """The dock. FreeCAD restores place and visibility by its object name, so that must never change.
+class Dock(QtWidgets.QDockWidget):  # type: ignore[misc]  # PySide has no types
+    """A dock whose content is made when somebody first looks at it.
 
-    on_action
-        gets every button that is pressed.
+    FreeCAD restores place and visibility by its object name, so that must never change.
     """
 
-    def __init__(self, window: Any, on_action: Callable[[Action], None]) -> None:
-        super().__init__(translate("Silo", "Database Activity"), window)
-        self.setObjectName(NAME)
-        self._on_action = on_action
-        self._pane: Pane | None = None
-        self._shown: Shown | None = None
+    def __init__(self, window: Any, name: str, title: str) -> None:
+        super().__init__(title, window)
+        self.setObjectName(name)
+        self._content: Any = None
         window.addDockWidget(QtCore.Qt.DockWidgetArea.RightDockWidgetArea, self)
         self.hide()
         self.visibilityChanged.connect(self._visible)
+        window.restoreDockWidget(self)
+
+    def make(self) -> Any:
+        """Make the content."""
+        raise NotImplementedError
 
     def show_and_raise(self) -> None:
         """Show the dock, also where it is a tab behind another one."""
         self.show()
         self.raise_()
 
-    def update_shown(self, shown: Shown) -> None:
-        """Draw a new state; while nobody looks, only remember it."""
-        self._shown = shown
-        if self._pane is not None and self.isVisible():
-            self._pane.draw(shown)
-
     def _visible(self, visible: bool) -> None:
-        if not visible:
-            return
-        if self._pane is None:
-            from silo.workbench.pane.boxes import Pane
-
-            self._pane = Pane(self._on_action)
-            self.setWidget(self._pane)
+        if visible and self._content is None:
+            self._content = self.make()
+            self.setWidget(self._content)
             if self.width() < NARROW:
                 # Never placed by the user so far: wide enough to read, narrow enough to work beside.
                 self.parent().resizeDocks([self], [WIDTH], QtCore.Qt.Orientation.Horizontal)
-        if self._shown is not None:
-            self._pane.draw(self._shown)
+
+
+class ActivityDock(Dock):
+    """The Database Activity pane.
+
+    on_action
+        gets every button that is pressed.
+    """
+
+    def __init__(self, window: Any, on_action: Callable[[Action], None]) -> None:
+        super().__init__(window, NAME, translate("Silo", "Database Activity"))
+        self._on_action = on_action
+        self._shown: PaneState | None = None
+
+    def make(self) -> Pane:
+        """Make the pane."""
+        from silo.workbench.pane.boxes import Pane
+
+        return Pane(self._on_action)
+
+    def update_shown(self, shown: PaneState) -> None:
+        """Draw a new state; while nobody looks, only remember it."""
+        self._shown = shown
+        if self._content is not None and self.isVisible():
+            self._content.draw(shown)
+
+    def _visible(self, visible: bool) -> None:
+        super()._visible(visible)
+        if visible and self._shown is not None:
+            self._content.draw(self._shown)
+
+
+class ProjectDock(Dock):
+    """The project view.
+
+    flow
+        gives :class:`silo.workbench.revisions.flow.ProjectFlow`, when it is first needed.
+    """
+
+    def __init__(self, window: Any, flow: Callable[[], ProjectFlow]) -> None:
+        super().__init__(window, PROJECT, translate("Silo", "Silo Project"))
+        self._flow = flow
+
+    def make(self) -> ProjectPane:
+        """Make the view."""
+        from silo.workbench.revisions.dialog import ProjectPane
+
+        return ProjectPane(self._flow())
+
+    def refresh(self) -> None:
+        """Look at the files again, if somebody sees them."""
+        if self._content is not None and self.isVisible():
+            self._content.refresh()

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import Any
 
-from silo.activity import Count, count_texts, draft_text, headline, no_changes, unregistered_text
 from silo.api.boms import unusual
 from silo.api.events import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
@@ -19,9 +18,19 @@ from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.model import BomEntry, walk_entries
 from silo.bom.report import shorten
 from silo.bom.resolve import display_name
-from silo.bom_sync import Resolved, Status
+from silo.bom_sync import (
+    MergeCount,
+    Resolved,
+    Status,
+    count_texts,
+    draft_text,
+    headline,
+    no_changes,
+    summary_texts,
+    unregistered_text,
+)
 from silo.outbox.send import Sent
-from silo.workbench.pane.activity import Action, Batch, Do, Entry, Line, Tone, not_in_silo_key, shortened
+from silo.workbench.pane.activity import Action, Batch, Do, Line, PaneEntry, Tone, not_in_silo_key, shortened
 from silo.workbench.session.session import Newer
 from silo.workbench.words import counted, plain, quantity, translate
 
@@ -29,12 +38,12 @@ from silo.workbench.words import counted, plain, quantity, translate
 Page = Callable[[str], str]
 
 
-def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
+def of_sent(sent: Sent, page: Page, now: float | None = None) -> PaneEntry:
     """The box of one commit."""
-    lines = (*_revision_lines(sent), *_status_lines(sent), *_resolved_lines(sent))
+    lines = (*_revision_lines(sent), *_status_lines(sent), *_resolved_lines(sent), *_product_lines(sent))
     tone = max((line.tone for line in lines), key=_WEIGHT.__getitem__, default=Tone.GOOD)
     url = (sent.result.resolve_url if sent.result is not None else "") or sent.page
-    return Entry(
+    return PaneEntry(
         key=f"sync:{sent.sync_id}" if sent.sync_id else f"commit:{sent.part_number}:{now}",
         also=(
             not_in_silo_key(sent.entry.path),
@@ -53,7 +62,7 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
     )
 
 
-def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> Entry | None:
+def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> PaneEntry | None:
     """Return the box that says that the team works with another FreeCAD; None if it does not, or if the
     server does not say.
 
@@ -78,7 +87,7 @@ def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> Ent
         )
     shown = title.replace("{team}", wanted).replace("{here}", "{}.{}".format(*here))
     when = time.time() if now is None else now
-    return Entry(
+    return PaneEntry(
         "team-freecad", shown, when, Tone.WARNING, lines=(Line(text, Tone.WARNING),), icon="silo-commit"
     )
 
@@ -126,17 +135,17 @@ def _badges(sent: Sent) -> tuple[Line, ...]:
 
 def badges(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> tuple[Line, ...]:
     """The counts of a merge, as the spec's box has them; what is zero is left out."""
-    told = count_texts(diff, warnings, translate)
-    if not told:
+    texts = count_texts(diff, warnings, translate)
+    if not texts:
         return (Line(no_changes(translate), Tone.QUIET),)
-    return tuple(Line(text, _TONES[kind]) for kind, text in told.items())
+    return tuple(Line(text, _TONES[kind]) for kind, text in texts.items())
 
 
 _TONES = {
-    Count.ADDED: Tone.GOOD,
-    Count.CHANGED: Tone.CHANGED,
-    Count.UNREFERENCED: Tone.WARNING,
-    Count.IN_CONFLICT: Tone.WARNING,
+    MergeCount.ADDED: Tone.GOOD,
+    MergeCount.CHANGED: Tone.CHANGED,
+    MergeCount.UNREFERENCED: Tone.WARNING,
+    MergeCount.IN_CONFLICT: Tone.WARNING,
 }
 
 
@@ -154,25 +163,27 @@ def _status_lines(sent: Sent) -> tuple[Line, ...]:
     lines = []
     if sent.entry.remark:
         lines.append(Line(sent.entry.remark, Tone.WARNING))
-    if draft := draft_text(sent.result, translate):
+    if draft := draft_text(sent.result or sent.uploaded, translate):
         lines.append(Line(draft, Tone.PLAIN))
     lines += [Line(plain(message, 300), Tone.WARNING) for message in unusual(sent.result)]
     removed = len(sent.result.diff.removed) if sent.result is not None else 0
     if sent.status is Status.UNCHANGED and sent.plan is not None:
         removed = len(sent.plan.diff.removed)
     if removed:
-        one = translate("Silo", "{n} item in the Silo BOM is not referenced by components in this assembly.")
+        sentence = translate(
+            "Silo", "{n} item in the Silo BOM is not referenced by components in this assembly."
+        )
         many = translate(
             "Silo", "{n} items in the Silo BOM are not referenced by components in this assembly."
         )
-        lines.append(Line(counted(removed, one, many), Tone.WARNING))
+        lines.append(Line(counted(removed, sentence, many), Tone.WARNING))
     missing = sum(entry.missing for entry in sent.resolved.entries) if sent.resolved is not None else 0
     if missing:
-        one = translate("Silo", "Incomplete: {n} component is missing; its known line stays as it is.")
+        sentence = translate("Silo", "Incomplete: {n} component is missing; its known line stays as it is.")
         many = translate(
             "Silo", "Incomplete: {n} components are missing; their known lines stay as they are."
         )
-        lines.append(Line(counted(missing, one, many), Tone.WARNING))
+        lines.append(Line(counted(missing, sentence, many), Tone.WARNING))
     if sent.status is Status.BLOCKED:
         text = translate("Silo", "The file is in Silo. The BOM waits until these are mended:")
         lines.append(Line(text, Tone.ERROR, _blocked_actions(sent.entry.path, missing)))
@@ -183,10 +194,10 @@ def _blocked_actions(path: str, missing: int) -> tuple[Action, ...]:
     """What a person can do about components that are missing; nothing else is left out of a BOM."""
     if not missing:
         return ()
-    one, many = translate("Silo", "Sync without it"), translate("Silo", "Sync without them")
+    singular, many = translate("Silo", "Sync without it"), translate("Silo", "Sync without them")
     return (
         Action(Do.MEND, translate("Silo", "Relink…"), document=path),
-        Action(Do.SYNC_WITHOUT, counted(missing, one, many), document=path),
+        Action(Do.SYNC_WITHOUT, counted(missing, singular, many), document=path),
     )
 
 
@@ -203,8 +214,21 @@ def _resolved_lines(sent: Sent) -> tuple[Line, ...]:
     )
 
 
+def _product_lines(sent: Sent) -> tuple[Line, ...]:
+    """What is open in the sub-assemblies, and what the product weighs and costs, as the server keeps it."""
+    if sent.summary is None:
+        return ()
+    own = f"{sent.number}: "  # what is open in its own BOM is shown already
+    value_lines, values = summary_texts(sent.summary, translate)
+    below = translate("Silo", "Open in {bom}")
+    lines = tuple(
+        Line(below.replace("{bom}", line), Tone.WARNING) for line in value_lines if not line.startswith(own)
+    )
+    return (*shortened(lines, MOST_OPEN), *((Line(" · ".join(values), Tone.QUIET),) if values else ()))
+
+
 # However many of a kind there are, the box has room for the other kinds and their buttons.
-MOST_FINDINGS, MOST_CONFLICTS = 6, 4
+MOST_FINDINGS, MOST_CONFLICTS, MOST_OPEN = 6, 4, 4
 
 # Told elsewhere in the box, or in the preview only.
 _NOT_HERE = (FindingCode.UNREGISTERED, FindingCode.CONSOLIDATION)
@@ -213,8 +237,8 @@ _NOT_HERE = (FindingCode.UNREGISTERED, FindingCode.CONSOLIDATION)
 def _finding_lines(resolved: Resolved, base: str) -> list[Line]:
     lines = []
     order = {Severity.ERROR: 0, Severity.WARNING: 1}
-    told = [f for f in resolved.findings if f.severity in order and f.code not in _NOT_HERE]
-    for finding in sorted(told, key=lambda f: order[f.severity]):
+    findings = [f for f in resolved.findings if f.severity in order and f.code not in _NOT_HERE]
+    for finding in sorted(findings, key=lambda f: order[f.severity]):
         tone = Tone.ERROR if finding.severity is Severity.ERROR else Tone.WARNING
         lines.append(Line(shorten(finding.message, base), tone, finding_actions(finding, resolved)))
     return lines
@@ -244,12 +268,14 @@ def _conflict_lines(sent: Sent, resolved: Resolved) -> list[Line]:
     if sent.plan is None:
         return []
     text = translate("Silo", "{number}: the assembly has {cad}, a manual line in Silo says {silo}")
-    known = {entry.part_number: entry for entry in resolved.entries}
+    entries = {entry.part_number: entry for entry in resolved.entries}
     lines = []
     for change in sent.plan.diff.conflicts:
-        told = text.replace("{number}", change.part_number).replace("{cad}", quantity(change.local_quantity))
-        told = told.replace("{silo}", change.on_server(quantity(change.remote_quantity)))
-        lines.append(Line(told, Tone.WARNING, _show(known.get(change.part_number), resolved)))
+        conflict_text = text.replace("{number}", change.part_number).replace(
+            "{cad}", quantity(change.local_quantity)
+        )
+        conflict_text = conflict_text.replace("{silo}", change.on_server(quantity(change.remote_quantity)))
+        lines.append(Line(conflict_text, Tone.WARNING, _show(entries.get(change.part_number), resolved)))
     return lines
 
 
@@ -277,7 +303,7 @@ def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
 # --- events of the server --------------------------------------------------------------------------------
 
 
-def of_event(event: ServerEvent, page: Page, now: float | None = None) -> Entry | None:
+def of_event(event: ServerEvent, page: Page, now: float | None = None) -> PaneEntry | None:
     """The box of one event; None for those that people need not see."""
     when = time.time() if now is None else now
     if event.merge is not None:
@@ -289,7 +315,7 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> Entry 
     title, key = _event_words(event.type, number, data)
     if not title or not number:
         return None
-    return Entry(
+    return PaneEntry(
         key=key or f"event:{event.id}:{event.type}:{number}",
         title=title,
         when=when,
@@ -313,10 +339,10 @@ def commit_of_event(event: ServerEvent) -> tuple[str, Newer] | None:
     return identity.lower(), Newer(plain(event.item or ""), revision, who, time.monotonic())
 
 
-def of_gap(when: float) -> Entry:
-    """The box for what was not heard: the server lost its log, or counts anew."""
+def of_gap(when: float) -> PaneEntry:
+    """The box for what was not heard: the server lost its log, or counts again."""
     text = translate("Silo", "The server no longer knows what happened since. See its own activity page.")
-    return Entry(
+    return PaneEntry(
         key="gap",
         title=translate("Silo", "Some activity may be missing"),
         when=when,
@@ -325,27 +351,27 @@ def of_gap(when: float) -> Entry:
     )
 
 
-def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = None) -> Entry:
+def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = None) -> PaneEntry:
     """The box of a merge that the server announced (spec §5, SSE Event)."""
-    told = badges(merge.diff, merge.warnings)
-    return Entry(
+    lines = badges(merge.diff, merge.warnings)
+    return PaneEntry(
         key=f"sync:{merge.sync_id}" if merge.sync_id else f"event:{event_id}:{MERGE}",
         title=headline(merge.item, translate),
         when=_moment(merge.timestamp, when),
-        tone=Tone.WARNING if any(badge.tone is Tone.WARNING for badge in told) else Tone.PLAIN,
+        tone=Tone.WARNING if any(badge.tone is Tone.WARNING for badge in lines) else Tone.PLAIN,
         who=merge.user,
-        badges=told,
+        badges=lines,
         actions=_view(merge.resolve_url or f"/items/{merge.item}/bom", page),
         icon="silo-bom",
     )
 
 
-def _moment(told: datetime | None, now: float) -> float:
+def _moment(moment: datetime | None, now: float) -> float:
     """When an event happened: as the server says where it is an old one, else now.
 
     Servers send whole seconds, and their clocks are a little off: just now, the order of arrival is truer.
     """
-    stamp = told.timestamp() if told is not None else now
+    stamp = moment.timestamp() if moment is not None else now
     return stamp if abs(stamp - now) > _JUST_NOW_S else now
 
 

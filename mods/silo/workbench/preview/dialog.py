@@ -10,7 +10,7 @@ from silo.bom.errors import SiloError
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Tone
-from silo.workbench.preview.flow import MOST_CELL, MOST_ROWS, Kind, Preview, Row, rows, summary
+from silo.workbench.preview.flow import MOST_CELL, MOST_ROWS, Preview, PreviewRow, RowKind, rows, summary
 from silo.workbench.words import counted, plain, tip, translate
 
 if TYPE_CHECKING:
@@ -20,31 +20,31 @@ if TYPE_CHECKING:
 MOST_WRAPPED = 200
 
 _TONES = {
-    Kind.ADDED: Tone.GOOD,
-    Kind.CHANGED: Tone.CHANGED,
-    Kind.CONFLICT: Tone.ERROR,
-    Kind.UNREFERENCED: Tone.WARNING,
-    Kind.MANUAL: Tone.QUIET,
-    Kind.UNREGISTERED: Tone.WARNING,
-    Kind.MISSING: Tone.ERROR,
-    Kind.NOT_COUNTED: Tone.PLAIN,
+    RowKind.ADDED: Tone.GOOD,
+    RowKind.CHANGED: Tone.CHANGED,
+    RowKind.CONFLICT: Tone.ERROR,
+    RowKind.UNREFERENCED: Tone.WARNING,
+    RowKind.MANUAL: Tone.QUIET,
+    RowKind.UNREGISTERED: Tone.WARNING,
+    RowKind.MISSING: Tone.ERROR,
+    RowKind.NOT_COUNTED: Tone.PLAIN,
 }
 _SIGNS = {
-    Kind.ADDED: "+",
-    Kind.CHANGED: "~",
-    Kind.CONFLICT: "⚡",
-    Kind.UNREFERENCED: "⚠",
-    Kind.MANUAL: "✎",
-    Kind.UNREGISTERED: "?",
-    Kind.MISSING: "✗",
-    Kind.UNCHANGED: "=",
+    RowKind.ADDED: "+",
+    RowKind.CHANGED: "~",
+    RowKind.CONFLICT: "⚡",
+    RowKind.UNREFERENCED: "⚠",
+    RowKind.MANUAL: "✎",
+    RowKind.UNREGISTERED: "?",
+    RowKind.MISSING: "✗",
+    RowKind.UNCHANGED: "=",
 }
 
 # Columns.
 NUMBERS = (2, 3)
 
 # Sentences rather than lines of a BOM.
-_WIDE = (Kind.GROUP, Kind.NOT_COUNTED)
+_WIDE = (RowKind.GROUP, RowKind.NOT_COUNTED)
 
 
 class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
@@ -162,25 +162,25 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         )
         self._summary.setText(summary(preview))
         self._tell(self._problems(preview))
-        one = translate("Silo", "Sync the {n} sub-assembly that differs too, before this one")
+        text = translate("Silo", "Sync the {n} sub-assembly that differs too, before this one")
         many = translate("Silo", "Sync the {n} sub-assemblies that differ too, before this one")
-        self.below.setText(counted(preview.to_send_below, one, many))
+        self.below.setText(counted(preview.to_send_below, text, many))
         self.below.setVisible(bool(preview.to_send_below))
         self.missing.setVisible(bool(preview.broken))
         self._fill()
         self._enable()
 
     def _problems(self, preview: Preview) -> str:
-        told = [preview.note] if preview.note else []
+        lines = [preview.note] if preview.note else []
         if not preview.number:
-            told.append(
+            lines.append(
                 translate("Silo", "This assembly has no Silo part number yet. Register it to sync its BOM.")
             )
         if preview.broken:
-            one = translate("Silo", "{n} broken link: the BOM is not synced until it is mended.")
+            text = translate("Silo", "{n} broken link: the BOM is not synced until it is mended.")
             many = translate("Silo", "{n} broken links: the BOM is not synced until they are mended.")
-            told.append(counted(len(preview.broken), one, many))
-        return "\n".join(told)
+            lines.append(counted(len(preview.broken), text, many))
+        return "\n".join(lines)
 
     def tell_view(self, text: str, *, agrees: bool | None) -> None:
         """What a comparison with the 3D view found, or why a line counts so many (``agrees`` None)."""
@@ -220,7 +220,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             self._spread(item.child(number))
 
     def resizeEvent(self, event: Any) -> None:
-        """Sentences are broken anew for the new width."""
+        """Sentences are broken again for the new width."""
         super().resizeEvent(event)
         QtCore.QTimer.singleShot(0, self._wrap)
 
@@ -232,7 +232,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         left = MOST_WRAPPED
         while left and (item := items.value()) is not None:
             text = item.data(2, QtCore.Qt.ItemDataRole.UserRole)
-            if item.data(1, QtCore.Qt.ItemDataRole.UserRole) == Kind.NOT_COUNTED.value:
+            if item.data(1, QtCore.Qt.ItemDataRole.UserRole) == RowKind.NOT_COUNTED.value:
                 item.setText(0, widgets.broken(text, metrics, whole))
                 left -= 1
             elif text:
@@ -240,24 +240,24 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
                 left -= 1
             items += 1
 
-    def _items(self, wanted: Iterable[Row], left: list[int]) -> Iterable[Any]:
+    def _items(self, wanted: Iterable[PreviewRow], left: list[int]) -> Iterable[Any]:
         only = self.changes_only.isChecked()
         for row in wanted:
             children = list(self._items(row.children, left))
-            if only and row.kind is Kind.UNCHANGED and not children:
+            if only and row.kind is RowKind.UNCHANGED and not children:
                 continue
             left[0] -= 1
             if left[0] >= 0:
                 yield self._item(row, children)
 
-    def _item(self, row: Row, children: list[Any]) -> Any:
+    def _item(self, row: PreviewRow, children: list[Any]) -> Any:
         sign = _SIGNS.get(row.kind, "")
         note = plain(row.note, MOST_CELL)
         texts = [f"{sign} {row.number}".strip(), row.name, row.cad, row.silo, note]
         if row.kind in _WIDE:
             texts = [" ".join(filter(None, (row.number, row.name or note)))]
         item = QtWidgets.QTreeWidgetItem(texts)
-        sentence = texts[0] if row.kind is Kind.NOT_COUNTED else "" if row.kind is Kind.GROUP else note
+        sentence = texts[0] if row.kind is RowKind.NOT_COUNTED else "" if row.kind is RowKind.GROUP else note
         item.setData(2, QtCore.Qt.ItemDataRole.UserRole, sentence)
         tone = Tone.ERROR if row.number == "✗" else _TONES.get(row.kind, Tone.PLAIN)
         if tone is not Tone.PLAIN:
@@ -265,7 +265,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
                 item.setForeground(column, widgets.brush(tone, self.table))
         for column in NUMBERS:
             item.setTextAlignment(column, QtCore.Qt.AlignmentFlag.AlignRight)
-        if row.kind is Kind.GROUP:
+        if row.kind is RowKind.GROUP:
             widgets.embolden(item)
         if row.note:
             item.setToolTip(0 if row.kind in _WIDE else 4, tip(row.note))

@@ -23,12 +23,12 @@ from silo.bom.resolve import display_name
 from silo.outbox.entry import new_key
 from silo.workbench.commit.flow import CommitFlow, Desk, commit_of
 from silo.workbench.commit.plan import Snapshot
-from silo.workbench.session.jobs import Control
+from silo.workbench.session import Control
 from silo.workbench.session.session import Session
 from silo.workbench.words import MOST_TIP, counted, plain, quantity, translate
 
 if TYPE_CHECKING:
-    from silo.bom.walk.tree import Key
+    from silo.bom.objects import Key
     from silo.bom_sync import Resolved
 
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 MOST_CELL = 300
 
 
-class Kind(StrEnum):
+class RowKind(StrEnum):
     """What a row says."""
 
     ADDED = "added"
@@ -52,7 +52,7 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Row:
+class PreviewRow:
     """One row of the table.
 
     cad, silo
@@ -63,7 +63,7 @@ class Row:
         the assembly in that document, and what the row counts in it, to say why so many.
     """
 
-    kind: Kind
+    kind: RowKind
     number: str = ""
     name: str = ""
     cad: str = ""
@@ -73,7 +73,7 @@ class Row:
     objects: tuple[str, ...] = ()
     assembly: str = ""
     parts: tuple[Key, ...] = ()
-    children: tuple[Row, ...] = ()
+    children: tuple[PreviewRow, ...] = ()
 
     def __post_init__(self) -> None:
         for text, most in (("number", MOST_CELL), ("name", MOST_CELL), ("note", MOST_TIP)):
@@ -142,7 +142,7 @@ class Preview:
     @property
     def to_send_below(self) -> int:
         """Sub-assemblies whose sync has something to send."""
-        return sum(1 for one in self.compared[:-1] if one.to_send)
+        return sum(1 for compared in self.compared[:-1] if compared.to_send)
 
 
 def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
@@ -155,38 +155,40 @@ def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
     extraction = with_suggestions(extraction)
     whole = resolve(extraction, api)
     lines = []
-    for one in assemblies(whole):
+    for assembly in assemblies(whole):
         control.check()
-        control.progress(one.assembly.part_number or one.assembly.label)
-        lines.append(server_lines(one, api))
+        control.progress(assembly.assembly.part_number or assembly.assembly.label)
+        lines.append(server_lines(assembly, api))
     whole = suggest_by_identity(whole, list(zip(assemblies(whole), lines, strict=True)))
-    compared = [_compared(one, known) for one, known in zip(assemblies(whole), lines, strict=True)]
-    all_lines = [line for one in compared for line in one.lines]
+    compared = [
+        _compared(resolved, each_lines) for resolved, each_lines in zip(assemblies(whole), lines, strict=True)
+    ]
+    all_lines = [line for each_compared in compared for line in each_compared.lines]
     number = whole.assembly.part_number
     page = api.web_url(f"/items/{number}/bom") if number else ""
     return Preview(snapshot, tuple(compared), names_of(whole, all_lines), blocking(whole), page)
 
 
-def _compared(one: Resolved, lines: tuple[Mapping[str, Any], ...]) -> Compared:
+def _compared(resolved: Resolved, lines: tuple[Mapping[str, Any], ...]) -> Compared:
     from silo.bom_sync import Status, decide
 
     # Whether what is missing may be left out is asked in the window, so it does not count here.
-    outcome = decide(one, lines, allow_missing=True)
-    diff = one.diff(lines) if outcome.plan is None else outcome.plan.diff
-    return Compared(one, lines, diff, outcome.status is Status.MERGED)
+    outcome = decide(resolved, lines, allow_missing=True)
+    diff = resolved.diff(lines) if outcome.plan is None else outcome.plan.diff
+    return Compared(resolved, lines, diff, outcome.status is Status.MERGED)
 
 
 # Nested assemblies share their lines: some dozen small files can stand for more rows than memory holds.
 MOST_ROWS = 3000
 
 
-def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[Row, ...]:
+def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[PreviewRow, ...]:
     """The table: the lines of the assembly, then what is left out and why.
 
     most
         so many rows of sub-assemblies at most, each of which gets its share; one row sums up the rest.
     """
-    by_key = {one.resolved.assembly.key: one for one in preview.compared}
+    by_key = {compared.resolved.assembly.key: compared for compared in preview.compared}
     base = os.path.dirname(preview.snapshot.path)
     room = most // 2
     table = [*_assembly_rows(preview.top, by_key, preview.names, frozenset(), room)]
@@ -199,15 +201,21 @@ def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[Row, ...]:
     if unregistered:
         title = translate("Silo", "Without a part number: left out until registered")
         table.append(_group(title, unregistered))
-    left_out = tuple(_finding_row(f, preview, base) for f in _told(preview.top.resolved.findings))
+    left_out = tuple(
+        _finding_row(f, preview, base)
+        for f in sorted(
+            (f for f in preview.top.resolved.findings if f.code not in _ELSEWHERE),
+            key=lambda f: _ORDER[f.severity],
+        )
+    )
     if left_out:
         title = translate("Silo", "Not counted, or counted with a remark")
         table.append(_group(title, left_out))
     return tuple(table)
 
 
-def _group(title: str, children: tuple[Row, ...]) -> Row:
-    return Row(Kind.GROUP, name=f"{title} ({len(children)})", children=children)
+def _group(title: str, children: tuple[PreviewRow, ...]) -> PreviewRow:
+    return PreviewRow(RowKind.GROUP, name=f"{title} ({len(children)})", children=children)
 
 
 Known = Mapping[tuple[str, str], Compared]
@@ -219,92 +227,100 @@ def _share(room: int, entries: Sequence[BomEntry]) -> int:
 
 
 def _assembly_rows(
-    one: Compared, known: Known, names: Mapping[str, str], above: Keys, room: int
-) -> Iterator[Row]:
+    compared: Compared, lines: Known, names: Mapping[str, str], above: Keys, room: int
+) -> Iterator[PreviewRow]:
     """The assembly's own lines in its own order, then those that only the server has.
 
     room
         so many rows may stand below them.
     """
-    states = _states(one.diff)
-    share = _share(room, one.resolved.entries)
-    above = above | {one.resolved.assembly.key}
-    for entry in one.resolved.entries:
-        kind, silo, note = states.get(entry.part_number or "", (Kind.UNCHANGED, "", ""))
-        if (own := known.get(entry.key)) is not None and entry.is_assembly and entry.part_number:
+    states = _states(compared.diff)
+    share = _share(room, compared.resolved.entries)
+    above = above | {compared.resolved.assembly.key}
+    for entry in compared.resolved.entries:
+        kind, silo, note = states.get(entry.part_number or "", (RowKind.UNCHANGED, "", ""))
+        if (own := lines.get(entry.key)) is not None and entry.is_assembly and entry.part_number:
             note = "; ".join(filter(None, (note, _own_words(own))))
         if entry.missing:
-            base = os.path.dirname(one.resolved.assembly.doc_path)
-            kind, note = Kind.MISSING, _missing_words(relative(entry.doc_path, base), entry.object_name)
-        yield Row(
+            base = os.path.dirname(compared.resolved.assembly.doc_path)
+            kind, note = RowKind.MISSING, _missing_words(relative(entry.doc_path, base), entry.object_name)
+        yield PreviewRow(
             kind,
             number=entry.part_number or "",
             name=entry.name or (display_name(entry) if entry.missing else ""),
             cad=quantity(entry.quantity),
             silo=silo,
             note=note,
-            **_counted(entry, one.resolved.assembly),
-            children=tuple(_below(entry, known, names, above, share)),
+            **_counted(entry, compared.resolved.assembly),
+            children=tuple(_below(entry, lines, names, above, share)),
         )
-    local = {entry.part_number for entry in one.resolved.entries}
+    local = {entry.part_number for entry in compared.resolved.entries}
     for kind, changes in (
-        (Kind.UNREFERENCED, one.diff.removed),
-        (Kind.MISSING, one.diff.kept),
-        (Kind.MANUAL, one.diff.manual),
+        (RowKind.UNREFERENCED, compared.diff.removed),
+        (RowKind.MISSING, compared.diff.kept),
+        (RowKind.MANUAL, compared.diff.manual),
     ):
         for change in changes:
             if change.part_number not in local:
                 number, amount = change.part_number, quantity(change.quantity)
                 name = names.get(number, "")
-                yield Row(kind, number=number, name=name, silo=amount, note=_notes()[kind])
+                yield PreviewRow(kind, number=number, name=name, silo=amount, note=_notes()[kind])
 
 
-def _below(entry: BomEntry, known: Known, names: Mapping[str, str], above: Keys, room: int) -> Iterator[Row]:
+def _below(
+    entry: BomEntry, lines: Known, names: Mapping[str, str], above: Keys, room: int
+) -> Iterator[PreviewRow]:
     """The lines of a sub-assembly; none where it stands above itself (a loop is reported as a finding)."""
-    one = known.get(entry.key) if entry.is_assembly and entry.key not in above else None
-    if one is None:
+    compared = lines.get(entry.key) if entry.is_assembly and entry.key not in above else None
+    if compared is None:
         return
-    left = room - len(one.resolved.entries) - len(one.diff.removed) - len(one.diff.manual)
+    left = room - len(compared.resolved.entries) - len(compared.diff.removed) - len(compared.diff.manual)
     if left < 0:
-        yield Row(Kind.GROUP, name=translate("Silo", "… more rows than can be shown here"))
+        yield PreviewRow(RowKind.GROUP, name=translate("Silo", "… more rows than can be shown here"))
     else:
-        yield from _assembly_rows(one, known, names, above, left)
+        yield from _assembly_rows(compared, lines, names, above, left)
 
 
-def _states(diff: BomDiff) -> dict[str, tuple[Kind, str, str]]:
+def _states(diff: BomDiff) -> dict[str, tuple[RowKind, str, str]]:
     """Part number → kind, the server's quantity, and what a sync does."""
     notes = _notes()
-    states: dict[str, tuple[Kind, str, str]] = {}
+    states: dict[str, tuple[RowKind, str, str]] = {}
     for line in diff.unchanged:
-        states[line.part_number] = (Kind.UNCHANGED, quantity(line.quantity), "")
+        states[line.part_number] = (RowKind.UNCHANGED, quantity(line.quantity), "")
     for line in diff.added:
-        states[line.part_number] = (Kind.ADDED, "", notes[Kind.ADDED])
+        states[line.part_number] = (RowKind.ADDED, "", notes[RowKind.ADDED])
     for change in diff.quantity_changed:
-        states[change.part_number] = (Kind.CHANGED, quantity(change.remote_quantity), notes[Kind.CHANGED])
+        states[change.part_number] = (
+            RowKind.CHANGED,
+            quantity(change.remote_quantity),
+            notes[RowKind.CHANGED],
+        )
     for change in diff.conflicts:
         kept = change.on_server(quantity(change.remote_quantity))
-        states[change.part_number] = (Kind.CONFLICT, kept, notes[Kind.CONFLICT])
+        states[change.part_number] = (RowKind.CONFLICT, kept, notes[RowKind.CONFLICT])
     for line in diff.kept:
-        states[line.part_number] = (Kind.MISSING, quantity(line.quantity), notes[Kind.MISSING])
+        states[line.part_number] = (RowKind.MISSING, quantity(line.quantity), notes[RowKind.MISSING])
     return states
 
 
-def _notes() -> dict[Kind, str]:
+def _notes() -> dict[RowKind, str]:
     return {
-        Kind.ADDED: translate("Silo", "new in the assembly: will be added"),
-        Kind.CHANGED: translate("Silo", "will take the assembly's quantity"),
-        Kind.CONFLICT: translate("Silo", "manual line in Silo with another quantity: a person decides there"),
-        Kind.UNREFERENCED: translate("Silo", "not in the assembly: kept, marked unreferenced"),
-        Kind.MANUAL: translate("Silo", "manual line: not touched"),
-        Kind.MISSING: translate("Silo", "its file is missing: the line stays as it is"),
+        RowKind.ADDED: translate("Silo", "new in the assembly: will be added"),
+        RowKind.CHANGED: translate("Silo", "will take the assembly's quantity"),
+        RowKind.CONFLICT: translate(
+            "Silo", "manual line in Silo with another quantity: a person decides there"
+        ),
+        RowKind.UNREFERENCED: translate("Silo", "not in the assembly: kept, marked unreferenced"),
+        RowKind.MANUAL: translate("Silo", "manual line: not touched"),
+        RowKind.MISSING: translate("Silo", "its file is missing: the line stays as it is"),
     }
 
 
-def _own_words(one: Compared) -> str:
+def _own_words(compared: Compared) -> str:
     """Whether the BOM of a sub-assembly is in Silo."""
-    if one.is_new:
+    if compared.is_new:
         return translate("Silo", "its own BOM is not in Silo yet")
-    return translate("Silo", "its own BOM differs from Silo") if one.to_send else ""
+    return translate("Silo", "its own BOM differs from Silo") if compared.to_send else ""
 
 
 def _missing_words(file: str, name: str) -> str:
@@ -312,10 +328,10 @@ def _missing_words(file: str, name: str) -> str:
     return text.replace("{file}", f"{file}#{name}" if name else file)
 
 
-def _unregistered_row(entry: BomEntry, preview: Preview, children: tuple[Row, ...]) -> Row:
+def _unregistered_row(entry: BomEntry, preview: Preview, children: tuple[PreviewRow, ...]) -> PreviewRow:
     head = preview.top.resolved.assembly
-    return Row(
-        Kind.UNREGISTERED,
+    return PreviewRow(
+        RowKind.UNREGISTERED,
         name=display_name(entry),
         cad=quantity(entry.quantity),
         note=relative(entry.doc_path, os.path.dirname(preview.snapshot.path)),
@@ -339,15 +355,11 @@ _ELSEWHERE = (FindingCode.UNREGISTERED,)
 _ORDER = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
 
 
-def _told(findings: Iterable[Finding]) -> list[Finding]:
-    return sorted((f for f in findings if f.code not in _ELSEWHERE), key=lambda f: _ORDER[f.severity])
-
-
-def _finding_row(finding: Finding, preview: Preview, base: str) -> Row:
+def _finding_row(finding: Finding, preview: Preview, base: str) -> PreviewRow:
     top = preview.snapshot.path
     mine = tuple(place.obj for place in finding.where if place.doc_path == top and place.obj)
-    return Row(
-        Kind.NOT_COUNTED,
+    return PreviewRow(
+        RowKind.NOT_COUNTED,
         number={Severity.ERROR: "✗", Severity.WARNING: "⚠", Severity.INFO: "·"}[finding.severity],
         note=shorten(finding.message, base),
         document=top if mine else "",
@@ -366,11 +378,11 @@ def summary(preview: Preview) -> str:
         (len(preview.top.resolved.unresolved), translate("Silo", "{n} without a part number")),
         (sum(entry.missing for entry in preview.top.resolved.entries), translate("Silo", "{n} missing")),
     )
-    told = [text.replace("{n}", str(count)) for count, text in parts if count]
-    new = sum(one.is_new for one in preview.compared[:-1])
+    texts = [text.replace("{n}", str(count)) for count, text in parts if count]
+    new = sum(singular.is_new for singular in preview.compared[:-1])
     below = [
-        counted(count, one, many)
-        for count, one, many in (
+        counted(count, singular, many)
+        for count, singular, many in (
             (
                 new,
                 translate("Silo", "{n} sub-assembly is not in Silo yet"),
@@ -385,8 +397,8 @@ def summary(preview: Preview) -> str:
         if count
     ]
     agreeing = len(diff.unchanged)
-    if told:
-        own = ", ".join(told)
+    if texts:
+        own = ", ".join(texts)
     elif below:
         own = counted(agreeing, translate("Silo", "{n} line agrees"), translate("Silo", "{n} lines agree"))
     else:
@@ -398,18 +410,18 @@ def summary(preview: Preview) -> str:
 
 def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:
     """Snapshots whose BOMs a sync sends, children before parents; without ``below`` the top one only."""
-    found = []
-    for one in preview.compared[:-1] if below else ():
-        if one.to_send:
-            found.append(_part_of(preview.snapshot, one.resolved))
-    return (*found, preview.snapshot)
+    snapshots = []
+    for compared in preview.compared[:-1] if below else ():
+        if compared.to_send:
+            snapshots.append(_part_of(preview.snapshot, compared.resolved))
+    return (*snapshots, preview.snapshot)
 
 
-def _part_of(snapshot: Snapshot, one: Resolved) -> Snapshot:
+def _part_of(snapshot: Snapshot, resolved: Resolved) -> Snapshot:
     """A sub-assembly as a snapshot of its own, cut from that of its parent."""
-    head = one.assembly
+    head = resolved.assembly
     original = _find(snapshot.extraction, head.key)
-    mine = tuple(f for f in one.findings if any(place.doc_path == head.doc_path for place in f.where))
+    mine = tuple(f for f in resolved.findings if any(place.doc_path == head.doc_path for place in f.where))
     return Snapshot(
         path=head.doc_path,
         label=display_name(head),
@@ -437,7 +449,7 @@ _MOST_ACCOUNTS = 4
 _MOST_WAYS = 12
 
 
-class Window(Protocol):
+class PreviewWindow(Protocol):
     """An open preview; :mod:`silo.workbench.preview.dialog` is the real one."""
 
     def busy(self) -> None: ...
@@ -471,7 +483,7 @@ class PreviewFlow:
     ) -> None:
         self._session, self._commits, self._desk = session, commits, desk
         self.register, self.show, self.view, self._known = register, show, view, known
-        self._open: dict[str, Window] = {}
+        self._open: dict[str, PreviewWindow] = {}
         self._to_mend: set[str] = set()
 
     def start(self, doc: Any, *, mend: bool = False) -> None:
@@ -490,16 +502,16 @@ class PreviewFlow:
         self._ask(taken)
 
     def again(self, path: str) -> None:
-        """Compare anew where a window is open: what it shows has changed."""
+        """Compare again where a window is open: what it shows has changed."""
         if path in self._open and (taken := self._taken_again(path)) is not None:
             self._ask(taken)
 
     def _taken_again(self, path: str) -> Snapshot | None:
         """The document of an open window as it is now; the window says where it was closed."""
-        doc = self._found(path, path)
+        doc = self._opened(path, path)
         return None if doc is None else self._take(doc)
 
-    def _found(self, path: str, window: str) -> Any:
+    def _opened(self, path: str, window: str) -> Any:
         doc = self._desk.find(path)
         if doc is None:
             text = translate("Silo", "{name} is not open any more. Open it, then compare again.")
@@ -543,7 +555,7 @@ class PreviewFlow:
             self._to_mend.discard(path)
             self.relink(preview)
 
-    def _with_dialog(self, path: str, call: Callable[[Window], None]) -> None:
+    def _with_dialog(self, path: str, call: Callable[[PreviewWindow], None]) -> None:
         # The window may have been closed while the server was thinking.
         if path in self._open:
             call(self._open[path])
@@ -555,12 +567,12 @@ class PreviewFlow:
         if taken is None or taken.extraction is None:
             return
         try:
-            found = self._desk.accounts(taken.extraction)
+            accounts = self._desk.accounts(taken.extraction)
         except SiloError as error:
             self._desk.warn(translate("Silo", "BOM in Silo"), str(error))
             return
-        differing = [account for account in found if not account.agrees]
-        lines = [account.sentence() for account in (differing or found[:1])[:_MOST_ACCOUNTS]]
+        differing = [account for account in accounts if not account.agrees]
+        lines = [account.sentence() for account in (differing or accounts[:1])[:_MOST_ACCOUNTS]]
         text = "\n".join(lines)
         self._with_dialog(path, lambda dialog: dialog.tell_view(text, agrees=not differing))
         unexplained = next((account for account in differing if account.unexplained), None)
@@ -569,7 +581,7 @@ class PreviewFlow:
 
     def why(self, window: str, document: str, assembly: str, parts: Collection[Key]) -> None:
         """Show in a window each chain from an assembly to a part of it."""
-        if (doc := self._found(document, window)) is None:
+        if (doc := self._opened(document, window)) is None:
             return
         try:
             lines = self._desk.why(doc, assembly, parts)

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import SiloError
@@ -12,20 +13,25 @@ from silo.registering.items import Registration
 from silo.registering.offer import Offer
 from silo.registering.orders import Order
 from silo.workbench.gui import widgets
-from silo.workbench.gui.qt import QtCore, QtWidgets
-from silo.workbench.gui.widgets import KEY, ChoiceDelegate
+from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
+from silo.workbench.gui.widgets import KEY, ChoiceDelegate, chosen_key
 from silo.workbench.pane.activity import Tone
 from silo.workbench.register.flow import (
     APART,
     NEW,
+    SAME,
     EditedRow,
+    Filter,
     choose,
+    filter_words,
     group,
+    grouped,
     heading,
+    headings,
     notices,
     number_texts,
-    retype,
-    section_words,
+    set_all,
+    source_words,
     type_words,
 )
 from silo.workbench.words import plain, tip, told_apart, translate, visible
@@ -36,7 +42,17 @@ if TYPE_CHECKING:
 # Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
 MOST_ROWS = 400
 
-COMPONENT, NAME, TYPE, CATEGORY, NUMBER, NOTE, BUTTON, NO_PART = range(8)
+COMPONENT, NAME, SOURCE, SUPPLIER, SUPPLIER_NUMBER, TYPE, CATEGORY, NUMBER, NOTE, BUTTON, NO_PART = range(11)
+# What a person may write or choose in a cell: column → the attribute of the row.
+_CELLS = {
+    NAME: "name",
+    SOURCE: "sourcing",
+    SUPPLIER: "supplier",
+    SUPPLIER_NUMBER: "supplier_part_number",
+    TYPE: "item_type",
+    CATEGORY: "category",
+}
+_PICTURE = 28
 
 
 class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
@@ -48,20 +64,23 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.finished.connect(lambda _result: flow.closed(path))
         self._rows: list[EditedRow] = []
         self._offer = Offer((), {})
-        self._types = type_words()
+        self._types, self._sources = type_words(), source_words()
         self._categories: dict[str, str] = {}
-        # How each row was drawn. Only what looks different is drawn anew: there may be hundreds.
+        # How each row was drawn. Only what looks different is drawn again: there may be hundreds.
         self._drawn: dict[int, object] = {}
         # Where in the table each row stands, between the headings of the sections; and back.
         self._places: list[int] = []
         self._row_at: dict[int, int] = {}
         self._filling = False
+        self._headings: dict[int, str] = {}
         layout = widgets.lay_out(self, "SiloRegister", translate("Silo", "Register Components"), 1080, 480)
         self._title = title
         self._text = widgets.label(translate("Silo", "Looking for components without a part number…"))
         layout.addWidget(self._text)
+        layout.addLayout(self._make_filters())
         self.table = self._make_table()
         layout.addWidget(self.table, 1)
+        layout.addLayout(self._make_bulk())
         self._problem = widgets.label("", Tone.ERROR)
         self._problem.hide()
         layout.addWidget(self._problem)
@@ -71,12 +90,15 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     # -- made once --------------------------------------------------------------------------------------
 
     def _make_table(self) -> Any:
-        table = QtWidgets.QTableWidget(0, 8)
+        table = QtWidgets.QTableWidget(0, 11)
         table.setObjectName("components")
         table.setHorizontalHeaderLabels(
             [
                 translate("Silo", "Component"),
                 translate("Silo", "Name"),
+                translate("Silo", "Source"),
+                translate("Silo", "Supplier"),
+                translate("Silo", "Supplier's number"),
                 translate("Silo", "Type"),
                 translate("Silo", "Category"),
                 translate("Silo", "Part number"),
@@ -87,12 +109,23 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         )
         table.verticalHeader().hide()
         table.setWordWrap(True)
-        table.setSelectionBehavior(QtWidgets.QAbstractItemView.SelectionBehavior.SelectRows)
-        table.setEditTriggers(QtWidgets.QAbstractItemView.EditTrigger.AllEditTriggers)
+        view = QtWidgets.QAbstractItemView
+        table.setSelectionBehavior(view.SelectionBehavior.SelectRows)
+        # Not by any click: rows are chosen by clicks.
+        triggers = view.EditTrigger
+        table.setEditTriggers(
+            triggers.DoubleClicked
+            | triggers.SelectedClicked
+            | triggers.EditKeyPressed
+            | triggers.AnyKeyPressed
+        )
+        table.setIconSize(QtCore.QSize(_PICTURE, _PICTURE))
+        table.itemSelectionChanged.connect(self._enable)
         # A view does not own its delegates.
         self._delegates = {
+            SOURCE: ChoiceDelegate(lambda row: self._sources, table),
             TYPE: ChoiceDelegate(lambda row: self._types, table),
-            CATEGORY: ChoiceDelegate(lambda row: self._categories, table),
+            CATEGORY: ChoiceDelegate(lambda row: self._categories, table, search=True),
             NUMBER: ChoiceDelegate(lambda place: self._rows[self._row_at[place]].choices(), table),
         }
         for column, delegate in self._delegates.items():
@@ -100,15 +133,84 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         table.itemChanged.connect(self._changed)
         return table
 
+    def _make_filters(self) -> Any:
+        self.words = QtWidgets.QLineEdit()
+        self.words.setObjectName("words")
+        self.words.setPlaceholderText(translate("Silo", "Filter"))
+        self.words.setClearButtonEnabled(True)
+        self.words.textChanged.connect(lambda _text: self._filter())
+        self.only = widgets.choice_box(
+            None, {filter_kind.value: text for filter_kind, text in filter_words().items()}
+        )
+        self.only.activated.connect(lambda _number: self._filter())
+        texts = {
+            "all": translate("Silo", "Check All"),
+            "none": translate("Silo", "None"),
+            "certain": translate("Silo", "All Certain"),
+        }
+        self.checks = {
+            which: widgets.button(text, f"check-{which}", partial(self.check, which))
+            for which, text in texts.items()
+        }
+        return widgets.row(self.words, self.only, *self.checks.values(), gap=6)
+
+    def _make_bulk(self) -> Any:
+        """One value for all chosen rows."""
+        self.bulk: dict[str, Any] = {
+            "sourcing": widgets.choice_box(None, self._sources),
+            "category": widgets.choice_box(None, {}, search=True),
+            "item_type": widgets.choice_box(None, self._types),
+        }
+        hints = {
+            "sourcing": translate("Silo", "Source…"),
+            "category": translate("Silo", "Category…"),
+            "item_type": translate("Silo", "Type…"),
+            "supplier": translate("Silo", "Supplier…"),
+            "name": translate("Silo", "Name, as {name} left {n}"),
+        }
+        for column, box in self.bulk.items():
+            box.activated.connect(partial(self._chosen_for_all, column))
+            if box.isEditable():
+                box.lineEdit().setPlaceholderText(hints[column])
+                box.lineEdit().returnPressed.connect(partial(self._chosen_for_all, column))
+            else:
+                box.insertItem(0, hints[column], None)
+            box.setMinimumWidth(160 if box.isEditable() else 0)
+            self._reset(box)
+        for column in ("supplier", "name"):
+            line = self.bulk[column] = QtWidgets.QLineEdit()
+            line.setMinimumWidth(170)
+            line.setPlaceholderText(hints[column])
+            line.returnPressed.connect(partial(self._chosen_for_all, column))
+        self.fill_button = widgets.button(
+            translate("Silo", "Fill Down"),
+            "fill",
+            self.fill_down,
+            translate("Silo", "All chosen rows get what the first of them has in this column (Ctrl+D)"),
+        )
+        QShortcut(QtGui.QKeySequence("Ctrl+D"), self, self.fill_down)
+        text = widgets.label(translate("Silo", "For the chosen rows:"), wrap=False)
+        return widgets.row(text, *self.bulk.values(), self.fill_button, gap=6)
+
     def _make_buttons(self, asks: bool) -> Any:
         self.ask_again = QtWidgets.QCheckBox(translate("Silo", "Ask after each commit"))
         self.ask_again.setChecked(asks)
         self.ask_again.toggled.connect(lambda on: self._flow.ask_again(bool(on)))
+        # No button of Return: that sets a value in a field above.
         self.register_button = widgets.button(
-            translate("Silo", "Register Selected"), "register", self._register_checked, default=True
+            translate("Silo", "Register Selected"), "register", self._register_checked
         )
+        self.undo_button = widgets.button(
+            translate("Silo", "Undo"),
+            "undo",
+            self._undo,
+            translate(
+                "Silo", "Take back what was just registered: new items are archived, the files forget them"
+            ),
+        )
+        self.undo_button.hide()
         self.skip_button = widgets.button(translate("Silo", "Skip All"), "skip", self.close)
-        return widgets.line(self.ask_again, None, self.register_button, self.skip_button)
+        return widgets.line(self.ask_again, None, self.undo_button, self.register_button, self.skip_button)
 
     # -- what is shown ----------------------------------------------------------------------------------
 
@@ -122,19 +224,28 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._offer = offer
         self.tell(notices(offer))
         self._categories = {
-            code: f"{code} {plain(text, 60)}".strip() for code, text in offer.categories.items()
+            code: f"{code} {plain(offer.categories[code], 60)}".strip()
+            for code in dict.fromkeys((*offer.recent, *offer.categories))
         }
+        widgets.fill_choices(self.bulk["category"], self._categories)
+        self._reset(self.bulk["category"])
         self._drawn.clear()
-        candidates = offer.candidates[:MOST_ROWS]
+        candidates = grouped(offer.candidates[:MOST_ROWS])
         names = told_apart(candidate.entry.doc_path for candidate in candidates)
-        self._rows = [EditedRow.of(one, names[one.entry.doc_path]) for one in candidates]
+        self._rows = [
+            EditedRow.of(each_candidate, names[each_candidate.entry.doc_path])
+            for each_candidate in candidates
+        ]
         self._filling = True
         self._lay_out()
         for number, row in enumerate(self._rows):
             self._fill_row(self._places[number], row)
         self._filling = False
         self._refresh()
-        for column, most in ((COMPONENT, 230), (NAME, 220), (TYPE, 110), (CATEGORY, 220), (NUMBER, 170)):
+        widths = {COMPONENT: 230, NAME: 200, SOURCE: 90, TYPE: 90, CATEGORY: 200, NUMBER: 150}
+        for column in (SUPPLIER, SUPPLIER_NUMBER):  # they come when a part is bought
+            self.table.setColumnWidth(column, 120)
+        for column, most in widths.items():
             self.table.resizeColumnToContents(column)
             self.table.setColumnWidth(column, min(self.table.columnWidth(column) + 14, most))
         mode = QtWidgets.QHeaderView.ResizeMode
@@ -146,19 +257,20 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
 
     def _lay_out(self) -> None:
         """A heading before each section; none where there is only the one of components."""
-        sections = [row.section for row in self._rows]
-        with_headings = bool(set(sections) - {""})
-        place, self._places, headings = 0, [], {}
-        for number, section in enumerate(sections):
-            if with_headings and (number == 0 or sections[number - 1] != section):
-                headings[place] = section_words()[section]
+        texts = headings(self._rows)
+        # No heading if there are only components of one folder.
+        with_headings = len(set(texts)) > 1 or any(row.section for row in self._rows)
+        place, self._places, self._headings = 0, [], {}
+        for number, text in enumerate(texts):
+            if with_headings and (number == 0 or texts[number - 1] != text):
+                self._headings[place] = text
                 place += 1
             self._places.append(place)
             place += 1
         self._row_at = {place: number for number, place in enumerate(self._places)}
         self.table.clearSpans()
         self.table.setRowCount(place)
-        for place, text in headings.items():
+        for place, text in self._headings.items():
             heading = QtWidgets.QTableWidgetItem(text)
             widgets.embolden(heading)
             heading.setFlags(QtCore.Qt.ItemFlag.ItemIsEnabled)
@@ -166,7 +278,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             self.table.setSpan(place, 0, 1, self.table.columnCount())
 
     def _fill_row(self, number: int, row: EditedRow) -> None:
-        for column in range(6):
+        for column in range(BUTTON):
             self.table.setItem(number, column, QtWidgets.QTableWidgetItem())
         entry = row.candidate.entry
         self.table.item(number, COMPONENT).setToolTip(tip(f"{entry.doc_path} · {entry.object_name}"))
@@ -211,6 +323,23 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
                 row.candidate, row.checked = replace(row.candidate, article=article), False
             self._refresh()
 
+    def taken_back(self, order: Order, error: SiloError | None) -> None:
+        """One registration is undone, or could not be."""
+        for row in self._rows:
+            if row.candidate is order.candidate:
+                row.result = Registration(order.proposal, error=error) if error is not None else None
+                row.running, row.checked = False, False
+        self._refresh()
+
+    def show_pictures(self, pictures: Mapping[str, bytes]) -> None:
+        """Show what FreeCAD keeps in the files."""
+        self._filling = True
+        for number, row in enumerate(self._rows):
+            shown = QtGui.QPixmap()
+            if shown.loadFromData(pictures.get(row.candidate.entry.doc_path, b"")):
+                self.table.item(self._places[number], COMPONENT).setIcon(QtGui.QIcon(shown))
+        self._filling = False
+
     def stopped(self) -> None:
         """Nothing is being registered any more."""
         for row in self._rows:
@@ -227,6 +356,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         texts = number_texts(self._rows, self._offer.numbers)
         for number, row in enumerate(self._rows):
             self._refresh_row(number, row, texts[number])
+        bought = any(row.sourcing == "purchased" and not row.section for row in self._rows)
+        for column in (SUPPLIER, SUPPLIER_NUMBER):
+            self.table.setColumnHidden(column, not bought)
         self._filling = False
         more = len(self._offer.candidates) - len(self._rows)
         self._text.setText(heading(self._rows, self._title, more))
@@ -238,8 +370,10 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         if row.guesses:
             category = translate("Silo", "guess: {category}").replace("{category}", category)
         kind = self._types.get(row.item_type, row.item_type)
-        texts = (row.component(), row.name, kind, category, number_text, note)
-        keys = {TYPE: row.item_type, CATEGORY: row.category, NUMBER: row.number}
+        source = self._sources[row.sourcing]
+        supply = (row.supplier, row.supplier_part_number) if row.sourcing == "purchased" else ("", "")
+        texts = (row.component(), row.name, source, *supply, kind, category, number_text, note)
+        keys = {SOURCE: row.sourcing, TYPE: row.item_type, CATEGORY: row.category, NUMBER: row.number}
         can = (row.editable, row.can_choose, row.can_register, row.can_keep, row.can_undeclare, row.section)
         look = (texts, keys, tone, can, row.checked)
         if self._drawn.get(number) == look:
@@ -262,7 +396,41 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         if (no_part := self.table.cellWidget(place, NO_PART)) is not None:
             no_part.setVisible(row.can_be_no_part)
 
+    def _filter(self) -> None:
+        """Show the rows that fit, and the headings above them."""
+        only, words = Filter(self.only.currentData()), self.words.text()
+        shown = {
+            place
+            for place, row in zip(self._places, self._rows, strict=True)
+            if row.fits(only, words) or row.running
+        }
+        below: set[int] = set()
+        for place in range(self.table.rowCount() - 1, -1, -1):
+            if place in self._headings:
+                self.table.setRowHidden(place, not below)
+                below.clear()
+            else:
+                self.table.setRowHidden(place, place not in shown)
+                below |= {place} & shown
+
+    def _visible(self) -> list[EditedRow]:
+        pairs = zip(self._places, self._rows, strict=True)
+        return [row for place, row in pairs if not self.table.isRowHidden(place)]
+
+    def selected(self) -> list[EditedRow]:
+        """The rows that a person has chosen, from above."""
+        places = sorted({index.row() for index in self.table.selectionModel().selectedRows()})
+        chosen = [self._rows[self._row_at[place]] for place in places if place in self._row_at]
+        visible = self._visible()
+        return [row for row in chosen if row in visible]
+
     def _enable(self) -> None:
+        any_chosen = bool(self.table.selectionModel().selectedRows())
+        for widget in (*self.bulk.values(), self.fill_button):
+            widget.setEnabled(any_chosen)
+        self.undo_button.setVisible(
+            self._flow.can_take_back(self._path) and not any(row.running for row in self._rows)
+        )
         chosen = any(row.checked and (row.can_register or row.can_keep) for row in self._rows)
         self.register_button.setEnabled(chosen)
         done = bool(self._rows) and all(row.finished for row in self._rows)
@@ -280,17 +448,54 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         chosen = item.data(QtCore.Qt.ItemDataRole.UserRole)
         if column == COMPONENT:
             row.checked = item.checkState() == QtCore.Qt.CheckState.Checked
-        elif column == NAME:
-            row.name = str(item.text())
-        elif column == TYPE and chosen:
-            retype(row, chosen, self._offer.categories)
-            self._need_number(row.category)
         elif column == NUMBER and chosen:
             choose(self._rows, row, chosen)
-        elif column == CATEGORY and chosen:
-            row.category, row.checked = chosen, row.can_register
-            self._need_number(chosen)
+        elif column in (NAME, SUPPLIER, SUPPLIER_NUMBER):
+            setattr(row, _CELLS[column], str(item.text()))
+        elif column in _CELLS and chosen is not None:
+            self._set([row], _CELLS[column], chosen)
         self._refresh()
+
+    def _set(self, rows: Sequence[EditedRow], column: str, value: str) -> None:
+        set_all(rows, column, value, self._offer.categories)
+        for category in {row.category for row in rows}:
+            self._need_number(category)
+        self._refresh()
+
+    def _chosen_for_all(self, column: str, _number: int = 0) -> None:
+        box = self.bulk[column]
+        if isinstance(box, QtWidgets.QLineEdit):
+            value = box.text().strip()
+            box.clear()
+        else:
+            value = chosen_key(box)
+            self._reset(box)
+        if value is not None and (value or column == "sourcing"):
+            self._set(self.selected(), column, value)
+
+    def _reset(self, box: Any) -> None:
+        box.setCurrentIndex(-1 if box.isEditable() else 0)
+        if box.isEditable():
+            box.clearEditText()
+
+    def fill_down(self) -> None:
+        """All chosen rows get what the first of them has in the column of the current cell."""
+        rows, column = self.selected(), _CELLS.get(self.table.currentColumn(), "category")
+        if rows:
+            self._set(rows[1:], column, getattr(rows[0], column))
+
+    def check(self, which: str) -> None:
+        """Check all rows that are shown, none of them, or all that are certain."""
+        for row in self._visible():
+            certain = row.candidate.wanted or row.checked
+            row.checked = row.can_register and (which == "all" or (which == "certain" and certain))
+        self._refresh()
+
+    def _undo(self) -> None:
+        for row in self._rows:
+            row.running = row.finished and row.number != SAME
+        self._refresh()
+        self._flow.take_back(self._path)
 
     def _need_number(self, category: str) -> None:
         if category not in self._offer.numbers:
@@ -306,7 +511,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._carry_out([row for row in self._rows if row.checked])
 
     def _carry_out(self, rows: Sequence[EditedRow]) -> None:
-        # Keeping is said of all files of an identity together, or it is said of none.
+        # The choice to keep holds for all files of an identity together, or for none.
         kept = {id(other): other for row in rows if row.can_keep for other in group(self._rows, row)}
         if same := [row for row in kept.values() if row.can_keep]:
             self._flow.same(same)
@@ -342,7 +547,9 @@ def _flags(row: EditedRow, column: int) -> Any:
     """What a person can do with a cell."""
     flag = QtCore.Qt.ItemFlag
     flags = flag.ItemIsEnabled | flag.ItemIsSelectable
-    if (row.editable and column in (NAME, TYPE, CATEGORY)) or (row.can_choose and column == NUMBER):
+    is_supply = column in (SUPPLIER, SUPPLIER_NUMBER)
+    writable = column in _CELLS and not (is_supply and row.sourcing != "purchased")
+    if (row.editable and writable) or (row.can_choose and column == NUMBER):
         flags |= flag.ItemIsEditable
     if column == COMPONENT and (row.can_register or row.can_keep):
         flags |= flag.ItemIsUserCheckable

@@ -15,24 +15,24 @@ The rows of the Register Parts dialog while a person edits them. Pure; the dialo
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 from typing import Any, Protocol
 
-from silo.activity import rules_text
 from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry, Extraction, walk_entries
-from silo.registering.items import Registration
-from silo.registering.journal import Journal
-from silo.registering.offer import Candidate, Offer, Similar, State, next_number, offer
-from silo.registering.orders import Order, carry_out
+from silo.bom_sync import rules_text
+from silo.registering.items import Journal, Registration
+from silo.registering.offer import Candidate, ComponentState, Offer, Similar, next_number, offer, picture_in
+from silo.registering.orders import CHOSEN, Order, carry_out, take_back
 from silo.workbench.commit.flow import CommitFlow, Desk
 from silo.workbench.commit.plan import Snapshot
 from silo.workbench.pane.activity import Tone
 from silo.workbench.session.session import Session
-from silo.workbench.settings.preferences import Preferences
+from silo.workbench.settings import Preferences
 from silo.workbench.words import counted, plain, translate
 
 NEW = "new"
@@ -62,20 +62,52 @@ def type_words() -> dict[str, str]:
     }
 
 
-def state_words() -> dict[State, str]:
+def source_words() -> dict[str, str]:
+    """Where a part comes from, for people."""
+    return {
+        "manufactured": translate("Silo", "made here"),
+        "purchased": translate("Silo", "bought"),
+        "": translate("Silo", "not said"),
+    }
+
+
+class Filter(StrEnum):
+    """Which rows are shown."""
+
+    ALL = "all"
+    UNSURE = "unsure"  # a person has to look at them first
+    NEW = "new"  # Silo has nothing like them
+    DUPLICATES = "duplicates"  # Silo, or another row, has them probably
+
+
+def filter_words() -> dict[Filter, str]:
+    """The filters for people."""
+    return {
+        Filter.ALL: translate("Silo", "all rows"),
+        Filter.UNSURE: translate("Silo", "unsure"),
+        Filter.NEW: translate("Silo", "new"),
+        Filter.DUPLICATES: translate("Silo", "probable duplicates"),
+    }
+
+
+def state_words() -> dict[ComponentState, str]:
     """The states for people."""
     return {
-        State.READY: "",
-        State.EDITED: translate("Silo", "its unsaved edits are saved too"),
-        State.ELSEWHERE: translate(
+        ComponentState.READY: "",
+        ComponentState.EDITED: translate("Silo", "its unsaved edits are saved too"),
+        ComponentState.ELSEWHERE: translate(
             "Silo", "open in another FreeCAD: close it there first, or saving there undoes this"
         ),
-        State.READ_ONLY: translate("Silo", "the file is read-only"),
-        State.PARTIAL: translate("Silo", "has edits, but is loaded only in part: open the file itself first"),
-        State.NEWER: translate("Silo", "has changed on disk since you opened it: open it again first"),
-        State.MISSING: translate("Silo", "the file is missing"),
-        State.UNNAMED: translate("Silo", "has no file yet: save it first"),
-        State.LOST: translate("Silo", "made by a newer FreeCAD: cannot be saved here"),
+        ComponentState.READ_ONLY: translate("Silo", "the file is read-only"),
+        ComponentState.PARTIAL: translate(
+            "Silo", "has edits, but is loaded only in part: open the file itself first"
+        ),
+        ComponentState.NEWER: translate(
+            "Silo", "has changed on disk since you opened it: open it again first"
+        ),
+        ComponentState.MISSING: translate("Silo", "the file is missing"),
+        ComponentState.UNNAMED: translate("Silo", "has no file yet: save it first"),
+        ComponentState.LOST: translate("Silo", "made by a newer FreeCAD: cannot be saved here"),
     }
 
 
@@ -97,6 +129,9 @@ class EditedRow:
     item_type: str
     category: str
     file: str
+    sourcing: str = ""
+    supplier: str = ""
+    supplier_part_number: str = ""
     number: str = NEW
     checked: bool = True
     running: bool = False
@@ -105,12 +140,9 @@ class EditedRow:
     @classmethod
     def of(cls, candidate: Candidate, file: str = "") -> EditedRow:
         """A row as it is offered."""
-        proposal = candidate.proposal
         return cls(
             candidate,
-            name=proposal.name,
-            item_type=proposal.item_type,
-            category=proposal.category,
+            **{name: getattr(candidate.proposal, name) for name in CHOSEN},
             file=file or os.path.basename(candidate.entry.doc_path),
             number=ASK if candidate.same_as else NEW,
             checked=candidate.wanted,
@@ -136,7 +168,7 @@ class EditedRow:
 
     @property
     def can_undeclare(self) -> bool:
-        """True where it is modelled in the file and what was said of it can be taken back."""
+        """True if it is modelled in the file and the decision about it can be taken back."""
         return self.candidate.decided and self.candidate.state.usable and not self.running
 
     @property
@@ -167,8 +199,22 @@ class EditedRow:
     def order(self) -> Order:
         """The row as an order for the worker."""
         existing = next((s for s in self.candidate.similar if s.part_number == self.number), None)
-        apart = self.number == APART
-        return Order(self.candidate, self.name.strip(), self.item_type, self.category, existing, apart)
+        chosen = {name: getattr(self, name).strip() for name in CHOSEN}
+        if self.sourcing != "purchased":
+            chosen |= {"supplier": "", "supplier_part_number": ""}
+        return Order(self.candidate, existing=existing, apart=self.number == APART, **chosen)
+
+    def fits(self, only: Filter, words: str) -> bool:
+        """True where a filter shows the row, and all of these words are in it."""
+        text = f"{self.component()} {self.name} {self.category} {self.supplier} {self.note()[0]}".casefold()
+        similar = bool(self.candidate.similar or self.candidate.twin or self.candidate.same_as)
+        shown = {
+            Filter.ALL: True,
+            Filter.UNSURE: not (self.candidate.wanted or self.checked or self.finished),
+            Filter.NEW: not similar and not self.finished,
+            Filter.DUPLICATES: similar,
+        }
+        return shown[only] and all(word in text for word in words.casefold().split())
 
     @property
     def guesses(self) -> bool:
@@ -218,19 +264,19 @@ class EditedRow:
 
     def choices(self) -> dict[str, str]:
         """What can be chosen as its number."""
-        found = {}
+        result = {}
         if self.candidate.same_as:
             same = translate("Silo", "same part: keep {number}")
-            found[SAME] = same.replace("{number}", self.candidate.same_as)
+            result[SAME] = same.replace("{number}", self.candidate.same_as)
         if not self.candidate.state.usable:
-            return found
+            return result
         new = translate("Silo", "new part: a new number")
-        found[NEW] = new if self.candidate.same_as else translate("Silo", "a new number")
+        result[NEW] = new if self.candidate.same_as else translate("Silo", "a new number")
         if self.candidate.article is not None and len(self.candidate.article.objects) > 1:
-            found[APART] = translate("Silo", "different parts: a number for each copy")
+            result[APART] = translate("Silo", "different parts: a number for each copy")
         for similar in self.candidate.similar:
-            found[similar.part_number] = f"{similar.part_number} {plain(similar.name, 60)}"
-        return found
+            result[similar.part_number] = f"{similar.part_number} {plain(similar.name, 60)}"
+        return result
 
     def note(self) -> tuple[str, Tone]:
         """The last column: what happened, what is in the way, or what to look at."""
@@ -243,9 +289,11 @@ class EditedRow:
             return translate("Silo", "registering…"), Tone.QUIET
         if not self.candidate.state.usable and not self.candidate.same_as:
             return state_words()[self.candidate.state], Tone.WARNING
-        told = [*self._suspicions(), *self._about_the_article(), state_words()[self.candidate.state]]
-        text = "; ".join(filter(None, told))
-        doubtful = bool(self._suspicions()) or self.candidate.state is State.ELSEWHERE
+        notes = [*self._suspicions(), *self._about_the_article(), state_words()[self.candidate.state]]
+        text = "; ".join(filter(None, notes))
+        if self.candidate.learnt and self.category == self.candidate.proposal.category:
+            text = "; ".join(filter(None, (translate("Silo", "as you chose in this folder before"), text)))
+        doubtful = bool(self._suspicions()) or self.candidate.state is ComponentState.ELSEWHERE
         return text, Tone.WARNING if doubtful else Tone.QUIET
 
     def _about_the_article(self) -> list[str]:
@@ -255,32 +303,32 @@ class EditedRow:
         if article.no_part:
             return [translate("Silo", "no part: nothing asks for it again")]
         if article.declared:
-            one, many = translate("Silo", "counts once"), translate("Silo", "counts {n} times")
+            text, many = translate("Silo", "counts once"), translate("Silo", "counts {n} times")
         else:
-            one = translate("Silo", "would count once; check it if it is a part")
+            text = translate("Silo", "would count once; check it if it is a part")
             many = translate("Silo", "would count {n} times; check it if it is a part")
-        told = [counted(article.entry.quantity, one, many)]
+        result = [counted(article.entry.quantity, text, many)]
         if article.source:
             source = translate("Silo", "imported from {file}").replace(
                 "{file}", os.path.basename(article.source)
             )
-            told.append(source)
+            result.append(source)
         if article.alike == "label":
-            told.append(translate("Silo", "equal by their labels only"))
-        return told
+            result.append(translate("Silo", "equal by their labels only"))
+        return result
 
     def _suspicions(self) -> list[str]:
-        told = []
+        suspicions = []
         if self.candidate.same_as:
             text = translate("Silo", "carries the identity of {number}, as another file does")
-            told.append(text.replace("{number}", self.candidate.same_as))
+            suspicions.append(text.replace("{number}", self.candidate.same_as))
         if self.candidate.foreign:
-            told.append(translate("Silo", "registered at another server: it keeps its identity"))
-        told += [_similar_words(similar) for similar in self.candidate.similar[:2]]
+            suspicions.append(translate("Silo", "registered at another server: it keeps its identity"))
+        suspicions += [_similar_words(similar) for similar in self.candidate.similar[:2]]
         if self.candidate.twin:
             text = translate("Silo", "the same content as {name}")
-            told.append(text.replace("{name}", plain(self.candidate.twin, 40)))
-        return told
+            suspicions.append(text.replace("{name}", plain(self.candidate.twin, 40)))
+        return suspicions
 
 
 def _similar_words(similar: Similar) -> str:
@@ -305,9 +353,57 @@ def choose(rows: Sequence[EditedRow], row: EditedRow, number: str) -> None:
     last = len(asked) == 1 and all(
         other.number != SAME for other in group(rows, row) if other is not asked[0]
     )
-    # "The same part" is said of all of them; once all others are new parts, the last one is the part itself.
+    # "The same part" holds for all of them; once all others are new parts, the last one is the part itself.
     for other in asked if number == SAME or last else ():
         other.number, other.checked = SAME, True
+
+
+def set_all(rows: Iterable[EditedRow], column: str, value: str, categories: Mapping[str, str]) -> None:
+    """Take over one value for all of these rows; what a person said of a row's category is no guess.
+
+    column
+        of :data:`silo.registering.orders.CHOSEN`. In a name ``{name}`` is the present name, ``{n}`` counts.
+    """
+    for number, row in enumerate((row for row in rows if row.editable), start=1):
+        if column == "name":
+            if not row.candidate.entry.is_standard:
+                row.name = value.replace("{name}", row.name).replace("{n}", str(number))
+        elif column == "item_type":
+            retype(row, value, categories)
+        else:
+            setattr(row, column, value)
+            if column.startswith("supplier") and value:
+                row.sourcing = "purchased"
+            row.checked = row.checked or (column == "category" and row.can_register)
+
+
+def grouped(candidates: Iterable[Candidate]) -> list[Candidate]:
+    """Components by folder, in the order of their first ones, the assembly's folder last; then the others."""
+    plain_ones = [candidate for candidate in candidates if _folder_of(candidate)]
+    folders = list(dict.fromkeys(_folder_of(candidate) for candidate in plain_ones))
+    if plain_ones:
+        folders.append(_folder_of(plain_ones[-1]))
+    order = {folder: number for number, folder in enumerate(folders)}
+    others = [candidate for candidate in candidates if not _folder_of(candidate)]
+    return [*sorted(plain_ones, key=lambda candidate: order[_folder_of(candidate)]), *others]
+
+
+def _folder_of(candidate: Candidate) -> str:
+    is_plain = candidate.article is None and not candidate.entry.is_standard
+    return os.path.dirname(candidate.entry.doc_path) if is_plain else ""
+
+
+def headings(rows: Sequence[EditedRow]) -> list[str]:
+    """The heading that each row stands under; components have that of their folder if there are several."""
+    folders = {_folder_of(row.candidate) for row in rows} - {""}
+    words = section_words()
+    base = os.path.dirname(os.path.commonpath(folders)) if folders else ""
+    return [
+        plain(os.path.relpath(folder, base), 120)
+        if (folder := _folder_of(row.candidate)) and len(folders) > 1
+        else words[row.section]
+        for row in rows
+    ]
 
 
 def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> None:
@@ -333,11 +429,11 @@ def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]
 
 def notices(offer: Offer) -> str:
     """About the whole offer: mistakes in the site's rules, and that nobody looked for look-alikes."""
-    told = [rules_text(getattr(offer.categories, "problem", ""), translate)]
+    value = [rules_text(getattr(offer.categories, "problem", ""), translate)]
     if offer.unsearched:
         text = translate("Silo", "Silo was not searched for parts that look alike: {problem}")
-        told.append(text.replace("{problem}", plain(offer.unsearched, 300)))
-    return "\n".join(filter(None, told))
+        value.append(text.replace("{problem}", plain(offer.unsearched, 300)))
+    return "\n".join(filter(None, value))
 
 
 def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
@@ -350,9 +446,9 @@ def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
     if not left:
         return translate("Silo", "All of these have their part number now.")
     copied = sum(1 for row in left if row.candidate.same_as)
-    told = [_unregistered(len(left) - copied)] if len(left) > copied else []
+    lines = [_unregistered(len(left) - copied)] if len(left) > copied else []
     if copied:
-        told.append(
+        lines.append(
             translate(
                 "Silo",
                 "Where files carry one identity, choose in the column Part number: the same part, or a "
@@ -360,12 +456,12 @@ def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
             )
         )
     if more > 0:
-        told.append(translate("Silo", "({n} more after these)").replace("{n}", str(more)))
-    return "\n".join(told)
+        lines.append(translate("Silo", "({n} more after these)").replace("{n}", str(more)))
+    return "\n".join(lines)
 
 
 def _unregistered(left: int) -> str:
-    one = translate(
+    text = translate(
         "Silo",
         "The following component has no Silo part number and will be excluded from the BOM until registered:",
     )
@@ -374,10 +470,10 @@ def _unregistered(left: int) -> str:
         "The following components have no Silo part number and will be excluded from the BOM until "
         "registered:",
     )
-    return counted(left, one, many)
+    return counted(left, text, many)
 
 
-class Window(Protocol):
+class RegisterWindow(Protocol):
     """An open dialog; :mod:`silo.workbench.register.dialog` is the real one."""
 
     def fill(self, offer: Offer, /) -> None: ...
@@ -389,6 +485,10 @@ class Window(Protocol):
     def registered(self, order: Order, result: Registration, /) -> None: ...
 
     def undeclared(self, row: EditedRow, /, *, no_part: bool) -> None: ...
+
+    def taken_back(self, order: Order, error: SiloError | None, /) -> None: ...
+
+    def show_pictures(self, pictures: Mapping[str, bytes], /) -> None: ...
 
     def stopped(self) -> None: ...
 
@@ -412,7 +512,9 @@ class RegisterFlow:
         self._session, self._preferences, self._commits = session, preferences, commits
         self._desk = desk
         self._journal = journal or Journal()
-        self._open: dict[str, Window] = {}
+        self._open: dict[str, RegisterWindow] = {}
+        # Path → what the last press of Register did there.
+        self._last: dict[str, list[tuple[Order, Registration]]] = {}
 
     def start(self, doc: Any) -> None:
         """Show the components of a document that have no number."""
@@ -430,8 +532,22 @@ class RegisterFlow:
         self._session.ask(
             translate("Silo", "Looking for components without a part number"),
             lambda client, control: offer(extraction, seen, client, schema, control, self._journal.pending()),
-            done=lambda found: self._with_dialog(taken.path, lambda dialog: dialog.fill(found)),
+            done=lambda new_offer: self._show_offer(taken.path, new_offer),
             failed=lambda error: self._with_dialog(taken.path, lambda dialog: dialog.fail(error)),
+        )
+
+    def _show_offer(self, path: str, new_offer: Offer) -> None:
+        self._with_dialog(path, lambda dialog: dialog.fill(new_offer))
+        files = {candidate.entry.doc_path for candidate in new_offer.candidates if candidate.entry.doc_path}
+
+        def show(pictures: Mapping[str, bytes]) -> None:
+            self._with_dialog(path, lambda dialog: dialog.show_pictures(pictures))
+
+        self._session.aside(
+            translate("Silo", "Reading pictures"),
+            lambda _control: {file: picture for file in files if (picture := picture_in(file))},
+            done=show,
+            failed=lambda _error: None,  # the rows stand without them
         )
 
     def _dialog(self, taken: Snapshot) -> None:
@@ -444,12 +560,13 @@ class RegisterFlow:
     def closed(self, path: str) -> None:
         """The dialog of this document is gone."""
         self._open.pop(path, None)
+        self._last.pop(path, None)
 
     def ask_again(self, on: bool) -> None:
         """Whether a person wants to be asked after each commit."""
         self._preferences.set("AskRegister", on)
 
-    def _with_dialog(self, path: str, call: Callable[[Window], None]) -> None:
+    def _with_dialog(self, path: str, call: Callable[[RegisterWindow], None]) -> None:
         if path in self._open:
             call(self._open[path])
 
@@ -464,7 +581,7 @@ class RegisterFlow:
         )
 
     def undeclare(self, path: str, row: EditedRow, *, no_part: bool = False) -> None:
-        """Take back what was said of what is modelled in the assembly's file; an item stays.
+        """Take back decisions about what is modelled in the assembly's file; an item stays.
 
         no_part
             a person says that it is no part, and the file keeps that.
@@ -495,13 +612,15 @@ class RegisterFlow:
         """Give these components their numbers, one after another."""
         schema = self._preferences.text("Schema")
         registered: list[Candidate] = []
+        last = self._last[path] = []
         clean = self._desk.unedited()
 
         def run(client: Any, control: Any) -> None:
             def tell(order: Order, result: Registration) -> None:
                 if result.error is None:
                     registered.append(order.candidate)
-                self._session.in_gui(lambda: self._done(path, order, result), control)
+                    last.append((order, result))
+                self._session.in_gui(lambda: self._show_registered(path, order, result), control)
 
             carry_out(
                 orders,
@@ -529,6 +648,48 @@ class RegisterFlow:
 
         self._session.ask(translate("Silo", "Registering"), run, done=finished, failed=failed)
 
+    def can_take_back(self, path: str) -> bool:
+        """True where the last press of Register did something that can be undone."""
+        return any(not order.candidate.entry.is_standard for order, _ in self._last.get(path, ()))
+
+    def take_back(self, path: str) -> None:
+        """Undo what the last press of Register did: new items are archived, and the files forget them."""
+        done = self._last.pop(path, [])
+        ids = {result.item_id for _, result in done}
+        clean = self._desk.unedited()
+        for entry in self._session.shown.waiting:  # not sent yet, and of an item that goes
+            if entry.identity in ids:
+                self._session.discard(entry.id)
+
+        def run(client: Any, control: Any) -> None:
+            def back(order: Order, error: SiloError | None) -> None:
+                def tell() -> None:
+                    self._with_dialog(path, lambda dialog: dialog.taken_back(order, error))
+
+                self._session.in_gui(tell, control)
+
+            take_back(
+                done,
+                client,
+                self._journal,
+                lambda candidate: self._session.in_gui(
+                    lambda: self._desk.restore_identity(candidate), control
+                ),
+                control=control,
+                back=back,
+            )
+
+        def finished(_result: Any = None) -> None:
+            self._with_dialog(path, lambda dialog: dialog.stopped())
+            top = self._desk.find(path)
+            self._save_parents(clean, lambda: self._commits.sync_only(top) if top is not None else None)
+
+        def failed(error: SiloError) -> None:
+            self._with_dialog(path, lambda dialog: dialog.tell(str(error)))
+            finished()
+
+        self._session.ask(translate("Silo", "Undoing"), run, done=finished, failed=failed)
+
     def _save_parents(self, clean: list[Any], then: Callable[[], None]) -> None:
         """Save the documents that FreeCAD marked because their parts were saved, one in a turn."""
         if not clean:
@@ -538,7 +699,7 @@ class RegisterFlow:
             self._desk.save_marked(clean[0])
         self._desk.later(lambda: self._save_parents(clean[1:], then))
 
-    def _done(self, path: str, order: Order, result: Registration) -> None:
+    def _show_registered(self, path: str, order: Order, result: Registration) -> None:
         self._with_dialog(path, lambda dialog: dialog.registered(order, result))
 
     def _send(self, path: str, registered: Sequence[Candidate]) -> None:

@@ -1,20 +1,30 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""*Open from Silo…* and *History*: two windows over :mod:`silo.workbench.revisions.flow`. Not modal."""
+"""*Open from Silo…*, *History* and *Project*: drawn from :mod:`silo.workbench.revisions.flow`. Not modal."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import SiloError
-from silo.workbench.commit.flow import more_text
+from silo.workbench.commit.flow import Choice, Theirs, choice_texts, more_text
+from silo.workbench.freecad import host
 from silo.workbench.gui import widgets
-from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets, run_dialog
 from silo.workbench.pane.activity import Tone
-from silo.workbench.revisions.flow import Known, RevisionFlow, left_alone
-from silo.workbench.words import plain, tip, translate
+from silo.workbench.revisions.flow import (
+    ItemHistory,
+    ProjectFlow,
+    ProjectRow,
+    ProjectView,
+    RevisionFlow,
+    file_in_project,
+    left_alone,
+    over_edits,
+)
+from silo.workbench.words import plain, tip, told_apart, translate
 
 if TYPE_CHECKING:
     from silo.api.wire import Item, Revision
@@ -49,12 +59,15 @@ def _revisions_table() -> Any:
     return widgets.tree("revisions", headings)
 
 
-def _fill_in(tree: Any, known: Known, *, newest: str = "") -> None:
+def _fill_in(tree: Any, history: ItemHistory, *, newest: str = "") -> None:
     """Show the revisions and choose the first row; ``newest``: the comment of one above them, number 0."""
-    rows = [(0, [translate("Silo", "newest"), "", "", newest], "")] if newest and known.revisions else []
-    rows += [(one.revision_number, revision_texts(one), one.comment) for one in known.revisions]
+    rows = [(0, [translate("Silo", "newest"), "", "", newest], "")] if newest and history.revisions else []
+    rows += [
+        (revision.revision_number, revision_texts(revision), revision.comment)
+        for revision in history.revisions
+    ]
     for number, texts, hint in rows:
-        if number == known.base:
+        if number == history.base:
             texts[0] += " ← " + translate("Silo", "yours")
         row = QtWidgets.QTreeWidgetItem(texts)
         row.setToolTip(3, tip(hint))
@@ -72,7 +85,6 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         super().__init__(parent)
         self._flow = flow
         self._closed = False
-        self._again: Callable[[], None] = lambda: None
         self._layout = widgets.lay_out(self, name, title, *size)
         self.finished.connect(self._end)
         self.news = widgets.label("", Tone.QUIET)
@@ -81,17 +93,14 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         self.more.setObjectName("more")
         self.more.hide()
 
-    def _finish(self, action: Any) -> None:
-        """The lower end of the window. Replacing edited files takes a press of its own."""
-        self.replace = widgets.button(
-            translate("Silo", "Replace edited files (copies are kept)"), "replace", lambda: self._again()
-        )
-        self.replace.hide()
-        action.setEnabled(False)
+    def _finish(self, *actions: Any) -> None:
+        """The lower end of the window."""
+        for action in actions:
+            action.setEnabled(False)
         close = widgets.button(translate("Silo", "Close"), "close", self.reject)
         self._layout.addWidget(self.news)
         self._layout.addWidget(self.more)
-        self._layout.addLayout(widgets.line(self.replace, None, action, close))
+        self._layout.addLayout(widgets.line(None, *actions, close))
 
     def _first(self, lines: Sequence[str], most: int) -> Sequence[str]:
         """The first lines; a button shows all of them."""
@@ -105,7 +114,7 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
 
     def _alive(self, call: Callable[[Any], None]) -> Callable[[Any], None]:
         """An answer that comes after the window was closed is nobody's."""
-        return lambda found: None if self._closed else call(found)
+        return lambda result: None if self._closed else call(result)
 
     def say(self, text: str, tone: Tone = Tone.QUIET) -> None:
         """The line of news."""
@@ -116,8 +125,8 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         """What went wrong."""
         self.say(str(error), Tone.ERROR)
 
-    def fetch(self, part_number: str, revision: int | None, folder: Path, *, overwrite: bool = False) -> None:
-        """Fetch into a folder, then open it; what was left alone is said, with the way to replace it."""
+    def fetch(self, part_number: str, revision: int | None, folder: Path) -> None:
+        """Fetch into a folder, then open it; report what was left alone, and ask about edits."""
         self.say(translate("Silo", "Fetching…"))
         self._first((), 0)
 
@@ -125,17 +134,13 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
             self._flow.open(str(pulled.top))
             if self._closed:
                 return
-            told = self._first(left_alone(pulled), MOST_NEWS)
-            self.say("\n".join(told) or translate("Silo", "Opened."), Tone.WARNING if told else Tone.QUIET)
-            self._offer(part_number, revision, folder, pulled)
+            news = self._first(left_alone(pulled), MOST_NEWS)
+            self.say("\n".join(news) or translate("Silo", "Opened."), Tone.WARNING if news else Tone.QUIET)
+            if edited := over_edits(pulled):
+                for theirs, choice in ask_choices(self, edited):
+                    self._flow.choose(theirs.path, theirs, choice)
 
-        self._flow.pull(
-            part_number, revision, folder, overwrite=overwrite, done=done, failed=self._alive(self.fail)
-        )
-
-    def _offer(self, part_number: str, revision: int | None, folder: Path, pulled: Pulled) -> None:
-        self.replace.setVisible(any(one.state.value == "edited" for one in pulled.files))
-        self._again = lambda: self.fetch(part_number, revision, folder, overwrite=True)
+        self._flow.pull(part_number, revision, folder, done=done, failed=self._alive(self.fail))
 
 
 class OpenDialog(_Window):
@@ -151,6 +156,12 @@ class OpenDialog(_Window):
         self._layout.addLayout(self._make_middle(), 1)
         self._layout.addLayout(self._make_folder(folder))
         self.open_button = widgets.button(translate("Silo", "Open"), "open", self._open)
+        self._item = ""
+        self._newest: Callable[[], None] = lambda: None
+        text = translate("Silo", "Fetch what is newer in Silo")
+        self.newest = widgets.link_button(text, lambda: self._newest())
+        self.newest.hide()
+        self._layout.addWidget(self.newest)
         self._finish(self.open_button)
         self._asked = 0
         self._typing = QtCore.QTimer(self)
@@ -185,33 +196,33 @@ class OpenDialog(_Window):
         return widgets.line(text, self.folder, widgets.button("…", "choose", self._choose_folder))
 
     def _choose_folder(self) -> None:
-        found = ask_folder(self, self.folder.text())
-        if found:
-            self.folder.setText(found)
+        folder = ask_folder(self, self.folder.text())
+        if folder:
+            self.folder.setText(folder)
 
     def _search(self) -> None:
         self._asked += 1
         mine = self._asked
         self.say(translate("Silo", "Loading…"))
 
-        def done(found: list[Item]) -> None:
+        def done(items: list[Item]) -> None:
             if mine == self._asked:  # what was typed meanwhile has its own answer
-                self._fill(found)
+                self._fill(items)
 
         self._flow.search(self.words.text().strip(), self._alive(done), self._alive(self.fail))
 
-    def _fill(self, found: Sequence[Item]) -> None:
+    def _fill(self, items: Sequence[Item]) -> None:
         chosen = self._number()
         self.items.clear()
-        for item in found:
+        for item in items:
             row = QtWidgets.QTreeWidgetItem([plain(item.part_number, 60), plain(item.name, 120)])
             row.setToolTip(1, tip(item.description))
             row.setData(0, _DATA, item.part_number)
             self.items.addTopLevelItem(row)
         self.items.resizeColumnToContents(0)
-        self.say("" if found else translate("Silo", "Nothing found."))
-        numbers = [item.part_number for item in found]
-        if found:  # what a person has chosen meanwhile stays chosen
+        self.say("" if items else translate("Silo", "Nothing found."))
+        numbers = [item.part_number for item in items]
+        if items:  # what a person has chosen meanwhile stays chosen
             place = numbers.index(chosen) if chosen in numbers else 0
             self.items.setCurrentItem(self.items.topLevelItem(place))
 
@@ -223,9 +234,9 @@ class OpenDialog(_Window):
         if not number:
             return
 
-        def done(known: Known) -> None:
+        def done(history: ItemHistory) -> None:
             if self._number() == number:
-                self._show(known)
+                self._show(history)
 
         self._flow.details(number, self._alive(done), self._alive(self.fail))
 
@@ -233,15 +244,23 @@ class OpenDialog(_Window):
         row = self.items.currentItem()
         return str(row.data(0, _DATA)) if row is not None else ""
 
-    def _show(self, known: Known) -> None:
-        _fill_in(self.revisions, known, newest=translate("Silo", "with the newest of all that it links to"))
+    def _offer_newest(self, folder: str, here: str) -> None:
+        """A press fetches what is newer, with all that it links to."""
+        number = self._number()
+        self.newest.setVisible(True)
+        self._newest = lambda: self.fetch(number, None, Path(folder).expanduser())
+
+    def _show(self, history: ItemHistory) -> None:
+        self._item = history.item.id
+        self.newest.hide()
+        _fill_in(self.revisions, history, newest=translate("Silo", "with the newest of all that it links to"))
         picture = QtGui.QPixmap()
-        if known.picture and picture.loadFromData(known.picture):
+        if history.picture and picture.loadFromData(history.picture):
             self.picture.setPixmap(picture.scaledToHeight(PICTURE))
             self.picture.show()
-        if not known.revisions:
+        if not history.revisions:
             self.say(translate("Silo", "It has no file in Silo."))
-        self.open_button.setEnabled(bool(known.revisions))
+        self.open_button.setEnabled(bool(history.revisions))
 
     def _open(self) -> None:
         row, folder = self.revisions.currentItem(), self.folder.text().strip()
@@ -249,6 +268,13 @@ class OpenDialog(_Window):
             return
         if not folder:
             self.say(translate("Silo", "Choose the project folder first."), Tone.WARNING)
+            return
+        here = "" if row.data(0, _DATA) else file_in_project(folder, self._item)
+        if here:
+            self._flow.open(here)
+            text = translate("Silo", "It lies in the project already, and is open: {path}")
+            self.say(text.replace("{path}", here))
+            self._offer_newest(folder, here)
             return
         self.fetch(self._number(), row.data(0, _DATA) or None, Path(folder).expanduser())
 
@@ -260,7 +286,7 @@ class HistoryDialog(_Window):
         title = translate("Silo", "History of {name}").replace("{name}", plain(os.path.basename(path), 80))
         super().__init__(flow, parent, "SiloHistory", title, (680, 460))
         self._path = path
-        self._known: Known | None = None
+        self._known: ItemHistory | None = None
         self.revisions = _revisions_table()
         self.revisions.currentItemChanged.connect(lambda _now, _before: self._chosen())
         self._layout.addWidget(self.revisions, 1)
@@ -269,16 +295,20 @@ class HistoryDialog(_Window):
         self._layout.addWidget(self.change)
         text = translate("Silo", "Get This Revision as a Copy…")
         self.get_button = widgets.button(text, "get", self._get)
-        self._finish(self.get_button)
+        tip = translate("Silo", "Show the revision as a ghost beside yours; once more removes it")
+        self.compare_button = widgets.button(
+            translate("Silo", "Compare in 3D"), "compare", self._compare, tip
+        )
+        self._finish(self.compare_button, self.get_button)
         self.say(translate("Silo", "Asking Silo…"))
 
-    def fill(self, known: Known) -> None:
+    def fill(self, history: ItemHistory) -> None:
         """Show the revisions."""
         if self._closed:
             return
-        self._known = known
-        self.say("" if known.revisions else translate("Silo", "It has no file in Silo."))
-        _fill_in(self.revisions, known)
+        self._known = history
+        self.say("" if history.revisions else translate("Silo", "It has no file in Silo."))
+        _fill_in(self.revisions, history)
 
     def _number(self) -> int:
         row = self.revisions.currentItem()
@@ -287,18 +317,19 @@ class HistoryDialog(_Window):
     def _chosen(self) -> None:
         number = self._number()
         self.get_button.setEnabled(bool(number))
+        self.compare_button.setEnabled(bool(number))
         if self._known is None or not number:
             return
-        numbers = [one.revision_number for one in self._known.revisions]
-        older = next((one for one in numbers if one < number), None)
+        numbers = [revision.revision_number for revision in self._known.revisions]
+        older = next((each_number for each_number in numbers if each_number < number), None)
         self.change.setText(translate("Silo", "Comparing…"))
         self._first((), 0)
 
         def done(lines: list[str]) -> None:
             if self._number() == number:
                 text = plain(", ".join(self._first(lines, MOST_CHANGES)), 1000)
-                told = translate("Silo", "BOM: {changes}").replace("{changes}", text)
-                self.change.setText(told if text else translate("Silo", "No change of the BOM."))
+                sentence = translate("Silo", "BOM: {changes}").replace("{changes}", text)
+                self.change.setText(sentence if text else translate("Silo", "No change of the BOM."))
 
         def failed(error: SiloError) -> None:
             self.change.setText(str(error))
@@ -308,6 +339,12 @@ class HistoryDialog(_Window):
             item.part_number, self._path, older, number, self._alive(done), self._alive(failed)
         )
 
+    def _compare(self) -> None:
+        if self._known is not None:
+            failed = self._alive(lambda error: self.say(str(error), Tone.ERROR))
+            number = self._known.item.part_number
+            self._flow.compare(self._path, number, self._number(), self._alive(self.say), failed)
+
     def _get(self) -> None:
         if self._known is None:
             return
@@ -316,6 +353,167 @@ class HistoryDialog(_Window):
         if folder:
             name = f"{plain(item.part_number, 60).replace('/', '_')}-r{number}"
             self.fetch(item.part_number, number, Path(folder) / name)
+
+
+def ask_choices(parent: Any, files: Sequence[Theirs]) -> list[tuple[Theirs, Choice]]:
+    """Ask what to do about new versions over local edits; nothing is done to a file without an answer."""
+    window = QtWidgets.QDialog(parent)
+    layout = widgets.lay_out(
+        window, "SiloChoices", translate("Silo", "Edited here, and newer in Silo"), 620, 260, modal=True
+    )
+    tree = widgets.tree(
+        "files", (translate("Silo", "File"), translate("Silo", "In Silo"), translate("Silo", "What to do"))
+    )
+    boxes = []
+    for theirs in files:
+        item = QtWidgets.QTreeWidgetItem([plain(os.path.basename(theirs.path), 80), theirs.headline])
+        item.setToolTip(0, tip(theirs.path))
+        tree.addTopLevelItem(item)
+        boxes.append(
+            widgets.choice_box(None, {choice.value: text for choice, text in choice_texts().items()})
+        )
+        tree.setItemWidget(item, 2, boxes[-1])
+    for column in range(2):
+        tree.resizeColumnToContents(column)
+    layout.addWidget(tree)
+    layout.addLayout(
+        widgets.line(None, widgets.button(translate("Silo", "Do It"), "do", window.accept, default=True))
+    )
+    done = run_dialog(window)
+    chosen = [Choice(box.currentData()) for box in boxes]
+    window.deleteLater()
+    pairs = zip(files, chosen, strict=True)
+    return [(theirs, choice) for theirs, choice in pairs if done and choice is not Choice.LEAVE]
+
+
+class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no types
+    """All files of the project folder, with how they stand to Silo."""
+
+    def __init__(self, flow: ProjectFlow) -> None:
+        super().__init__()
+        self._flow = flow
+        layout = QtWidgets.QVBoxLayout(self)
+        self.root = widgets.choice_box(None, {}, name="root")
+        self.root.activated.connect(lambda _number: self._choose(str(self.root.currentData() or "")))
+        self.root.setSizePolicy(QtWidgets.QSizePolicy.Policy.Ignored, QtWidgets.QSizePolicy.Policy.Preferred)
+        browse = widgets.button("…", "choose", self._browse, translate("Silo", "Choose the project's folder"))
+        refresh = widgets.button(translate("Silo", "Refresh"), "refresh", self.refresh)
+        line = widgets.line(self.root, browse, refresh)
+        line.setStretch(0, 1)
+        layout.addLayout(line)
+        self.words = QtWidgets.QLineEdit()
+        self.words.setObjectName("words")
+        self.words.setPlaceholderText(translate("Silo", "Search"))
+        self.words.setClearButtonEnabled(True)
+        self.words.textChanged.connect(lambda _text: self._draw())
+        self.only_left = QtWidgets.QCheckBox(translate("Silo", "Not in Silo as here"))
+        self.only_left.toggled.connect(lambda _on: self._draw())
+        layout.addLayout(widgets.line(self.words, self.only_left))
+        self.news = widgets.label("", Tone.QUIET)
+        layout.addWidget(self.news)
+        self.files = widgets.tree("files", (translate("Silo", "File"), translate("Silo", "State")))
+        self.files.itemDoubleClicked.connect(lambda _item, _column: self._open())
+        self.files.currentItemChanged.connect(lambda _now, _before: self._enable())
+        layout.addWidget(self.files, 1)
+        self.comment = QtWidgets.QLineEdit()
+        self.comment.setObjectName("comment")
+        self.comment.setPlaceholderText(translate("Silo", "Comment"))
+        self.decide_button = widgets.button(translate("Silo", "Decide…"), "decide", self._decide)
+        self.commit = widgets.button(translate("Silo", "Commit All"), "commit", self._commit)
+        layout.addWidget(self.comment)
+        layout.addLayout(widgets.line(self.decide_button, None, self.commit))
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Look at the folder and at Silo again."""
+        roots = self._flow.roots()
+        if self._flow.view.root:
+            roots = list(dict.fromkeys((self._flow.view.root, *roots)))
+        widgets.fill_choices(self.root, told_apart(roots))
+        self.root.setToolTip(tip(roots[0]) if roots else "")
+        self._draw()
+        if roots:
+            self.news.setText(translate("Silo", "Looking at the files…"))
+            self._flow.look(roots[0], lambda _view: self._draw(), self._fail)
+        else:
+            text = translate("Silo", "Choose the project's folder: it is remembered, and marked for others.")
+            self.news.setText(text)
+
+    def _fail(self, error: SiloError) -> None:
+        self.news.setText(str(error))
+        widgets.paint(self.news, Tone.ERROR)
+
+    def _choose(self, root: str) -> None:
+        if root:
+            self._flow.choose(root)
+            self._flow.view = ProjectView()
+            self.refresh()
+
+    def _browse(self) -> None:
+        self._choose(ask_folder(self, str(self.root.currentData() or "")))
+
+    def _draw(self) -> None:
+        view, chosen = self._flow.view, self._row()
+        self.files.clear()
+        for row in view.shown(self.words.text(), only_left=self.only_left.isChecked()):
+            item = QtWidgets.QTreeWidgetItem([row.place, row.words()])
+            item.setToolTip(1, tip(row.words()))
+            item.setForeground(1, widgets.brush(row.tone, self.files))
+            item.setData(0, _DATA, row)
+            self.files.addTopLevelItem(item)
+            if chosen is not None and chosen.place == row.place:
+                self.files.setCurrentItem(item)
+        self.files.resizeColumnToContents(0)
+        if view.root:
+            self.news.setText("\n".join((view.heading(), *view.notes[:MOST_NEWS])))
+            self.news.setToolTip(tip("; ".join(view.notes)))
+            widgets.paint(self.news, Tone.WARNING if view.notes else Tone.QUIET)
+        mark_in_tree({row.path: (row.words(), row.tone) for row in view.rows})
+        self._enable()
+
+    def _row(self) -> ProjectRow | None:
+        item = self.files.currentItem()
+        return item.data(0, _DATA) if item is not None else None
+
+    def _enable(self) -> None:
+        row, view = self._row(), self._flow.view
+        self.decide_button.setEnabled(row is not None and row.theirs is not None)
+        self.commit.setEnabled(
+            any(not project_row.is_fine and project_row.theirs is None for project_row in view.rows)
+        )
+
+    def _open(self) -> None:
+        if (row := self._row()) is not None:
+            self._flow.open(row)
+
+    def _decide(self) -> None:
+        row = self._row()
+        if row is not None and row.theirs is not None:
+            for _, choice in ask_choices(self, [row.theirs]):
+                self._flow.decide(row, choice)
+
+    def _commit(self) -> None:
+        self._flow.commit_all(self.comment.text().strip())
+        self.comment.clear()
+
+
+def mark_in_tree(states: Mapping[str, tuple[str, Tone]]) -> None:
+    """Show how files stand at their documents in FreeCAD's tree: colour and tool tip of the entry alone, so
+    that no document changes."""
+    documents = host.documents_by_path()
+    open_now = {str(doc.Label) for doc in documents.values()}
+    labels = {str(doc.Label): states[path] for path, doc in documents.items() if path in states}
+    for tree in host.main_window().findChildren(QtWidgets.QTreeWidget):
+        if tree.metaObject().className() != "Gui::TreeWidget":
+            continue
+        items = [tree.topLevelItem(number) for number in range(tree.topLevelItemCount())]
+        if not {item.text(0) for item in items} & open_now:  # below an entry for the application
+            items = [item.child(number) for item in items for number in range(item.childCount())]
+        for item in items:
+            words, tone = labels.get(item.text(0), ("", Tone.PLAIN))
+            if words:
+                item.setToolTip(0, tip(translate("Silo", "Silo: {state}").replace("{state}", words)))
+                item.setForeground(0, widgets.brush(tone, tree))
 
 
 def ask_folder(parent: Any, start: str) -> str:

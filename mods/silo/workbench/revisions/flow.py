@@ -3,6 +3,9 @@
 
 Nothing of the user's is replaced without their word, and a copy of what is replaced is kept. Downloads and
 reading are a worker's; opening and closing documents is done in the GUI thread.
+
+The project view: all files of a project folder, each with how it stands to Silo. The folder is the one that
+the person chose, or a marked one above an open document; it is never guessed.
 """
 
 from __future__ import annotations
@@ -11,31 +14,38 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from silo.bom.errors import DocumentError, SiloError
+from silo.bom.errors import DocumentError, InputError, SiloError
+from silo.files import PROJECT_FILE, Project
 from silo.outbox.store import KEPT_ASIDE_DAYS
-from silo.platform import cache_folder
-from silo.workbench.commit.flow import Choice, Desk, Theirs
+from silo.platform import cache_folder, one_path
+from silo.workbench.commit.flow import Choice, CommitFlow, Desk, Theirs, theirs_of
 from silo.workbench.commit.opened import Base
-from silo.workbench.pane.activity import Entry, Line, Tone
+from silo.workbench.commit.plan import MOST_S
+from silo.workbench.pane.activity import Line, PaneEntry, Tone
 from silo.workbench.session.session import Session
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.wire import Item, Revision
+    from silo.inertia.geometry.together import Floats, Mesh
+    from silo.outbox.store import Store
+    from silo.vault.project import ProjectState as StandState
     from silo.vault.pull import Pulled
-    from silo.workbench.session.jobs import Control
+    from silo.workbench.session import Control
+    from silo.workbench.settings import Preferences
 
 MOST_FOUND = 60
 
 
 @dataclass(frozen=True)
-class Known:
+class ItemHistory:
     """An item with its revisions that have a file, newest first, and its picture (PNG).
 
     base
@@ -46,6 +56,62 @@ class Known:
     revisions: tuple[Revision, ...]
     picture: bytes = b""
     base: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """An occurrence in another revision: its path, (4, 4) to the axes of the top, its triangles there [m]."""
+
+    path: tuple[str, ...]
+    matrix: Floats
+    mesh: Mesh
+
+
+@dataclass(frozen=True)
+class Differences:
+    """How many are only in the other revision, stand elsewhere there, are only here, cannot be compared."""
+
+    removed: int
+    moved: int
+    added: int
+    unknown: int
+
+
+def ghosts(client: SiloClient, part_number: str, revision: int, control: Control) -> list[Ghost]:
+    """Fetch what a revision shows. For a worker."""
+    import numpy as np
+
+    from silo.drawing import products
+
+    scene = client.get_scene(part_number, revision)
+    result: list[Ghost] = []
+    meshes: dict[int, dict[str, Mesh]] = {}
+    for occurrence in scene.occurrences:
+        control.check()
+        if occurrence.geometry is None:
+            continue
+        if occurrence.geometry not in meshes:
+            meshes[occurrence.geometry] = products(
+                client.get_geometry(scene.geometries[occurrence.geometry].id)
+            )
+        if (mesh := meshes[occurrence.geometry].get(occurrence.key)) is not None:
+            matrix = np.array(occurrence.matrix).reshape(4, 4).T
+            result.append(Ghost(tuple(occurrence.path), matrix, mesh.moved(matrix)))
+    return result
+
+
+def _in_words(differences: Differences | None, revision: int) -> str:
+    if differences is None:
+        return translate("Silo", "The ghost is removed.")
+    text = translate(
+        "Silo", "Ghost: {removed} only in revision {n}, {moved} elsewhere there. Only here: {added}."
+    )
+    if differences.unknown:
+        text += " " + translate("Silo", "Not compared: {unknown} in groups and arrays without links.")
+    values = (differences.removed, differences.moved, differences.added, differences.unknown, revision)
+    for name, value in zip(("removed", "moved", "added", "unknown", "n"), values, strict=True):
+        text = text.replace(f"{{{name}}}", str(value))
+    return text
 
 
 class RevisionFlow:
@@ -76,6 +142,12 @@ class RevisionFlow:
             target = _aside("on-disk", os.path.basename(path))
             self._guarded(path, lambda: self._open_copy(path, target))
             return
+        from silo.api.files import DocumentId
+
+        if isinstance(theirs.part_number, DocumentId):  # of no item: nothing says what it links to
+            target = _aside(f"{theirs.part_number}-r{theirs.revision}", os.path.basename(path))
+            self._fetch(path, theirs, target, lambda: self._desk.open(str(target)))
+            return
         folder = _aside(f"{_word(theirs.part_number)}-r{theirs.revision}")
         self.pull(
             theirs.part_number,
@@ -84,6 +156,34 @@ class RevisionFlow:
             overwrite=True,
             done=lambda pulled: self._guarded(path, lambda: self._desk.open(str(pulled.top))),
             failed=lambda error: self._box_error(path, error),
+        )
+
+    def compare(
+        self,
+        path: str,
+        part_number: str,
+        revision: int,
+        report: Callable[[str], object],
+        failed: Callable[[SiloError], None],
+    ) -> None:
+        """Show another revision as a ghost beside the open document, and say what differs; or remove it."""
+
+        def done(theirs: list[Ghost]) -> None:
+            if not theirs:
+                text = translate("Silo", "Silo has no model of revision {n} yet.")
+                report(text.replace("{n}", str(revision)))
+                return
+            try:
+                report(_in_words(self._desk.compare(path, revision, theirs), revision))
+            except SiloError as error:
+                failed(error)
+
+        title = translate("Silo", "Fetching from Silo")
+        self._session.ask(
+            title,
+            lambda client, control: ghosts(client, part_number, revision, control),
+            done=done,
+            failed=failed,
         )
 
     def _open_copy(self, path: str, target: Path) -> None:
@@ -100,6 +200,10 @@ class RevisionFlow:
             self._guarded(path, lambda: put(None))
             return
         content = self._session.outbox.path.parent / "fetched" / f"{time.monotonic_ns()}.FCStd"
+        self._fetch(path, theirs, content, lambda: put(content))
+
+    def _fetch(self, path: str, theirs: Theirs, content: Path, then: Callable[[], object]) -> None:
+        """Fetch their file alone."""
 
         def fetch(client: SiloClient, control: Control) -> None:
             content.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -112,7 +216,7 @@ class RevisionFlow:
         self._session.ask(
             translate("Silo", "Fetching from Silo"),
             fetch,
-            done=lambda _none: self._guarded(path, lambda: put(content)),
+            done=lambda _none: self._guarded(path, then),
             failed=lambda error: self._box_error(path, error),
         )
 
@@ -141,11 +245,15 @@ class RevisionFlow:
         if doc is not None:
             self._desk.close(doc)
         self._desk.open(path)
-        told = translate("Silo", "Yours is kept for {n} days at {path}")
-        text = told.replace("{n}", str(KEPT_ASIDE_DAYS)).replace("{path}", ", ".join(kept)) if kept else ""
+        sentence = translate("Silo", "Yours is kept for {n} days at {path}")
+        text = (
+            sentence.replace("{n}", str(KEPT_ASIDE_DAYS)).replace("{path}", ", ".join(kept)) if kept else ""
+        )
         if lost := _not_here(path):
-            told = translate("Silo", "It links to {names}, not in this folder: Open from Silo… fetches them.")
-            text = " ".join(filter(None, (told.replace("{names}", plain(", ".join(lost), 200)), text)))
+            sentence = translate(
+                "Silo", "It links to {names}, not in this folder: Open from Silo… fetches them."
+            )
+            text = " ".join(filter(None, (sentence.replace("{names}", plain(", ".join(lost), 200)), text)))
         title = translate("Silo", "Took {who}'s revision {n}: {name}") if theirs.revision else ""
         title = title or translate("Silo", "Took the file on disk: {name}")
         for key, value in (("{who}", theirs.who), ("{n}", str(theirs.revision)), ("{name}", _name(path))):
@@ -169,7 +277,7 @@ class RevisionFlow:
         )
 
     def _box(self, path: str, title: str, text: str, tone: Tone = Tone.PLAIN) -> None:
-        entry = Entry(
+        entry = PaneEntry(
             key=f"fetched:{path}:{time.time()}",
             title=title,
             when=time.time(),
@@ -188,10 +296,10 @@ class RevisionFlow:
         """Items whose number, name or description have all these words."""
         url = self._session.shown.server.url
 
-        def told(found: list[Item]) -> None:
+        def told(items: list[Item]) -> None:
             if not words:
-                self._recent = url, found
-            done(found)
+                self._recent = url, items
+            done(items)
 
         self._session.ask(
             translate("Silo", "Searching"),
@@ -203,16 +311,16 @@ class RevisionFlow:
     @property
     def recent(self) -> list[Item]:
         """What the server in use showed last without any words."""
-        url, found = self._recent
-        return found if url == self._session.shown.server.url else []
+        url, items = self._recent
+        return items if url == self._session.shown.server.url else []
 
     def details(
-        self, part_number: str, done: Callable[[Known], None], failed: Callable[[SiloError], None]
+        self, part_number: str, done: Callable[[ItemHistory], None], failed: Callable[[SiloError], None]
     ) -> None:
         """An item's revisions and picture."""
         self._session.ask(
             translate("Silo", "Asking Silo"),
-            lambda client, _control: _known(client, part_number),
+            lambda client, _control: _history_of(client, part_number),
             done,
             failed,
         )
@@ -262,7 +370,11 @@ class RevisionFlow:
     # -- the history of a document ----------------------------------------------------------------------
 
     def history(
-        self, identity: str, base: Base, done: Callable[[Known], None], failed: Callable[[SiloError], None]
+        self,
+        identity: str,
+        base: Base,
+        done: Callable[[ItemHistory], None],
+        failed: Callable[[SiloError], None],
     ) -> None:
         """The revisions of a document's item.
 
@@ -271,18 +383,18 @@ class RevisionFlow:
         """
         outbox = self._session.outbox
 
-        def run(client: SiloClient, _control: Control) -> Known:
+        def run(client: SiloClient, _control: Control) -> ItemHistory:
             from silo.api.files import standing
             from silo.bom.errors import NotFoundError
 
             item = client.get_item_by_uuid(identity)
             if item is None:
                 raise NotFoundError(translate("Silo", "This server does not know the item of this document."))
-            known = _known(client, item.part_number)
+            item_history = _history_of(client, item.part_number)
             origin = base.settle(outbox)
             number = outbox.known_revision(client.base_url, origin, identity)
-            made_from = standing(known.revisions, origin, number).base
-            return replace(known, base=made_from.revision_number if made_from is not None else None)
+            made_from = standing(item_history.revisions, origin, number).base
+            return replace(item_history, base=made_from.revision_number if made_from is not None else None)
 
         self._session.ask(translate("Silo", "Asking Silo"), run, done, failed)
 
@@ -306,41 +418,250 @@ class RevisionFlow:
         self._session.ask(translate("Silo", "Comparing revisions"), run, done, failed)
 
 
-def _known(client: SiloClient, part_number: str) -> Known:
+@dataclass(frozen=True)
+class ProjectRow:
+    """A file of the project.
+
+    edits
+        FreeCAD has it open, with edits that are not in the file.
+    theirs
+        the newest revision in Silo, if it is newer than what the file was made from.
+    """
+
+    place: str
+    path: str
+    state: StandState
+    moved_from: str = ""
+    edits: bool = False
+    theirs: Theirs | None = None
+
+    @property
+    def is_fine(self) -> bool:
+        """True where Silo has it as it is here."""
+        return self.state.name == "SAME" and not self.edits
+
+    @property
+    def tone(self) -> Tone:
+        """How its state is meant."""
+        if self.is_fine:
+            return Tone.GOOD
+        return Tone.WARNING if self.state.name in ("BOTH", "NO_ITEM") else Tone.CHANGED
+
+    def words(self) -> str:
+        """Its state for people."""
+        texts = {
+            "SAME": translate("Silo", "in Silo"),
+            "NEW": translate("Silo", "not in Silo"),
+            "EDITED": translate("Silo", "edited since its commit"),
+            "NEWER": translate("Silo", "newer in Silo"),
+            "BOTH": translate("Silo", "edited, and newer in Silo"),
+            "WAITING": translate("Silo", "waits to be sent"),
+            "NO_ITEM": translate("Silo", "its item is not on this server"),
+        }
+        row_words = [texts[self.state.name]]
+        if self.edits:
+            row_words.append(translate("Silo", "unsaved edits"))
+        if self.moved_from:
+            row_words.append(translate("Silo", "was {place}").replace("{place}", self.moved_from))
+        if self.theirs is not None:
+            row_words.append(self.theirs.headline)
+        return plain("; ".join(row_words), 300)
+
+
+@dataclass(frozen=True)
+class ProjectView:
+    """All files of a project, and what is wrong beside them, in sentences."""
+
+    root: str = ""
+    rows: tuple[ProjectRow, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def shown(self, words: str, *, only_left: bool) -> list[ProjectRow]:
+        """The rows with all of these words; ``only_left``: those that Silo has not as they are here."""
+        wanted = words.casefold().split()
+        return [
+            row
+            for row in self.rows
+            if not (only_left and row.is_fine)
+            and all(word in f"{row.place} {row.words()}".casefold() for word in wanted)
+        ]
+
+    def heading(self) -> str:
+        """How many files there are, and how many of them Silo does not have as they are here."""
+        text = translate("Silo", "{n} files, {left} of them not in Silo as they are here")
+        left = sum(not row.is_fine for row in self.rows)
+        return text.replace("{n}", str(len(self.rows))).replace("{left}", str(left))
+
+
+class ProjectFlow:
+    """One per FreeCAD: the project folder, how its files stand, and *Commit All*."""
+
+    def __init__(
+        self, session: Session, preferences: Preferences, commits: CommitFlow, desk: Desk, files: RevisionFlow
+    ) -> None:
+        self._session, self._preferences, self._commits = session, preferences, commits
+        self._desk, self._files = desk, files
+        self.view = ProjectView()
+
+    def roots(self) -> list[str]:
+        """The project that was shown last, and those of the open documents."""
+        folders = {os.path.dirname(path) for path in self._desk.open_paths()}
+        project_roots = {project.root for folder in folders if (project := Project.of(folder)) is not None}
+        last = self._preferences.text("ProjectFolder")
+        roots_before = [last] if last and os.path.isdir(last) else []
+        return [*roots_before, *sorted(project_roots - {last})]
+
+    def choose(self, root: str) -> None:
+        """Remember the folder: here, and by the mark in it, which everybody who shares it finds."""
+        self._preferences.set("ProjectFolder", one_path(root))
+
+    def look(
+        self, root: str, done: Callable[[ProjectView], None], failed: Callable[[SiloError], None]
+    ) -> None:
+        """Find out how the files of a project stand; without a connection, as far as the folder remembers."""
+        edited = self._edited()
+
+        def work(client: SiloClient | None) -> ProjectView:
+            return _project_view(root, client, self._session.outbox, edited)
+
+        def told(view: ProjectView) -> None:
+            self.view = view
+            done(view)
+
+        def offline(error: SiloError) -> None:
+            if isinstance(error, (DocumentError, InputError)):
+                failed(error)
+                return
+            self._session.aside(title, lambda _control: work(None), told, failed)
+
+        title = translate("Silo", "Looking at the project")
+        self._session.ask(title, lambda client, _control: work(client), told, offline)
+
+    def _edited(self) -> set[str]:
+        """The open files with edits; what FreeCAD only marked has none, as far as time allows to compare."""
+        documents, until = self._desk.documents, time.thread_time() + MOST_S
+        edited_documents = ((one_path(path), self._desk.find(path)) for path in self._desk.open_paths())
+        return {
+            path
+            for path, doc in edited_documents
+            if doc is not None and documents.is_modified(doc) and documents.is_edited(doc, until)
+        }
+
+    def commit_all(self, comment: str) -> None:
+        """Save what is edited, and send all files that Silo does not have as they are here."""
+        paths = {row.path for row in self.view.rows}
+        self._commits.commit_folder(self.view.root, paths & self._edited(), comment)
+
+    def decide(self, row: ProjectRow, choice: Choice) -> None:
+        """Do what a person chose about a file that is newer in Silo."""
+        if choice is Choice.ON_TOP:
+            if row.edits:
+                self._commits.commit_folder(self.view.root, (row.path,), "")
+            self._commits.send_linked(row.path, set(), "", over=(row.path,))
+        elif row.theirs is not None:
+            self._files.choose(row.path, row.theirs, choice)
+
+    def open(self, row: ProjectRow) -> None:
+        """Open a file of the project."""
+        self._files.open(row.path)
+
+
+def _project_view(root: str, client: SiloClient | None, store: Store, edited: Set[str]) -> ProjectView:
+    from silo.vault.project import ProjectState as StandState
+    from silo.vault.project import address_of, stand
+
+    project = Project(one_path(root))
+    if not os.path.isfile(project.path(PROJECT_FILE)):
+        with suppress(DocumentError):  # a folder that takes nothing can be looked at
+            project.note({})
+    belonging, standings = stand([project.root], project, client, store)
+    rows = []
+    for standing in standings:
+        theirs, file = None, standing.file
+        if (
+            standing.state in (StandState.NEWER, StandState.BOTH)
+            and standing.newest is not None
+            and client is not None
+        ):
+            newest = standing.newest.model_dump(mode="json", exclude={"properties", "links"})
+            theirs = theirs_of(file.path, address_of(file, client), newest)
+        rows.append(
+            ProjectRow(file.place, file.path, standing.state, file.moved_from, file.path in edited, theirs)
+        )
+    sentences = {
+        translate("Silo", "{place} links to {name}, which is not there."): belonging.missing,
+        translate("Silo", "{place} links to {name}, outside the project: it is not sent."): belonging.outside,
+        translate("Silo", "{place} cannot be read: {name}"): belonging.unreadable,
+        translate("Silo", "{place} is a copy of {name}, which has the item."): belonging.doubtful,
+        translate("Silo", "{place} is gone since its commit."): [(place, "") for place in belonging.gone],
+    }
+    notes = [
+        plain(text.replace("{place}", place).replace("{name}", name), 300)
+        for text, pairs in sentences.items()
+        for place, name in pairs
+    ]
+    return ProjectView(project.root, tuple(sorted(rows, key=lambda row: row.place)), tuple(notes))
+
+
+def file_in_project(folder: str, item: str) -> str:
+    """The file of an item that lies in a project already; "" where there is none."""
+    if (project := Project.of(folder)) is None:
+        return ""
+    items = project.files().items()
+    paths = [project.path(place) for place, kept in items if kept.document.lower() == item.lower()]
+    return next(filter(os.path.isfile, paths), "")
+
+
+def _history_of(client: SiloClient, part_number: str) -> ItemHistory:
     from silo.vault.pull import file_revisions
 
     item = client.get_item(part_number)
-    found = file_revisions(client.revisions(part_number))
-    return Known(item, tuple(found), client.thumbnail(part_number) or b"")
+    revisions = file_revisions(client.revisions(part_number))
+    return ItemHistory(item, tuple(revisions), client.thumbnail(part_number) or b"")
+
+
+def over_edits(pulled: Pulled) -> list[Theirs]:
+    """The new versions of files that have edits which are not in Silo."""
+    return [
+        Theirs(str(file.path), file.part_number, file.revision, newer={"revision_number": file.revision})
+        for file in pulled.files
+        if file.state.value == "edited"
+    ]
 
 
 def left_alone(pulled: Pulled) -> Sequence[str]:
     """What a pull did not do, in sentences."""
-    from silo.vault.pull import State
+    from silo.vault.pull import PullState
 
     texts = {
-        State.EDITED: translate("Silo", "{name} has edits that are not in Silo; it was left alone."),
-        State.OPEN: translate("Silo", "{name} is open in FreeCAD; it was left alone."),
+        PullState.EDITED: translate("Silo", "{name} has edits that are not in Silo; it was left alone."),
+        PullState.OPEN: translate("Silo", "{name} is open in FreeCAD; it was left alone."),
     }
-    told = [texts[one.state].replace("{name}", one.path.name) for one in pulled.files if one.state in texts]
+    result = [
+        texts[file.state].replace("{name}", file.path.name) for file in pulled.files if file.state in texts
+    ]
     lost = translate("Silo", "{path}, which {name} links to, was not fetched: {reason}")
-    for one in pulled.lost:
-        text = lost.replace("{path}", one.path or "?").replace("{name}", one.position)
-        told.append(plain(text.replace("{reason}", one.reason), 300))
-    return told
+    for link in pulled.lost:
+        text = lost.replace("{path}", link.path or "?").replace("{name}", link.position)
+        result.append(plain(text.replace("{reason}", link.reason), 300))
+    return result
 
 
 def _not_here(path: str) -> list[str]:
     """The files that a file links to and that are not there."""
     from silo.fcstd.linked import recorded_paths
-    from silo.fcstd.locate import Found, Locator
+    from silo.files import FoundFile, Locator
 
     locator, folder = Locator(), (os.path.dirname(path),)
     try:
         recorded = recorded_paths(path)
     except DocumentError:
         return []  # FreeCAD says what it cannot read
-    return [os.path.basename(one) for one in recorded if not isinstance(locator.find(one, folder), Found)]
+    return [
+        os.path.basename(each_path)
+        for each_path in recorded
+        if not isinstance(locator.find(each_path, folder), FoundFile)
+    ]
 
 
 def _aside(*names: str) -> Path:

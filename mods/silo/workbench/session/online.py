@@ -12,18 +12,17 @@ from typing import Any
 
 from silo.api.client import SiloClient
 from silo.api.config import Pause, resolve_server
-from silo.api.events import RESET, Connection, ConnectionState, EventListener, ServerEvent
+from silo.api.events import RESET, Connection, ConnectionState, EventListener, Pauses, ServerEvent
 from silo.bom.errors import ConfigError, InputError
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.send import Report, Sent, send_all
 from silo.outbox.store import Store
 from silo.platform import read_memory, write_memory
 from silo.workbench.pane import entries
-from silo.workbench.pane.activity import Entry
-from silo.workbench.session.gui_thread_gc import collection_off
-from silo.workbench.session.jobs import Control
+from silo.workbench.pane.activity import PaneEntry
+from silo.workbench.session import Control, collection_off
 from silo.workbench.session.session import Newer
-from silo.workbench.settings.server import Known, Server, TokenStore, choose_server
+from silo.workbench.settings.server import Server, ServerPreferences, TokenStore, choose_server
 from silo.workbench.words import translate
 
 
@@ -41,7 +40,7 @@ class Online:
         self,
         outbox: Store,
         *,
-        entry: Callable[[Entry], None],
+        entry: Callable[[PaneEntry], None],
         sent: Callable[[Sent], None],
         state: Callable[[str, str], None],
         newer: Callable[[str, Newer | None], None] = lambda _identity, _newer: None,
@@ -70,6 +69,11 @@ class Online:
         """The server in use; "" where none is configured."""
         return self._client.base_url if self._client is not None else ""
 
+    def another(self) -> SiloClient:
+        """Return one more client of the server, for another thread, which closes it."""
+        client: SiloClient = self._make_client(self._server)
+        return client
+
     def send(self, control: Control, *, force: bool) -> Report:
         """Send what waits for this server."""
 
@@ -86,19 +90,19 @@ class Online:
             force=force,
         )
 
-    def connect(self, known: Known, store: TokenStore, *, live: bool) -> Server:
+    def connect(self, preferences: ServerPreferences, store: TokenStore, *, live: bool) -> Server:
         """Use the server that the settings name; begin to listen to it where ``live``."""
-        self._use(choose_server(known, store, file_server=file_server()))
+        self._use(choose_server(preferences, store, file_server=file_server()))
         if self.address:
             # Another token or address may be what was wanted.
             self._outbox.resume(self.address, told=False)
         self._listen(live=live)
         return self._server
 
-    def need_client(self, known: Known, store: TokenStore) -> None:
+    def need_client(self, preferences: ServerPreferences, store: TokenStore) -> None:
         """Have a client; :class:`ConfigError` where no server is configured."""
         if self._client is None:
-            self._use(choose_server(known, store, file_server=file_server()))
+            self._use(choose_server(preferences, store, file_server=file_server()))
         _ = self.client
 
     def pause(self) -> Pause | None:
@@ -174,7 +178,7 @@ class Online:
         self._sent(sent)
 
 
-class _SharedPauses:
+class _SharedPauses(Pauses):
     """The pause of a server, for its live connection."""
 
     def __init__(self, outbox: Store, url: str) -> None:

@@ -10,19 +10,19 @@ What colleagues have committed since this FreeCAD runs, as the server announces 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import ConfigError, SiloError
+from silo.bom.errors import ConfigError, PackageError, SiloError
 from silo.outbox.entry import Commit, State
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.store import OutboxError, Store
-from silo.workbench.pane.activity import Action, Activity, Entry
-from silo.workbench.session.jobs import Busy, Control, Deliver, Job, Worker, in_gui
-from silo.workbench.settings.server import Known, Server, TokenStore
+from silo.workbench.pane.activity import Action, Activity, PaneEntry
+from silo.workbench.session import Busy, Control, Deliver, Job, Worker, in_gui
+from silo.workbench.settings.server import Server, ServerPreferences, TokenStore
 from silo.workbench.words import translate
 
 if TYPE_CHECKING:
@@ -33,9 +33,12 @@ if TYPE_CHECKING:
     from silo.workbench.commit.opened import Base
     from silo.workbench.session.online import Online
 
+    _Looked = tuple[tuple[Waiting, ...], Pause | None]
+    """What waits, and why nothing is sent to the server now; read by a worker."""
+
 
 @dataclass(frozen=True)
-class Shown:
+class PaneState:
     """Everything that the pane shows.
 
     waiting
@@ -77,7 +80,7 @@ class Listener:
         an exception that should not have been.
     """
 
-    shown: Callable[[Shown], None] = lambda _shown: None
+    shown: Callable[[PaneState], None] = lambda _shown: None
     console: Callable[[str], None] = lambda _text: None
     sent: Callable[[Sent], None] = lambda _sent: None
     bug: Callable[[BaseException], None] = lambda _error: None
@@ -111,14 +114,18 @@ class Colleagues:
         """A commit of this item is on its way to the server."""
         self._going.add(identity.lower())
 
-    def anew(self) -> None:
-        """The server counts anew, after a restore: by what we know of its numbers, nothing is ours."""
+    def forget_own(self) -> None:
+        """Forget which revisions are ours: the server counts again after a restore."""
         self._mine.clear()
 
     def gone(self, seen: Mapping[str, Newer], identities: Iterable[str]) -> None:
         """The server has nothing newer of these items; what was announced after ``seen`` stays."""
-        stale = {one for one in map(str.lower, identities) if self.newer.get(one) is seen.get(one)}
-        self.newer = {key: one for key, one in self.newer.items() if key not in stale}
+        stale = {
+            identity
+            for identity in map(str.lower, identities)
+            if self.newer.get(identity) is seen.get(identity)
+        }
+        self.newer = {key: identity for key, identity in self.newer.items() if key not in stale}
 
     def heard(self, identity: str, newer: Newer) -> None:
         """The server announced a commit."""
@@ -133,9 +140,9 @@ class Colleagues:
         """The server has our commit of an item, as this revision."""
         identity = identity.lower()
         self._mine[identity] = max(revision, self._mine.get(identity, 0))
-        known = self.newer.get(identity)
-        if known is not None and known.revision <= revision:
-            self.newer = {key: one for key, one in self.newer.items() if key != identity}
+        newer = self.newer.get(identity)
+        if newer is not None and newer.revision <= revision:
+            self.newer = {key: each_newer for key, each_newer in self.newer.items() if key != identity}
 
     def sent(self, still_going: Iterable[str]) -> None:
         """A run of sending has ended. What was announced meanwhile and is not ours is a colleague's. Of
@@ -157,22 +164,25 @@ class Session:
         where the outbox is; the user's data folder unless given.
     make_client
         makes the client of a server; for tests.
+    drawing
+        gives the command that draws models of files, as :func:`silo.drawing.models.send_models` takes it.
     """
 
     def __init__(
         self,
         deliver: Deliver,
-        known: Known,
+        known: ServerPreferences,
         store: TokenStore,
         *,
         listener: Listener | None = None,
         folder: Path | None = None,
         make_client: Callable[[Server], Any] | None = None,
+        drawing: Callable[[], Sequence[str]] | None = None,
     ) -> None:
-        self._make_client = make_client
+        self._make_client, self._drawing = make_client, drawing
         self._deliver, self._listener, self._folder = deliver, listener or Listener(), folder
         self._known, self._store = known, store
-        self.shown = Shown()
+        self.shown = PaneState()
         self.outbox = Store(folder / "outbox.sqlite3" if folder is not None else None)
         bug = self._listener.bug
         self._rows = Worker("silo-rows", deliver, on_bug=bug)
@@ -181,6 +191,8 @@ class Session:
         # What a person waits for on the preference page must not queue behind a long upload.
         self._aside = Worker("silo-aside", deliver, on_bug=bug)
         self._looks = Worker("silo-looks", deliver, on_bug=bug)
+        self._models = Worker("silo-models", deliver, on_bug=bug)
+        self._undrawn: dict[Path, str] = {}
         self._online: Online | None = None
         self._live = False
         self._colleagues = Colleagues()
@@ -197,15 +209,17 @@ class Session:
             Job(translate("Silo", "Connecting"), self._connect, done=self._connected, failed=self.problem)
         )
 
-    def settings_changed(self, known: Known, *, live: bool) -> None:
+    def settings_changed(self, preferences: ServerPreferences, *, live: bool) -> None:
         """Take over new settings."""
-        self._known = known
+        self._known = preferences
         self.begin(live=live)
 
-    def _connect(self, _control: Control) -> tuple[Server, tuple[Waiting, ...]]:
-        online = self._need_online()
-        server = online.connect(self._known, self._store, live=self._live)
-        return server, self.outbox.entries()
+    def _connect(self, _control: Control) -> tuple[Server, _Looked]:
+        server = self._need_online().connect(self._known, self._store, live=self._live)
+        return server, self._look()
+
+    def _look(self) -> _Looked:
+        return self.outbox.entries(), self._online.pause() if self._online is not None else None
 
     def _need_online(self) -> Online:
         """Made in the worker: its import is what would hold up FreeCAD's start."""
@@ -222,13 +236,13 @@ class Session:
             )
         return self._online
 
-    def _connected(self, result: tuple[Server, tuple[Waiting, ...]]) -> None:
-        server, waiting = result
-        for entry in waiting:
+    def _connected(self, result: tuple[Server, _Looked]) -> None:
+        server, looked = result
+        for entry in looked[0]:
             self._colleagues.sending(entry.identity)
         self._show(server=server, theirs={})
-        self._waits(waiting)
-        if waiting and server.configured:
+        self._waits(looked)
+        if looked[0] and server.configured:
             self.send(force=False)
 
     def _connection(self, kind: str, reason: str) -> None:
@@ -256,8 +270,10 @@ class Session:
                 content = self.outbox.finish(commit.key, commit.file, made_from)
             except (OutboxError, OSError) as error:
                 text = translate("Silo", "It is kept, and sent once the disk takes a copy of its file.")
-                told = OutboxError(f"{commit.label or commit.path}: {text} {error}")  # its row is on disk
-                self._deliver(lambda: self.problem(told))
+                outbox_error = OutboxError(
+                    f"{commit.label or commit.path}: {text} {error}"
+                )  # its row is on disk
+                self._deliver(lambda: self.problem(outbox_error))
             if base is not None:
                 base.committed(content)
 
@@ -287,10 +303,10 @@ class Session:
             except ConfigError:
                 # Without a server all that waits is kept; the pane says what to do.
                 report = None
-            pause = online.pause()
-            if pause is None:
+            looked = self._look()
+            if looked[1] is None:
                 online.wake()
-            return report, self.outbox.entries(), pause
+            return report, looked
 
         self._net.submit(
             Job(
@@ -303,9 +319,10 @@ class Session:
         )
 
     def _sent_all(self, result: Any) -> None:
-        report, waiting, pause = result
-        self._colleagues.sent(entry.identity for entry in waiting if entry.state is not State.HELD)
-        self._waits(waiting, newer=self._colleagues.newer, pause=pause)
+        report, looked = result
+        self._colleagues.sent(entry.identity for entry in looked[0] if entry.state is not State.HELD)
+        self._waits(looked, newer=self._colleagues.newer)
+        self._draw()
         stopped = report.stopped_by if report is not None else None
         if stopped is not None and stopped.code != "cancelled":
             self._show(reason=str(stopped), connection=self._connection_after(stopped))
@@ -318,7 +335,7 @@ class Session:
 
     def _heard(self, identity: str, newer: Newer | None) -> None:
         if newer is None:
-            self._colleagues.anew()
+            self._colleagues.forget_own()
             self._look_again()
             return
         self._colleagues.heard(identity, newer)
@@ -346,7 +363,32 @@ class Session:
         if sent.revision is not None:
             self._colleagues.arrived(sent.entry.identity, sent.revision)
             self._show(newer=self._colleagues.newer)
+        if sent.uploaded is not None and sent.entry.path:
+            self._undrawn[Path(sent.entry.path)] = sent.entry.sha256
         self._listener.sent(sent)
+
+    def _draw(self) -> None:
+        """Draw the files that have arrived, so that Silo shows them in 3D; their commits are done."""
+        files, self._undrawn = self._undrawn, {}
+        if not files or self._drawing is None:
+            return
+        try:
+            command = self._drawing()
+        except ConfigError:
+            return
+
+        def run(control: Control) -> tuple[int, list[str]]:
+            from silo.drawing.models import send_models
+
+            with self._need_online().another() as client:
+                return send_models(client, files.items(), command=command, cancelled=control.cancelled)
+
+        def done(outcome: tuple[int, list[str]]) -> None:
+            for problem in outcome[1]:
+                self._listener.console(f"[Silo] {problem}")
+
+        title = translate("Silo", "Drawing models")
+        self._models.submit(Job(title, run, done=done))
 
     def tick(self) -> None:
         """Called now and then: what waits is tried again when its time has come."""
@@ -383,24 +425,27 @@ class Session:
         self._change(lambda: self.outbox.save_copy(entry_id, target))
 
     def _change(self, change: Callable[[], None], *, send: bool = False) -> None:
-        def run(_control: Control) -> tuple[Waiting, ...]:
+        def run(_control: Control) -> _Looked:
             change()
-            return self.outbox.entries()
+            return self._look()
 
-        def done(waiting: tuple[Waiting, ...]) -> None:
-            self._waits(waiting)
+        def done(looked: _Looked) -> None:
+            self._waits(looked)
             if send:
                 self.send(force=True)
 
         self._disk.submit(Job(translate("Silo", "Outbox"), run, done=done, failed=self.problem))
 
-    def _waits(self, waiting: tuple[Waiting, ...], **more: Any) -> None:
+    def _waits(self, looked: _Looked, **more: Any) -> None:
         """Show what waits; a worker finds out what the colleagues changed for whom commits are held."""
+        waiting, pause = looked
         asked = {entry.id: entry for entry in waiting if entry.newer and entry.path}
-        known = {number: found for number, found in self.shown.theirs.items() if number in asked}
+        their_versions = {
+            number: their_version for number, their_version in self.shown.theirs.items() if number in asked
+        }
         self._owed = False
-        self._show(waiting=waiting, theirs=known, **more)
-        left = [entry for number, entry in asked.items() if number not in known]
+        self._show(waiting=waiting, pause=pause, theirs=their_versions, **more)
+        left = [entry for number, entry in asked.items() if number not in their_versions]
         if not left or self._comparing:
             return
 
@@ -409,10 +454,10 @@ class Session:
 
             return {entry.id: look_held(client, self.outbox, entry, control.cancelled) for entry in left}
 
-        def done(found: dict[int, Theirs | None]) -> None:
+        def done(theirs: dict[int, Theirs | None]) -> None:
             self._comparing = False
             # Decided meanwhile, and perhaps held again because of a third revision.
-            new = {entry.id: found[entry.id] for entry in left if entry in self.shown.waiting}
+            new = {entry.id: theirs[entry.id] for entry in left if entry in self.shown.waiting}
             self._show(theirs={**self.shown.theirs, **new})
 
         def failed(_error: SiloError) -> None:
@@ -475,14 +520,14 @@ class Session:
             do; it ends when that is nothing, or when a person wants no longer to wait.
         """
         self._net.cancel()
-        if self._left(0.0):
-            wait(self._left)
-        for worker in (self._aside, self._looks, self._rows, self._disk, self._net):
+        if self._unfinished(0.0):
+            wait(self._unfinished)
+        for worker in (self._aside, self._looks, self._models, self._rows, self._disk, self._net):
             worker.close(0.5)
         if self._online is not None:
             self._online.close()
 
-    def _left(self, seconds: float) -> int:
+    def _unfinished(self, seconds: float) -> int:
         # A row is followed by its copy, so the rows are asked first.
         return self._rows.left(seconds) + self._disk.left(seconds)
 
@@ -493,7 +538,7 @@ class Session:
 
     # -- what is shown ----------------------------------------------------------------------------------
 
-    def add(self, entry: Entry) -> None:
+    def add(self, entry: PaneEntry) -> None:
         """Show one more box."""
         self._show(activity=self.shown.activity.add(entry))
 
@@ -507,6 +552,9 @@ class Session:
     def problem(self, error: SiloError) -> None:
         """Show a problem that belongs to nothing else that is shown."""
         self._owed |= isinstance(error, OutboxError)
+        if isinstance(error, PackageError):
+            self._show(connection="packages", reason=str(error))
+            return
         if error.code != "cancelled":
             self._show(reason=str(error))
             if error.code != "bad_config":

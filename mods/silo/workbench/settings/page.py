@@ -1,22 +1,32 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The page in FreeCAD's preferences: server, token, TLS, and what a commit does."""
+"""The page in FreeCAD's preferences: server, token, TLS, and what a commit does.
+
+Where FreeCAD's Python lacks packages, the add-on is a workbench with one button that installs them.
+
+The add-on's page of the documentation, in a window: it needs no browser and no network.
+"""
 
 from __future__ import annotations
 
 import os
+import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo.workbench.freecad import host
 from silo.workbench.gui import qt, widgets
-from silo.workbench.gui.qt import QtCore, QtWidgets
+from silo.workbench.gui.qt import QtCore, QtWidgets, Relay
 from silo.workbench.pane.activity import Tone
+from silo.workbench.pane.dock import NAME, Dock
 from silo.workbench.session.session import Session
-from silo.workbench.settings.preferences import ALLOW, HOLD, Preferences
+from silo.workbench.settings import ALLOW, HOLD, Preferences
 from silo.workbench.settings.server import (
     Keyring,
-    Known,
     Server,
+    ServerPreferences,
     begin_login,
     in_use,
     is_let_in,
@@ -25,10 +35,12 @@ from silo.workbench.settings.server import (
     read_known,
     test,
 )
-from silo.workbench.words import translate
+from silo.workbench.start import INSTALL, Command, missing_packages, packages_hint
+from silo.workbench.words import QT_TRANSLATE_NOOP, translate, visible
 
 if TYPE_CHECKING:
     from silo.api.client import BrowserLogin
+
 
 # So often the server is asked if the user has let FreeCAD in.
 LOGIN_MS = 1500
@@ -154,10 +166,10 @@ class PreferencePage:
             box.setChecked(self._preferences.flag(name))
         self.missing.setCurrentIndex(max(self.missing.findData(self._preferences.text("MissingLinks")), 0))
         self.token.setText("")
-        known = read_known(self._preferences)
+        preferences = read_known(self._preferences)
         self._ask(
             translate("Silo", "Reading the settings"),
-            lambda: look(known, self._keyring),
+            lambda: look(preferences, self._keyring),
             self._looked,
         )
 
@@ -178,8 +190,8 @@ class PreferencePage:
             failed=lambda error: finished(lambda: self._tell(str(error), Tone.ERROR)),
         )
 
-    def _looked(self, found: tuple[Server, str]) -> None:
-        server, keyring = found
+    def _looked(self, outcome: tuple[Server, str]) -> None:
+        server, keyring = outcome
         self.in_use.setText(in_use(server, dict(os.environ)))
         if keyring and self.place.findData(KEYRING) < 0:
             text = translate("Silo", "the keyring of the system ({name})").replace("{name}", keyring)
@@ -228,16 +240,16 @@ class PreferencePage:
         """Ask the server who we are, with what is entered now."""
         self._tell(translate("Silo", "Asking the server…"), Tone.QUIET)
         wanted = self._entered()
-        known, keyring = read_known(self._preferences), self._keyring
+        preferences, keyring = read_known(self._preferences), self._keyring
         self._ask(
             translate("Silo", "Testing the connection"),
-            lambda: test(wanted, known, keyring),
+            lambda: test(wanted, preferences, keyring),
             lambda text: self._tell(text, Tone.GOOD),
         )
 
     def log_in(self) -> None:
         """Get a token through the browser: the user lets FreeCAD in on the server's page."""
-        wanted, known = self._entered(), read_known(self._preferences)
+        wanted, preferences = self._entered(), read_known(self._preferences)
         self._tell(translate("Silo", "Asking the server…"), Tone.QUIET)
 
         def opened(login: BrowserLogin) -> None:
@@ -249,7 +261,9 @@ class PreferencePage:
 
         def ask(login: BrowserLogin) -> None:
             title = translate("Silo", "Waiting for the browser")
-            self._ask(title, lambda: is_let_in(login, wanted, known), lambda done: answered(login, done))
+            self._ask(
+                title, lambda: is_let_in(login, wanted, preferences), lambda done: answered(login, done)
+            )
 
         def answered(login: BrowserLogin, done: bool) -> None:
             if not done:
@@ -259,12 +273,12 @@ class PreferencePage:
             self._tell(translate("Silo", "You are logged in. Press OK to keep the token."), Tone.GOOD)
 
         title = translate("Silo", "Asking for the login page")
-        self._ask(title, lambda: begin_login(wanted, known), opened)
+        self._ask(title, lambda: begin_login(wanted, preferences), opened)
 
-    def _entered(self) -> Known:
+    def _entered(self) -> ServerPreferences:
         certificate = self.certificate.text().strip()
         verify = (certificate or True) if self.verify.isChecked() else False
-        return Known(self.url.text().strip(), self.token.text().strip(), verify)
+        return ServerPreferences(self.url.text().strip(), self.token.text().strip(), verify)
 
     def _tell(self, text: str, tone: Tone) -> None:
         self.result.setText(text)
@@ -278,3 +292,136 @@ def _breathe() -> None:
     # FreeCAD's preference window, when a Python command opens it, keeps Python's lock for as long as it is
     # open (measured, 0.20 to 1.1), so no worker would get on: sleeping lets go of the lock.
     time.sleep(0.003)
+
+
+PAGE = Path(__file__).resolve().parents[4] / "docs" / "addon.md"
+
+
+class HelpWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
+    """Not modal: one reads it beside the work."""
+
+    def __init__(self, parent: Any) -> None:
+        super().__init__(parent)
+        layout = widgets.lay_out(self, "SiloHelp", translate("Silo", "Help on Silo"), 820, 700)
+        self.page = QtWidgets.QTextBrowser()
+        self.page.setOpenExternalLinks(True)
+        self.page.setSearchPaths([str(PAGE.parent)])
+        self.page.setMarkdown(_text())
+        layout.addWidget(self.page)
+
+
+def _text() -> str:
+    try:
+        return PAGE.read_text(encoding="utf-8")
+    except OSError:
+        text = translate("Silo", "The documentation is not there: {path}")
+        return text.replace("{path}", str(PAGE))
+
+
+# The one window; FreeCAD holds no reference to it.
+_open: list[Any] = []
+
+
+def stub_commands(missing: Sequence[str]) -> dict[str, Command]:
+    """The one command that works without packages."""
+
+    return {
+        INSTALL: Command(
+            text=QT_TRANSLATE_NOOP("Silo_InstallPackages", "Install What Silo Needs…"),
+            tip=QT_TRANSLATE_NOOP("Silo_InstallPackages", "Install the Python packages that Silo needs"),
+            icon="silo",
+            run=lambda: show_install(missing),
+        )
+    }
+
+
+def show_install(missing: Sequence[str]) -> None:
+    """Open the window that installs packages."""
+    window = InstallWindow(missing, host.main_window(), install)
+    _open[:] = [window]
+    window.show()
+
+
+class InstallDock(Dock):
+    """The pane while packages are missing: which, and the button that installs them."""
+
+    def __init__(self, window: Any, missing: Sequence[str]) -> None:
+        super().__init__(window, NAME, translate("Silo", "Database Activity"))
+        self._missing = missing
+        self.show()
+
+    def make(self) -> Any:
+        """Make the sentence and its button."""
+        content = QtWidgets.QWidget()
+        layout = QtWidgets.QVBoxLayout(content)
+        text = translate("Silo", "Silo cannot start yet: FreeCAD's Python lacks {names}.")
+        layout.addWidget(widgets.label(text.replace("{names}", ", ".join(self._missing)), Tone.WARNING))
+        text = translate("Silo", "Install What Silo Needs…")
+        layout.addWidget(widgets.button(text, "mend", lambda: show_install(self._missing)))
+        layout.addStretch(1)
+        return content
+
+
+def install() -> str:
+    """Install the packages for this FreeCAD, and return where they are. Raises SiloError. Worker."""
+    from silo.freecads import ask_freecad, install_packages
+
+    return install_packages(ask_freecad(host.program(), Path(host.user_data_folder())))
+
+
+class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
+    """Says what is missing, installs it, and says how that went.
+
+    install
+        does the work in a thread of its own; returns the folder, raises with the reason.
+    """
+
+    def __init__(self, missing: Sequence[str], parent: Any, install: Callable[[], str]) -> None:
+        super().__init__(parent)
+        self._install = install
+        self._relay = Relay()
+        title = translate("Silo", "Install what Silo needs")
+        layout = widgets.lay_out(self, "SiloInstall", title, 460, 120)
+        # The work may end after the window is closed; then it comes back and says how that went.
+        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose, False)
+        text = translate(
+            "Silo", "Silo needs these Python packages: {names}.\nThey are installed in {folder}."
+        )
+        text = text.replace("{names}", ", ".join(missing)).replace("{folder}", host.packages_folder())
+        self.text = widgets.label(text)
+        self.bar = QtWidgets.QProgressBar()
+        self.bar.setRange(0, 0)
+        self.bar.hide()
+        self.button = widgets.button(translate("Silo", "Install"), "install", self.begin, default=True)
+        close = widgets.button(translate("Silo", "Close"), "close", self.close)
+        layout.addWidget(self.text)
+        layout.addWidget(self.bar)
+        layout.addLayout(widgets.line(None, self.button, close))
+
+    def begin(self) -> None:
+        """Install, in a thread; the window stays usable, and may be closed."""
+        self.button.setEnabled(False)
+        self.bar.show()
+        self.text.setText(translate("Silo", "Installing. This takes a minute or two…"))
+        threading.Thread(target=self._work, name="silo-install", daemon=True).start()
+
+    def _work(self) -> None:
+        try:
+            text, done = self._install(), True
+        except Exception as error:  # noqa: BLE001  # a person wants to read it, whatever it is
+            text, done = str(error) or type(error).__name__, False
+        self._relay.post(lambda: self._ended(text, done=done))
+
+    def _ended(self, text: str, *, done: bool) -> None:
+        self.bar.hide()
+        self.show()
+        if done:
+            sentence = translate("Silo", "The packages are in {folder}. Start FreeCAD again to use Silo.")
+            self.text.setText(sentence.replace("{folder}", text))
+            self.button.hide()
+            return
+        self.button.setEnabled(True)
+        self.button.setText(translate("Silo", "Try again"))
+        failed = translate("Silo", "They could not be installed: {reason}")
+        by_hand = packages_hint(missing_packages(), host.packages_folder(), sys.version_info[:2])
+        self.text.setText(visible(failed.replace("{reason}", text), 1500) + "\n\n" + by_hand)

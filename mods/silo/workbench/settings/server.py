@@ -22,7 +22,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Protocol
 
 from silo.bom.errors import AuthError, ConfigError
-from silo.workbench.settings.preferences import Preferences
+from silo.workbench.settings import Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def _key(url: str) -> str:
     return url.strip().rstrip("/").lower()
 
 
-class Origin(StrEnum):
+class SettingSource(StrEnum):
     """Where a setting in use came from."""
 
     ENVIRONMENT = "environment"
@@ -106,8 +106,8 @@ class Server:
     url: str = ""
     token: str = ""
     verify: bool | str = True
-    url_from: Origin = Origin.NONE
-    token_from: Origin = Origin.NONE
+    url_from: SettingSource = SettingSource.NONE
+    token_from: SettingSource = SettingSource.NONE
 
     def __repr__(self) -> str:
         return f"Server({self.url!r}, token={'set' if self.token else 'none'}, {self.token_from.value})"
@@ -125,7 +125,7 @@ class TokenStore(Protocol):
 
 
 @dataclass(frozen=True)
-class Known:
+class ServerPreferences:
     """The preferences that choosing a server needs, read once in the GUI thread."""
 
     url: str = ""
@@ -133,11 +133,11 @@ class Known:
     verify: bool | str = True
 
 
-def read_known(preferences: Preferences) -> Known:
+def read_known(preferences: Preferences) -> ServerPreferences:
     """The server settings of the preference page."""
     certificate = preferences.text("SslCertPath").strip()
     verify: bool | str = certificate or True
-    return Known(
+    return ServerPreferences(
         url=preferences.text("ApiUrl").strip(),
         token=preferences.text("ApiToken").strip(),
         verify=verify if preferences.flag("SslVerify") else False,
@@ -145,7 +145,7 @@ def read_known(preferences: Preferences) -> Known:
 
 
 def choose_server(
-    known: Known,
+    preferences: ServerPreferences,
     store: TokenStore,
     env: Mapping[str, str] = os.environ,
     file_server: Any = None,
@@ -160,18 +160,20 @@ def choose_server(
 
     file_url, file_token = (file_server.url, file_server.token) if file_server is not None else (None, None)
     url, url_from = first_of(
-        (Origin.ENVIRONMENT, env.get(URL)), (Origin.PREFERENCES, known.url), (Origin.FILE, file_url)
+        (SettingSource.ENVIRONMENT, env.get(URL)),
+        (SettingSource.PREFERENCES, preferences.url),
+        (SettingSource.FILE, file_url),
     )
     if url is None or url_from is None:
         return Server()
-    verify = file_server.verify if url_from is Origin.FILE else _verify_from(env, known.verify)
+    verify = file_server.verify if url_from is SettingSource.FILE else _verify_from(env, preferences.verify)
     token, token_from = first_of(
-        (Origin.ENVIRONMENT, env.get(TOKEN)),
-        (Origin.KEYRING, lambda: store.get(url)),  # which may ask the user
-        (Origin.PREFERENCES, lambda: known.token if same_server(url, known.url) else None),
-        (Origin.FILE, lambda: file_token if same_server(url, file_url) else None),
+        (SettingSource.ENVIRONMENT, env.get(TOKEN)),
+        (SettingSource.KEYRING, lambda: store.get(url)),  # which may ask the user
+        (SettingSource.PREFERENCES, lambda: preferences.token if same_server(url, preferences.url) else None),
+        (SettingSource.FILE, lambda: file_token if same_server(url, file_url) else None),
     )
-    return Server(url, token or "", verify, url_from, token_from or Origin.NONE)
+    return Server(url, token or "", verify, url_from, token_from or SettingSource.NONE)
 
 
 def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
@@ -181,11 +183,11 @@ def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
     return verify_of(VERIFY, text) if text else otherwise
 
 
-def look(known: Known, keyring: Keyring) -> tuple[Server, str]:
+def look(preferences: ServerPreferences, keyring: Keyring) -> tuple[Server, str]:
     """The server in use, and the keyring's name ("" for none). Worker: a keyring may take its time."""
     from silo.workbench.session.online import file_server
 
-    return choose_server(known, keyring, file_server=file_server()), keyring.name()
+    return choose_server(preferences, keyring, file_server=file_server()), keyring.name()
 
 
 def keep_token(keyring: Keyring, url: str, token: str) -> None:
@@ -195,7 +197,7 @@ def keep_token(keyring: Keyring, url: str, token: str) -> None:
     keyring.set(url, token)
 
 
-def test(wanted: Known, known: Known, keyring: Keyring) -> str:
+def test(wanted: ServerPreferences, preferences: ServerPreferences, keyring: Keyring) -> str:
     """Ask the server who we are; the answer in words, or the error that explains what is wrong. Worker.
 
     wanted, known
@@ -204,7 +206,7 @@ def test(wanted: Known, known: Known, keyring: Keyring) -> str:
     from silo.api.client import SiloClient
     from silo.workbench.session.online import file_server
 
-    entered = replace(known, url=wanted.url or known.url, verify=wanted.verify)
+    entered = replace(preferences, url=wanted.url or preferences.url, verify=wanted.verify)
     server = choose_server(entered, keyring, file_server=file_server())
     if not server.configured:
         raise ConfigError(translate("Silo", "Enter the address of the server first."))
@@ -219,11 +221,11 @@ def test(wanted: Known, known: Known, keyring: Keyring) -> str:
     )
 
 
-def begin_login(wanted: Known, known: Known) -> BrowserLogin:
+def begin_login(wanted: ServerPreferences, preferences: ServerPreferences) -> BrowserLogin:
     """Return the page that lets FreeCAD in. Worker."""
     from silo.api.client import SiloClient
 
-    url = wanted.url or known.url
+    url = wanted.url or preferences.url
     if not url:
         raise ConfigError(translate("Silo", "Enter the address of the server first."))
     with SiloClient(url, None, verify=wanted.verify) as client:
@@ -234,11 +236,11 @@ def begin_login(wanted: Known, known: Known) -> BrowserLogin:
     return login
 
 
-def is_let_in(login: BrowserLogin, wanted: Known, known: Known) -> bool:
+def is_let_in(login: BrowserLogin, wanted: ServerPreferences, preferences: ServerPreferences) -> bool:
     """True once the user has let FreeCAD in. Worker."""
     from silo.api.client import SiloClient
 
-    with SiloClient(wanted.url or known.url, login.token, verify=wanted.verify) as client:
+    with SiloClient(wanted.url or preferences.url, login.token, verify=wanted.verify) as client:
         try:
             client.whoami()
         except AuthError:
@@ -258,21 +260,21 @@ def in_use(server: Server, env: Mapping[str, str]) -> str:
     return text
 
 
-def _url_words() -> dict[Origin, str]:
+def _url_words() -> dict[SettingSource, str]:
     return {
-        Origin.ENVIRONMENT: translate("Silo", "from the environment variable SILO_API_URL"),
-        Origin.PREFERENCES: translate("Silo", "from this page"),
-        Origin.FILE: translate("Silo", "from the configuration file of silo-mod"),
-        Origin.NONE: "",
-        Origin.KEYRING: "",
+        SettingSource.ENVIRONMENT: translate("Silo", "from the environment variable SILO_API_URL"),
+        SettingSource.PREFERENCES: translate("Silo", "from this page"),
+        SettingSource.FILE: translate("Silo", "from the configuration file of silo-mod"),
+        SettingSource.NONE: "",
+        SettingSource.KEYRING: "",
     }
 
 
-def _token_words() -> dict[Origin, str]:
+def _token_words() -> dict[SettingSource, str]:
     return {
-        Origin.ENVIRONMENT: translate("Silo", "Token: from the environment variable SILO_API_TOKEN."),
-        Origin.KEYRING: translate("Silo", "Token: from the system's keyring."),
-        Origin.PREFERENCES: translate("Silo", "Token: from FreeCAD's preferences, a plain file."),
-        Origin.FILE: translate("Silo", "Token: from the configuration file of silo-mod."),
-        Origin.NONE: translate("Silo", "Token: none."),
+        SettingSource.ENVIRONMENT: translate("Silo", "Token: from the environment variable SILO_API_TOKEN."),
+        SettingSource.KEYRING: translate("Silo", "Token: from the system's keyring."),
+        SettingSource.PREFERENCES: translate("Silo", "Token: from FreeCAD's preferences, a plain file."),
+        SettingSource.FILE: translate("Silo", "Token: from the configuration file of silo-mod."),
+        SettingSource.NONE: translate("Silo", "Token: none."),
     }

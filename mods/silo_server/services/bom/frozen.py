@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """A whole product as records that never change, and a record as a product again.
 
+What differs between two records, or a record and the product as it is now.
+
 A record per item: its data, files, mass, cost and lines, where a line names the record of its child. Records
 lie under the SHA-256 of their text, as the objects of git do; a part in a hundred products is stored once.
 """
@@ -8,7 +10,8 @@ lie under the SHA-256 of their text, as the objects of git do; a part in a hundr
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import count
 from typing import Any, NamedTuple
@@ -16,23 +19,35 @@ from typing import Any, NamedTuple
 from sqlalchemy import select
 
 from silo.api.wire import ItemTexts
+from silo.bom.numbers import plain
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import document_items, document_links, documents, revisions
+from silo_server.services.bom.history import (
+    Happened,
+    PastLine,
+    compare,
+    data_differs,
+    in_order,
+    line_happened,
+    moment,
+    what_changed,
+)
 from silo_server.services.bom.lines import state_to_json, stored_state
-from silo_server.services.bom.summary import OpenBom, Summary, Worth, summaries
-from silo_server.services.bom.tree import Graph, Part, load_graph, order_of
+from silo_server.services.bom.summary import MassAndCost, OpenBom, Summary, summaries
+from silo_server.services.bom.tree import Graph, RolledItem, load_graph, order_of, with_supplier
 from silo_server.services.items import by_ids
-from silo_server.services.releases import Frozen, Release, is_bought, read_records
-from silo_server.values import Item, Line, dumps
+from silo_server.services.releases import Frozen, Release, find_release, item_of, read_records
+from silo_server.values import Item, Line, bought, dumps
 
 
 class Product(NamedTuple):
     """A product to be shown or exported: its lines over all levels, its parts, what one of each is worth."""
 
     graph: Graph
-    parts: Mapping[int, Part]
-    worths: Mapping[int, Worth]
+    parts: Mapping[int, RolledItem]
+    worths: Mapping[int, MassAndCost]
     open: Mapping[int, OpenBom] = {}
+    items: Mapping[int, Item] = {}
 
 
 def freeze(tx: Tx, item: Item) -> Frozen:
@@ -43,10 +58,10 @@ def freeze(tx: Tx, item: Item) -> Frozen:
     graph = load_graph(tx, item)
     order = order_of(graph)
     ids = graph.names().keys()
-    known = by_ids(tx, ids)
+    items = by_ids(tx, ids)
     worths = summaries(tx, ids)
-    files = _files(tx, known)
-    without_file = [one for one in known.values() if not files[one.id]]
+    files = _files(tx, items)
+    without_file = [each_item for each_item in items.values() if not files[each_item.id]]
     hashes: dict[int, str] = {}
     records: dict[str, str] = {}
     # Children come before their parents; an item that is no assembly comes first.
@@ -61,18 +76,18 @@ def freeze(tx: Tx, item: Item) -> Frozen:
             }
             for line in graph.lines.get(item_id, ())
         ]
-        below = (one.child_id for one in graph.components(item_id))
+        below = (component.child_id for component in graph.components(item_id))
         # A file may lie in the product without a link that leads to it, if a person uploaded it.
         files[item_id] = {**files[item_id], **{k: v for child in below for k, v in files[child].items()}}
         written = [files[item_id][document] for document in sorted(files[item_id])]
-        text = dumps(_record(known[item_id], worths[item_id], written, lines))
+        text = dumps(_record(items[item_id], worths[item_id], written, lines))
         hashes[item_id] = hashlib.sha256(text.encode()).hexdigest()
         records[hashes[item_id]] = text
-    blocks = [f"{one.part_number}: {one.words}" for one in worths[item.id].open.values()]
+    blocks = [f"{bom.part_number}: {bom.words}" for bom in worths[item.id].open.values()]
     blocks += [
-        f"{one.part_number}: no file"
-        for one in without_file
-        if one.item_type in ("part", "assembly") and not is_bought(one.texts)
+        f"{each_item.part_number}: no file"
+        for each_item in without_file
+        if each_item.item_type in ("part", "assembly") and not each_item.is_bought
     ]
     return Frozen(hashes[item.id], records, sorted(blocks), tx.stamp)
 
@@ -90,6 +105,8 @@ def _record(
         "category": item.category,
         **item.texts,
         "properties": dict(item.properties),
+        # Only where there are some: so records from before have the same hash.
+        **({"supplier_parts": item.supplier_parts} if item.supplier_parts else {}),
         "revision": item.current_revision,
         "thumbnail": item.thumbnail_key,
         "mass_kg": None if worth.mass is None else str(worth.mass),
@@ -101,22 +118,22 @@ def _record(
     }
 
 
-def _files(tx: Tx, known: Mapping[int, Item]) -> dict[int, dict[str, dict[str, Any]]]:
+def _files(tx: Tx, items: Mapping[int, Item]) -> dict[int, dict[str, dict[str, Any]]]:
     """By item and document: the newest files that the item is in, and all that these link to."""
     row = document_items.c
-    query = select(row.item_id, row.document_id).where(one_of(tx, row.item_id, known.keys()))
-    holding: dict[int, set[int]] = {item_id: set() for item_id in known}
+    query = select(row.item_id, row.document_id).where(one_of(tx, row.item_id, items.keys()))
+    holding: dict[int, set[int]] = {item_id: set() for item_id in items}
     for item_id, document_id in tx.conn.execute(query):
         holding[item_id].add(document_id)
     targets: dict[int, set[int]] = {}
     level = set[int]().union(*holding.values())
     link = document_links.c
     while level:
-        targets |= {one: set() for one in level}
+        targets |= {each_item_id: set() for each_item_id in level}
         pairs = select(link.document_id, documents.c.id).join(documents, documents.c.uuid == link.target)
         for source, target in tx.conn.execute(pairs.where(one_of(tx, link.document_id, level))):
             targets[source].add(target)
-        level = set[int]().union(*(targets[one] for one in level)) - targets.keys()
+        level = set[int]().union(*(targets[each_item_id] for each_item_id in level)) - targets.keys()
     newest = (
         select(documents.c.id, documents.c.uuid, revisions)
         .join(revisions, revisions.c.document_id == documents.c.id)
@@ -124,23 +141,27 @@ def _files(tx: Tx, known: Mapping[int, Item]) -> dict[int, dict[str, dict[str, A
         .where(one_of(tx, documents.c.id, targets.keys()))
     )
     written = {
-        found[0]: {
-            "document": found.uuid,
-            "revision": found.revision_number,
-            "file_name": found.file_name,
-            "file_path": found.file_path,
-            "sha256": found.file_checksum,
-            "size": found.file_size,
+        newest_row[0]: {
+            "document": newest_row.uuid,
+            "revision": newest_row.revision_number,
+            "file_name": newest_row.file_name,
+            "file_path": newest_row.file_path,
+            "sha256": newest_row.file_checksum,
+            "size": newest_row.file_size,
         }
-        for found in tx.conn.execute(newest)
+        for newest_row in tx.conn.execute(newest)
     }
     reached: dict[int, dict[str, dict[str, Any]]] = {}
     for item_id, own in holding.items():
         seen, level = set(own), set(own)
         while level:
-            level = set[int]().union(*(targets[one] for one in level)) - seen
+            level = set[int]().union(*(targets[each_item_id] for each_item_id in level)) - seen
             seen |= level
-        reached[item_id] = {written[one]["document"]: written[one] for one in seen if one in written}
+        reached[item_id] = {
+            written[each_item_id]["document"]: written[each_item_id]
+            for each_item_id in seen
+            if each_item_id in written
+        }
     return reached
 
 
@@ -148,18 +169,19 @@ def frozen_product(tx: Tx, item: Item, release: Release) -> Product:
     """Return a revision as it was frozen, to be shown by whatever shows a product."""
     records = read_records(tx, release.record)
     ids = {record: number for number, record in enumerate(records, start=1)}
-    frozen = {ids[record]: _item(ids[record], made, release) for record, made in records.items()}
+    who = (release.frozen_at, release.created_by)
+    frozen = {ids[record]: item_of(made, ids[record], *who) for record, made in records.items()}
     others = count(len(ids) + 1)
     lines: dict[int, list[Line]] = {}
     parts = {ids[record]: _part(made) for record, made in records.items()}
-    worths = {ids[record]: _worth(made) for record, made in records.items()}
+    worths = {ids[record]: _worth_of(made) for record, made in records.items()}
     for record, made in records.items():
         for place, written in enumerate(made["lines"]):
             child = ids.get(written["child"]) or next(others)
             if child not in frozen:  # no component: nothing of it was frozen but its number
                 named = {"part_number": written["part_number"], "item": written["item"]}
-                frozen[child] = _item(child, named, release)
-                parts[child], worths[child] = _part(named), Worth(None, False, {}, False)
+                frozen[child] = item_of(named, child, *who)
+                parts[child], worths[child] = _part(named), MassAndCost(None, False, {}, False)
             of = frozen[child]
             lines.setdefault(ids[record], []).append(
                 Line(
@@ -177,39 +199,115 @@ def frozen_product(tx: Tx, item: Item, release: Release) -> Product:
                     stored_state(dumps(written["state"])),
                 )
             )
-    return Product(Graph(frozen[ids[release.record]], lines), parts, worths)
+    return Product(Graph(frozen[ids[release.record]], lines), parts, worths, items=frozen)
 
 
-def _item(number: int, made: Mapping[str, Any], release: Release) -> Item:
-    return Item(
-        id=number,
-        uuid=made["item"],
-        part_number=made["part_number"],
-        name=made.get("name", ""),
-        description=made.get("description", ""),
-        item_type=made.get("item_type", ""),
-        schema=None,
-        category=made.get("category"),
-        texts={name: made.get(name) for name in ItemTexts.model_fields},
-        thumbnail_key=made.get("thumbnail"),
-        properties=made.get("properties", {}),
-        current_revision=made.get("revision", 0),
-        bom_version=0,
-        version=0,
-        created_at=release.frozen_at,
-        created_by=release.created_by,
-        updated_at=release.frozen_at,
-        updated_by=release.created_by,
-        archived_at=None,
-    )
-
-
-def _part(made: Mapping[str, Any]) -> Part:
+def _part(made: Mapping[str, Any]) -> RolledItem:
     texts = (made["part_number"], made.get("name", ""), made.get("description", ""))
-    return Part(*texts, made.get("properties", {}), made.get("thumbnail"))
+    properties = with_supplier(made.get("properties", {}), made.get("supplier_parts", ()))
+    is_bought = bought(made.get("sourcing_type"), properties.get("supplier"))
+    return RolledItem(*texts, properties, made.get("thumbnail"), is_bought)
 
 
-def _worth(made: Mapping[str, Any]) -> Worth:
+def _worth_of(made: Mapping[str, Any]) -> MassAndCost:
     mass = None if made["mass_kg"] is None else Decimal(made["mass_kg"])
     costs = {currency: Decimal(cost) for currency, cost in made["costs"].items()}
-    return Worth(mass, made["mass_whole"], costs, made["cost_whole"])
+    return MassAndCost(mass, made["mass_whole"], costs, made["cost_whole"])
+
+
+class Changes(NamedTuple):
+    """What changed in a product from one time to another. In frozen revisions nobody knows who did it."""
+
+    first: str
+    last: str
+    found: Sequence[Happened]
+
+
+def changes_of(tx: Tx, item: Item, since: str, until: str = "") -> Changes:
+    """Return what changed in a product between two points, over all levels, from the older to the newer.
+
+    since, until
+        a day, a time, a revision of the item (``r3``), or the label of a frozen revision; until "": now.
+
+    Two frozen revisions, or one and now, are compared as they are, however old. Raises as :func:`moment`,
+    TooLargeError.
+    """
+    points = [find_release(tx, item, since), find_release(tx, item, until) if until else None]
+    ends = [
+        release.frozen_at if release else moment(tx, item, text, end=last) if text else tx.stamp
+        for release, text, last in zip(points, (since, until), (False, True), strict=True)
+    ]
+    if points[0] and (points[1] or not until):
+        sides = [
+            read_records(tx, point.record).values()
+            if point
+            else map(json.loads, freeze(tx, item).records.values())
+            for point in points
+        ]
+        before, after = ({made["item"]: made for made in side} for side in sides)
+        if ends[0] > ends[1]:
+            before, after = after, before
+        return Changes(min(ends), max(ends), in_order(_differences(item.uuid, before, after)))
+    return Changes(min(ends), max(ends), what_changed(tx, item, *ends))
+
+
+_DATA = ("name", "description", "item_type", "category", *ItemTexts.model_fields)
+Records = Mapping[str, Mapping[str, Any]]
+
+
+def _differences(root: str, before: Records, after: Records) -> Iterator[Happened]:
+    """What differs between two products, as records by the UUID of their item."""
+    sides = (before, after)
+    owned = [_own_files(side) for side in sides]
+    for uuid in before.keys() & after.keys():
+        old, new = before[uuid], after[uuid]
+        number, name = new["part_number"], new["name"]
+        for line in compare(*(_past(made, side) for made, side in zip((old, new), sides, strict=True))):
+            if line.status != "unchanged":
+                yield line_happened(number, line, "", "")
+        data = [{**made["properties"], **{name: made.get(name) for name in _DATA}} for made in (old, new)]
+        if uuid == root:
+            data = [of | _in_all(made) for of, made in zip(data, (old, new), strict=True)]
+        if differences := data_differs(*data):
+            yield Happened("data", "", number, name, *differences, "", "")
+        files = [{line["document"]: line for line in side.get(uuid, ())} for side in owned]
+        for document in files[0].keys() | files[1].keys():
+            pair = [side.get(document) for side in files]
+            if len({line and line["sha256"] for line in pair}) > 1:
+                then, now = (
+                    f"{line['file_name']}, revision {line['revision']}" if line else "" for line in pair
+                )
+                yield Happened("file", "", number, name, then, now, "", "")
+
+
+def _in_all(made: Mapping[str, Any]) -> dict[str, float]:
+    costs = {f"cost in all [{currency}]": cost for currency, cost in made["costs"].items()}
+    costs["mass in all [kg]"] = made["mass_kg"]
+    return {name: plain(Decimal(value)) for name, value in costs.items() if value is not None}
+
+
+def _past(made: Mapping[str, Any], side: Records) -> list[PastLine]:
+    """The lines of a record, each under its part and relation, of which a BOM has one."""
+    return [
+        PastLine(
+            f"{line['item']} {line['state'].get('rel_type')}",
+            item_of(side[line["item"]] if line["child"] else line),
+            place,
+            stored_state(dumps(line["state"])),
+        )
+        for place, line in enumerate(made["lines"])
+    ]
+
+
+def _own_files(side: Records) -> dict[str, list[Mapping[str, Any]]]:
+    """Of each item the files that are not those of a part in it."""
+    files = {}
+    for uuid, made in side.items():
+        below = {
+            file["document"]
+            for line in made["lines"]
+            if line["child"]
+            for file in side[line["item"]]["files"]
+        }
+        files[uuid] = [file for file in made["files"] if file["document"] not in below]
+    return files

@@ -10,13 +10,15 @@ Change 0 is the empty BOM before everything.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, NamedTuple
 
 from sqlalchemy import func, select
 
+from silo.api.wire import RELEASE_LABEL
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError
 from silo.bom.numbers import plain, whole_number
 from silo_server.db.engine import Tx, newest_first, one_of
@@ -111,18 +113,18 @@ def lines_of_changes(
     query = select(numbered).where(numbered.c.place <= most)
     rows = tx.conn.execute(query.order_by(numbered.c.change_id, numbered.c.place)).all()
     children = by_ids(tx, {row.child_id for row in rows})
-    found: dict[int, list[ChangedLine]] = {}
+    lines: dict[int, list[ChangedLine]] = {}
     for row in rows:
-        found.setdefault(row.change_id, []).append(_changed_line(row, children))
-    return found
+        lines.setdefault(row.change_id, []).append(_changed_line(row, children))
+    return lines
 
 
 def get_change(tx: Tx, parent: Item, change_id: int) -> tuple[Change, list[ChangedLine]]:
     """One change with its lines; NotFoundError where this BOM has no such change."""
-    found = _changes(tx, [bom_changes.c.parent_id == parent.id, bom_changes.c.id == change_id], 1)
-    if not found:
+    changes = _changes(tx, [bom_changes.c.parent_id == parent.id, bom_changes.c.id == change_id], 1)
+    if not changes:
         raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
-    return found[0], lines_of_changes(tx, [change_id]).get(change_id, [])
+    return changes[0], lines_of_changes(tx, [change_id]).get(change_id, [])
 
 
 def stories(
@@ -142,13 +144,13 @@ def stories(
         .order_by(bom_change_lines.c.change_id.desc())
     ).all()
     ids = {row.change_id for row in rows}
-    known = {change.id: change for change in _changes(tx, [one_of(tx, bom_changes.c.id, ids)], len(ids))}
+    changes = {change.id: change for change in _changes(tx, [one_of(tx, bom_changes.c.id, ids)], len(ids))}
     children = by_ids(tx, {row.child_id for row in rows})
-    found: dict[str, list[tuple[Change, ChangedLine]]] = {}
+    result: dict[str, list[tuple[Change, ChangedLine]]] = {}
     for row in rows:
         line = _changed_line(row, children)
-        found.setdefault(row.line_id, []).append((known[row.change_id], line))
-    return found
+        result.setdefault(row.line_id, []).append((changes[row.change_id], line))
+    return result
 
 
 def last_merge(tx: Tx, parent: Item) -> Change | None:
@@ -159,12 +161,12 @@ def last_merge(tx: Tx, parent: Item) -> Change | None:
 
 def change_at(tx: Tx, parent: Item, when: str) -> int:
     """The change that made the BOM what it was at ``when`` (as stored: ISO 8601, UTC); 0 before the first."""
-    found = tx.conn.scalar(
+    value = tx.conn.scalar(
         select(func.max(bom_changes.c.id)).where(
             bom_changes.c.parent_id == parent.id, bom_changes.c.at <= when
         )
     )
-    return found or 0
+    return value or 0
 
 
 def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
@@ -247,10 +249,10 @@ def restore(
 def item_changed_by(tx: Tx, change_id: int) -> str:
     """Return the part number of the BOM that a change is of; NotFoundError if there is no such change."""
     of_it = select(items.c.part_number).join(bom_changes, bom_changes.c.parent_id == items.c.id)
-    found = tx.conn.scalar(of_it.where(bom_changes.c.id == change_id))
-    if found is None:
+    value = tx.conn.scalar(of_it.where(bom_changes.c.id == change_id))
+    if value is None:
         raise NotFoundError(f"there is no change {change_id}")
-    return str(found)
+    return str(value)
 
 
 def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tuple[int, int]:
@@ -290,7 +292,7 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
 
 
 class Happened(NamedTuple):
-    """One thing that differs in a product between two times, and who did it last.
+    """One thing that differs in a product between two times, and who did it last ("" if it is not known).
 
     what
         ``added``, ``removed``, ``quantity`` or ``line`` of a BOM, ``data`` or ``file`` of an item.
@@ -311,16 +313,16 @@ class Happened(NamedTuple):
 def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
     """Return the time, as stored, that a person names: a date (its ``end``), a time, a revision as ``r3``.
 
-    Raises RejectedError, NotFoundError for a revision that the item does not have.
+    Raises RejectedError, NotFoundError for a revision that the item does not have, a frozen one too.
     """
     if text.startswith("r") and (number := whole_number(text[1:], 9)) is not None:
         row = revisions.c
-        found = tx.conn.scalar(
+        value = tx.conn.scalar(
             select(row.created_at).where(row.item_id == item.id, row.revision_number == number)
         )
-        if found is None:
+        if value is None:
             raise NotFoundError(f"{item.part_number} has no revision {number}")
-        return str(found)
+        return str(value)
     try:
         when = datetime.fromisoformat(text.replace(" ", "+"))
         if when.tzinfo is None and len(text) == 10:
@@ -329,9 +331,10 @@ def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
             return stamp(when)
     except (ValueError, OverflowError):
         pass
-    raise RejectedError(
-        f"wanted a date such as 2026-02-08, a time with its zone such as 2026-02-08T22:15:00Z, or a revision "
-        f"such as r3, got {text[:60]!r}"
+    is_label = re.fullmatch(RELEASE_LABEL, text, re.ASCII)
+    raise (NotFoundError if is_label else RejectedError)(
+        "wanted a date such as 2026-02-08, a time with its zone such as 2026-02-08T22:15:00Z, a revision of "
+        f"{item.part_number} such as r3, or one of its frozen revisions, got {text[:60]!r}"
     )
 
 
@@ -339,17 +342,24 @@ def what_changed(tx: Tx, root: Item, since: str, until: str) -> list[Happened]:
     """What differs in a product between two times, by item; what was added or removed is not looked into."""
     since, until = sorted((since, until))
     walked = _Walked(tx, since, until)
-    found: list[Happened] = []
+    happenings: list[Happened] = []
     before, after = (walked.reached(root.id, side) for side in (0, 1))
     common = before & after
     numbers = by_ids(tx, walked.changed.keys() & common)
     for item_id, parent in numbers.items():
         at, who = walked.changed[item_id]
-        for one in compare(*walked.states[item_id]):
-            if one.status != "unchanged":
-                found.append(_line_happened(parent.part_number, one, at, who))
-    found += _items_happened(tx, common, since, until)
-    return sorted(found, key=lambda one: (one.within or one.part_number, one.part_number, one.what))
+        for difference in compare(*walked.states[item_id]):
+            if difference.status != "unchanged":
+                happenings.append(line_happened(parent.part_number, difference, at, who))
+    happenings += _items_happened(tx, common, since, until)
+    return in_order(happenings)
+
+
+def in_order(happenings: Iterable[Happened]) -> list[Happened]:
+    """By BOM or item."""
+    return sorted(
+        happenings, key=lambda change: (change.within or change.part_number, change.part_number, change.what)
+    )
 
 
 class _Walked:
@@ -366,7 +376,7 @@ class _Walked:
         seen, level = {root}, {root}
         while level:
             self._load(level - self._children.keys())
-            level = set[int]().union(*(self._children[one][side] for one in level)) - seen
+            level = set[int]().union(*(self._children[item_id][side] for item_id in level)) - seen
             seen |= level
         return seen
 
@@ -378,10 +388,10 @@ class _Walked:
         ):
             if at <= self._until or parent_id not in self.changed:
                 self.changed[parent_id] = (at, who)
-        lines = lines_of_many(tx, [one for one in ids if one not in self.changed])
-        for one in ids:
-            now = {line.child_id for line in lines.get(one, ()) if line.state.rel_type == "component"}
-            self._children[one] = (now, now)
+        lines = lines_of_many(tx, [item_id for item_id in ids if item_id not in self.changed])
+        for item_id in ids:
+            now = {line.child_id for line in lines.get(item_id, ()) if line.state.rel_type == "component"}
+            self._children[item_id] = (now, now)
         for item in by_ids(tx, self.changed.keys() & ids).values():
             then, later = (
                 state_at(tx, item, change_at(tx, item, when)) for when in (self._since, self._until)
@@ -394,24 +404,23 @@ class _Walked:
             self._children[item.id] = (next(sides), next(sides))
 
 
-def _line_happened(within: str, one: Difference, at: str, who: str) -> Happened:
-    what = one.status
-    before, after = (_amount(state) for state in (one.before, one.after))
+def line_happened(within: str, difference: Difference, at: str, who: str) -> Happened:
+    what = difference.status
+    before, after = (
+        "" if state is None else f"{plain(state.quantity)} {state.unit or ''}".rstrip()
+        for state in (difference.before, difference.after)
+    )
     if what == "changed":
-        others = [name for name in one.fields if name not in ("quantity", "unit", *_BESIDE)]
+        others = [name for name in difference.fields if name not in ("quantity", "unit", *_BESIDE)]
         what = "line" if others else "quantity" if before != after else "line"
         if what == "line":
-            names = others or list(one.fields)
-            before, after = (_fields(state, names) for state in (one.before, one.after))
-    return Happened(what, within, one.child.part_number, one.child.name, before, after, at, who)
+            names = others or list(difference.fields)
+            before, after = (_fields(state, names) for state in (difference.before, difference.after))
+    return Happened(what, within, difference.child.part_number, difference.child.name, before, after, at, who)
 
 
 # What changes with a quantity, or when CAD loses and finds a line.
 _BESIDE = ("source", "override", "cad_quantity")
-
-
-def _amount(state: LineState | None) -> str:
-    return "" if state is None else f"{plain(state.quantity)} {state.unit or ''}".rstrip()
 
 
 def _fields(state: LineState | None, names: Sequence[str]) -> str:
@@ -430,29 +439,31 @@ def _items_happened(tx: Tx, ids: Collection[int], since: str, until: str) -> Ite
     within = one_of(tx, row.item_id, ids) & (row.created_at <= until)
     touched = set(tx.conn.scalars(select(row.item_id).where(within, row.created_at > since).distinct()))
     query = select(revisions).where(one_of(tx, row.item_id, touched), row.created_at <= until)
-    known: dict[int, list[Any]] = {}
-    for one in tx.conn.execute(query.order_by(row.item_id, row.revision_number)):
-        known.setdefault(one.item_id, []).append(one)
+    items_before: dict[int, list[Any]] = {}
+    for each_row in tx.conn.execute(query.order_by(row.item_id, row.revision_number)):
+        items_before.setdefault(each_row.item_id, []).append(each_row)
     for item in by_ids(tx, touched).values():
-        rows = known[item.id]
-        old = [one for one in rows if one.created_at <= since]
+        rows = items_before[item.id]
+        old = [each_row for each_row in rows if each_row.created_at <= since]
         last = rows[-1]
-        then = json.loads(old[-1].properties) if old else {}
-        now = json.loads(last.properties)
-        names = sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name))
-        if names:
-            before, after = (
-                "; ".join(f"{name}: {_text(side.get(name))}" for name in names) for side in (then, now)
-            )
-            what = ("data", "", item.part_number, item.name, before, after)
+        sides = json.loads(old[-1].properties) if old else {}, json.loads(last.properties)
+        if differences := data_differs(*sides):
+            what = ("data", "", item.part_number, item.name, *differences)
             yield Happened(*what, last.created_at, last.created_by)
-        files = [one for one in rows if one.file_checksum]
-        older = [one for one in files if one.created_at <= since]
+        files = [each_row for each_row in rows if each_row.file_checksum]
+        older = [file for file in files if file.created_at <= since]
         if files and (not older or older[-1].file_checksum != files[-1].file_checksum):
             newest = files[-1]
             before, after = (_file(some) for some in (older, files))
             what = ("file", "", item.part_number, item.name, before, after)
             yield Happened(*what, newest.created_at, newest.created_by)
+
+
+def data_differs(then: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Return the values that differ in words, before and after; None if none does."""
+    names = sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name))
+    before, after = ("; ".join(f"{name}: {_text(side.get(name))}" for name in names) for side in (then, now))
+    return (before, after) if names else None
 
 
 def _file(revisions_with_file: Sequence[Any]) -> str:

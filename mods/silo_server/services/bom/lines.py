@@ -55,22 +55,29 @@ def select_lines() -> Select[*tuple[Any, ...]]:
     ).join(items, items.c.id == bom_lines.c.child_id)
 
 
-def to_line(row: Any) -> Line:
-    """A frozen line from a row of :func:`select_lines`; by position, which is what makes it quick."""
-    return Line._make((*row[:10], row[10] is not None, _state(*row[11:])))
+def to_line(row: Any, child: tuple[Any, ...] = ()) -> Line:
+    """A frozen line from a row of :func:`select_lines`; by position, which is what makes it quick.
+
+    ``child``: what another line says of the same child (:func:`child_of`).
+    """
+    return Line._make((*row[:4], *(child or child_of(row)), _state(*row[11:])))
+
+
+def child_of(row: Any) -> tuple[Any, ...]:
+    """What a row of :func:`select_lines` says of its child."""
+    return (*row[4:10], row[10] is not None)
 
 
 # Most lines of a BOM are in one of a few states (so many pieces, from the assembly, nothing noted); a frozen
 # value can be shared, and making one costs ten times as much as finding it.
 @lru_cache(maxsize=16384)
 def _state(*columns: Any) -> LineState:
-    state = LineState(*columns)  # the columns are in the order of the fields
-    return replace(
-        state,
-        reference_designators=tuple(json.loads(columns[4])),
-        override=bool(state.override),
-        metadata=json.loads(columns[12]),
+    raw: Any = LineState(*columns)  # the columns are in the order of the fields
+    designators, metadata = (json.loads(text) for text in (raw.reference_designators, raw.metadata))
+    state: LineState = replace(
+        raw, reference_designators=tuple(designators), override=bool(raw.override), metadata=metadata
     )
+    return state
 
 
 def lines_of(tx: Tx, parent: Item) -> list[Line]:
@@ -88,7 +95,7 @@ def check_line_count(tx: Tx, parent_ids: Sequence[int]) -> None:
     row = bom_lines.c.parent_id
     query = select(row, func.count()).where(one_of(tx, row, set(parent_ids))).group_by(row)
     counts: dict[int, int] = dict(tx.conn.execute(query).all())
-    count = sum(counts.get(one, 0) for one in parent_ids)
+    count = sum(counts.get(parent_id, 0) for parent_id in parent_ids)
     most = min(MOST_LINES_AT_ONCE, tx.settings.max_expanded_rows)
     if count > most and len(parent_ids) > 1:
         raise TooLargeError(f"these BOMs have {count} lines, an answer at most {most}; ask for fewer")
@@ -101,10 +108,10 @@ def lines_of_many(tx: Tx, parent_ids: Collection[int]) -> dict[int, list[Line]]:
         .where(one_of(tx, bom_lines.c.parent_id, parent_ids))
         .order_by(bom_lines.c.parent_id, bom_lines.c.position)
     )
-    found: dict[int, list[Line]] = {}
+    lines: dict[int, list[Line]] = {}
     for row in tx.conn.execute(query):
-        found.setdefault(row[1], []).append(to_line(row))
-    return found
+        lines.setdefault(row[1], []).append(to_line(row))
+    return lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,16 +133,16 @@ def line_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
             raise NotFoundError(f"the BOM of {parent.part_number} has no line with the id {which.id!r}")
         return line
     key = which.casefold()
-    found = [line for line in lines if line.child_part_number.casefold() == key]
-    if len(found) > 1:
-        ids = ", ".join(f"{line.state.rel_type}: {line.id}" for line in found)
+    matches = [line for line in lines if line.child_part_number.casefold() == key]
+    if len(matches) > 1:
+        ids = ", ".join(f"{line.state.rel_type}: {line.id}" for line in matches)
         raise ConflictError(
-            f"the BOM of {parent.part_number} has {len(found)} lines for {which!r} ({ids}); "
+            f"the BOM of {parent.part_number} has {len(matches)} lines for {which!r} ({ids}); "
             "name one by its id"
         )
-    if not found:
+    if not matches:
         raise NotFoundError(f"the BOM of {parent.part_number} has no line for {which!r}")
-    return found[0]
+    return matches[0]
 
 
 def component_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
@@ -150,10 +157,10 @@ def component_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Li
 
 def state_to_json(state: LineState) -> dict[str, Any]:
     """A line's state as history stores it; only what is set."""
-    known = ((name, getattr(state, name)) for name in names_of(LineState))
+    fields = ((name, getattr(state, name)) for name in names_of(LineState))
     return {
         name: value
-        for name, value in known
+        for name, value in fields
         if value is not None and value is not False and value != () and value != {}
     }
 
@@ -367,16 +374,16 @@ def find_rings(tx: Tx, parent: Item, child_ids: Collection[int]) -> dict[int, li
     edges = _edges_above(tx, parent.id)
     above: dict[int, int] = {parent.id: parent.id}
     queue = [parent.id]
-    found: list[int] = []
-    while queue and len(found) < len(wanted):
+    ring: list[int] = []
+    while queue and len(ring) < len(wanted):
         node = queue.pop(0)
         if node in wanted:
-            found.append(node)
+            ring.append(node)
         for ancestor in edges.get(node, ()):
             if ancestor not in above:
                 above[ancestor] = node
                 queue.append(ancestor)
-    return {child_id: _ring(tx, parent.id, child_id, above) for child_id in found}
+    return {child_id: _ring(tx, parent.id, child_id, above) for child_id in ring}
 
 
 def _edges_above(tx: Tx, item_id: int) -> dict[int, list[int]]:

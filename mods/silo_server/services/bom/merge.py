@@ -35,9 +35,16 @@ from silo.bom.numbers import LARGEST_QUANTITY, as_decimal, plain
 from silo.bom.report import Reason, in_words, remembered
 from silo.bom.resolve import character_problem
 from silo_server import events
-from silo_server.db.engine import Tx, insert_rows, one_of
+from silo_server.db.engine import (
+    KeptAnswer,
+    KeyedRequest,
+    Tx,
+    earlier_answer,
+    insert_rows,
+    keep_answer,
+    one_of,
+)
 from silo_server.db.tables import bom_conflicts, bom_last_syncs, items
-from silo_server.services.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.services.bom.history import state_at
 from silo_server.services.bom.lines import (
     ChangeKind,
@@ -92,9 +99,9 @@ class MergeOrder:
     def missing(self) -> list[tuple[str, str]]:
         """The components that the assembly has lost."""
         return [
-            (one.get("file", ""), one.get("object", ""))
-            for one in self.left_out
-            if one["reason"] == Reason.MISSING
+            (part.get("file", ""), part.get("object", ""))
+            for part in self.left_out
+            if part["reason"] == Reason.MISSING
         ]
 
 
@@ -132,7 +139,7 @@ def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
 def text_problem(value: Any, longest: int) -> str | None:
     """Return what is wrong with a text of at most so many characters; None if nothing is."""
     if not isinstance(value, str) or len(value) > longest:
-        return f"wanted a text of at most {longest} characters, got {_shown(value)}"
+        return f"wanted a text of at most {longest} characters, got {_shortened(value)}"
     return character_problem(value)
 
 
@@ -148,10 +155,10 @@ def sha256_or_none(name: str, value: Any) -> str | None:
 def quantity_problem(value: Any) -> str | None:
     """What is wrong with a quantity, None where nothing is."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        return f"wanted a number, got {_shown(value)}"
+        return f"wanted a number, got {_shortened(value)}"
     # A huge integer has no float; comparing it does no harm where converting it would.
     if not 0 < value <= LARGEST_QUANTITY or not math.isfinite(value):
-        return f"wanted a number above 0 and at most 1e9, got {_shown(value)}"
+        return f"wanted a number above 0 and at most 1e9, got {_shortened(value)}"
     return None
 
 
@@ -169,7 +176,7 @@ def _sums_too_large(entries: Sequence[OrderEntry]) -> list[tuple[int, str]]:
 
 def _entry(index: int, raw: Any) -> tuple[OrderEntry | None, str | None]:
     if not isinstance(raw, Mapping):
-        return None, f"entries[{index}]: wanted an object, got {_shown(raw)}"
+        return None, f"entries[{index}]: wanted an object, got {_shortened(raw)}"
     name, quantity = raw.get("child_part_number"), raw.get("quantity")
     problem = quantity_problem(quantity)
     text = None if problem is None else f"entries[{index}].quantity: {problem}"
@@ -187,12 +194,14 @@ def _components(index: int, raw: Any) -> tuple[Sequence[Mapping[str, str]], str 
     if raw is None:
         return (), None
     where = f"entries[{index}].components"
-    if not isinstance(raw, list) or not all(isinstance(one, Mapping) for one in raw):
-        return (), f'{where}: wanted [{{"file": …, "object": …}}, …], got {_shown(raw)}'
-    for one in raw:
-        if wrong := text_problem(one.get("file"), 4096) or text_problem(one.get("object", ""), 1024):
+    if not isinstance(raw, list) or not all(isinstance(component, Mapping) for component in raw):
+        return (), f'{where}: wanted [{{"file": …, "object": …}}, …], got {_shortened(raw)}'
+    for component in raw:
+        if wrong := text_problem(component.get("file"), 4096) or text_problem(
+            component.get("object", ""), 1024
+        ):
             return (), f"{where}: {wrong}"
-    return [{"file": one["file"], "object": one.get("object", "")} for one in raw], None
+    return [{"file": component["file"], "object": component.get("object", "")} for component in raw], None
 
 
 _LEFT_OUT_TEXTS = {"reason": 32, "name": 1024, "file": 4096, "object": 1024, "message": 4096}
@@ -202,13 +211,13 @@ def _left_out(raw: Any, most: int) -> list[dict[str, Any]]:
     if raw is None:
         return []
     if not isinstance(raw, list) or len(raw) > most:
-        raise RejectedError(f"left_out: wanted a list of at most {most} objects, got {_shown(raw)}")
-    return [_left_out_part(index, one) for index, one in enumerate(raw)]
+        raise RejectedError(f"left_out: wanted a list of at most {most} objects, got {_shortened(raw)}")
+    return [_left_out_part(index, part) for index, part in enumerate(raw)]
 
 
 def _left_out_part(index: int, raw: Any) -> dict[str, Any]:
     if not isinstance(raw, Mapping) or not raw.get("reason"):
-        raise RejectedError(f'left_out[{index}]: wanted {{"reason": …, "name": …, …}}, got {_shown(raw)}')
+        raise RejectedError(f'left_out[{index}]: wanted {{"reason": …, "name": …, …}}, got {_shortened(raw)}')
     part: dict[str, Any] = {}
     for name, longest in _LEFT_OUT_TEXTS.items():
         value = raw.get(name, "")
@@ -242,24 +251,24 @@ def _document(raw: Any) -> tuple[str | None, str | None, str | None, int | None]
     return file, folder, sha256, revision
 
 
-def _shown(value: Any) -> str:
+def _shortened(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "…"
 
 
 def event_of(tx: Tx, parent: Item, diff: BomDiff, answer: Mapping[str, Any]) -> dict[str, Any]:
     """The spec's event; ``warnings`` only where there is a conflict, which the diff does not say."""
-    told = dict(answer["diff"])
-    if len(told["unchanged"]) > EVENT_UNCHANGED_LINES:
-        told["unchanged_count"] = len(told["unchanged"])
-        told["unchanged"] = []
+    diff_json = dict(answer["diff"])
+    if len(diff_json["unchanged"]) > EVENT_UNCHANGED_LINES:
+        diff_json["unchanged_count"] = len(diff_json["unchanged"])
+        diff_json["unchanged"] = []
     event: dict[str, Any] = {
         "type": "bom_merge",
         "item": parent.part_number,
         "user": tx.actor.username,
         "timestamp": spec_time(tx.stamp),
         "summary": summary(diff),
-        "diff": told,
+        "diff": diff_json,
         "resolve_url": answer["resolve_url"],
     }
     if "sync_id" in answer:
@@ -293,7 +302,7 @@ class LastSync:
     @property
     def gaps(self) -> list[dict[str, Any]]:
         """Everything that is not in the BOM, a refused merge too."""
-        gaps = [dict(one) for one in self.left_out]
+        gaps = [dict(part) for part in self.left_out]
         if self.refused_at:
             gaps.append({"reason": Reason.REFUSED.value, "message": self.refusal})
         return gaps
@@ -328,7 +337,7 @@ def _read(row: Any) -> LastSync:
         row,
         left_out=json.loads(row.left_out),
         refusal=row.refusal or "",
-        components={int(child): known for child, known in json.loads(row.components).items()},
+        components={int(child): by_child for child, by_child in json.loads(row.components).items()},
         folder=row.folder or "",
     )
 
@@ -346,14 +355,14 @@ def remember(
     entries = [
         {"child_part_number": ids[entry.key], "components": entry.components} for entry in order.entries
     ]
-    known = {str(child): list(components) for child, components in before.components.items()}
-    components = remembered(known, entries, [str(children[number]) for number in kept])
+    by_child = {str(child): list(components) for child, components in before.components.items()}
+    components = remembered(by_child, entries, [str(children[number]) for number in kept])
     tx.conn.execute(delete(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id))
     row = {
         "at": tx.stamp,
         "document_file": order.document_file,
         "folder": order.document_folder or before.folder or None,
-        "left_out": dumps([dict(one) for one in order.left_out]),
+        "left_out": dumps([dict(part) for part in order.left_out]),
         "components": dumps(components),
     }
     _insert(tx, parent, row)
@@ -362,10 +371,10 @@ def remember(
 def remember_refusal(tx: Tx, parent: Item, message: str) -> None:
     """Write down that a merge was refused; what the last good one said stays. Nothing announces it."""
     written = {"refused_at": tx.stamp, "refusal": message}
-    known = tx.conn.execute(
+    result = tx.conn.execute(
         update(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id).values(**written)
     )
-    if not known.rowcount:
+    if not result.rowcount:
         _insert(tx, parent, {"left_out": "[]", "components": "{}", **written})
     tx.touched.add(parent.uuid)
 
@@ -384,13 +393,13 @@ def _sentence(gap: Mapping[str, Any]) -> str:
     name, count = gap.get("name") or gap.get("object") or "", gap.get("quantity")
     who = f"{count} × {name}" if count else str(name)
     where = f" ({gap['file']})" if gap.get("file") else ""
-    known = {
+    texts = {
         Reason.MISSING: f"{who}{where}: the file is missing or cannot be read",
         Reason.UNREGISTERED: f"{who}{where}: no part number yet",
         Reason.BROKEN: str(gap.get("message", "")),
         Reason.REFUSED: f"a later sync was refused: {gap.get('message', '')}",
     }
-    return known.get(gap["reason"], f"{gap['reason']}: {who}{where} {gap.get('message', '')}").rstrip()
+    return texts.get(gap["reason"], f"{gap['reason']}: {who}{where} {gap.get('message', '')}").rstrip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -438,7 +447,19 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     check_version(parent, expected)
     prepared = _prepare(tx, parent, order)
     changes = _line_changes(tx, prepared)
-    change_id, version = apply_changes(tx, parent, changes, _note(prepared, order))
+    change_id, version = apply_changes(
+        tx,
+        parent,
+        changes,
+        ChangeNote(
+            kind=ChangeKind.MERGE,
+            summary=summary(prepared.plan.diff),
+            document_file=order.document_file,
+            document_sha256=order.document_sha256,
+            document_revision=order.document_revision,
+            sync_id=order.sync_id,
+        ),
+    )
     _remember_conflicts(tx, prepared)
     kept = [change.part_number for change in prepared.plan.diff.kept]
     remember(tx, parent, order, prepared.child_ids, prepared.before, kept)
@@ -464,8 +485,10 @@ def _prepare(tx: Tx, parent: Item, order: MergeOrder) -> _Prepared:
         {"child_part_number": names[entry.key], "quantity": entry.quantity} for entry in order.entries
     ]
     before = last_sync(tx, parent)
-    known = [{**_as_mapping(line), "components": before.components.get(line.child_id, ())} for line in lines]
-    plan = plan_merge(entries, known, order.missing)
+    lines_before = [
+        {**_as_mapping(line), "components": before.components.get(line.child_id, ())} for line in lines
+    ]
+    plan = plan_merge(entries, lines_before, order.missing)
     kept = {change.part_number for change in plan.diff.kept}
     check_no_cycle(tx, parent, [child_ids[change.part_number] for change in plan.diff.added])
     accepted = {
@@ -562,17 +585,6 @@ def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineChange]:
     return changes
 
 
-def _note(prepared: _Prepared, order: MergeOrder) -> ChangeNote:
-    return ChangeNote(
-        kind=ChangeKind.MERGE,
-        summary=summary(prepared.plan.diff),
-        document_file=order.document_file,
-        document_sha256=order.document_sha256,
-        document_revision=order.document_revision,
-        sync_id=order.sync_id,
-    )
-
-
 def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:
     ours = bom_conflicts.c.parent_id == prepared.parent.id
     before = {row.child_id: row for row in tx.conn.execute(select(bom_conflicts).where(ours))}
@@ -580,14 +592,14 @@ def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:
     rows = []
     for conflict in prepared.conflicts:
         child_id = prepared.child_ids[conflict.part_number]
-        known = before.get(child_id)
-        same = known is not None and known.cad_quantity == float(conflict.local_quantity)
+        row_before = before.get(child_id)
+        same = row_before is not None and row_before.cad_quantity == float(conflict.local_quantity)
         rows.append(
             {
                 "parent_id": prepared.parent.id,
                 "child_id": child_id,
                 "cad_quantity": float(conflict.local_quantity),
-                "since": known.since if known is not None and same else tx.stamp,
+                "since": row_before.since if row_before is not None and same else tx.stamp,
                 "accepted": prepared.accepted.get(child_id) == conflict.local_quantity,
             }
         )

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What a merge left for a person to decide, in one BOM and in all, and the decisions about it.
 
-Every page shows how many BOMs wait, so finding them reads nothing but what waits (``db.tables.UNREFERENCED``,
-``INCOMPLETE``).
+Every page shows how many BOMs wait, so finding them reads nothing but what waits
+(``db.tables.UNREFERENCED``, ``INCOMPLETE``).
 
-What people do to single BOM lines: add, change, remove. Each is one change in the history.
+What people do to a single BOM line (add, change, remove) is one change in the history.
+
+A person follows an item with all that is in it, or a project folder. News are what somebody else changed
+since the person looked. A page says how many news there are, with the open BOMs that the person settles
+(the badge).
 """
 
 from __future__ import annotations
@@ -12,20 +16,37 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from sqlalchemy import func, select, text, union, update
+from sqlalchemy import ColumnElement, delete, func, insert, or_, select, text, true, union, update
 
+from silo.api.wire import LineTexts
 from silo.bom.compare import same_quantity
-from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
+from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError, VersionConflictError
 from silo.bom.numbers import counts_pieces, plain
 from silo.bom.report import Reason
 from silo.bom.resolve import character_problem
-from silo_server.db.engine import Tx, one_of
-from silo_server.db.tables import INCOMPLETE, UNREFERENCED, bom_conflicts, bom_last_syncs, bom_lines, items
+from silo_server import events
+from silo_server.db.engine import Database, Tx, insert_rows, one_of
+from silo_server.db.tables import (
+    INCOMPLETE,
+    UNREFERENCED,
+    assignees,
+    bom_conflicts,
+    bom_last_syncs,
+    bom_lines,
+    follows,
+    items,
+    product_looks,
+    users,
+)
+from silo_server.db.tables import events as event_log
+from silo_server.schema import text_hints
+from silo_server.services import access
 from silo_server.services.bom.history import Change, last_merge
 from silo_server.services.bom.lines import (
     ChangeKind,
@@ -42,10 +63,11 @@ from silo_server.services.bom.lines import (
     parent_to_change,
 )
 from silo_server.services.bom.merge import quantity_problem
+from silo_server.services.bom.summary import LastChange, Summary, at_once
 from silo_server.services.bom.tree import Graph, Told, conflicts_in
-from silo_server.services.items import get_item
+from silo_server.services.items import get_by_uuids, get_item
 from silo_server.settings import DuplicateError, LinesChangedError
-from silo_server.values import Item, Line, LineState, json_problem
+from silo_server.values import Actor, Item, Line, LineState, Role, json_problem
 
 REL_TYPES = ("component", "alternate", "reference")
 SOURCES = ("manual", "assembly")
@@ -172,11 +194,11 @@ def check_state(state: LineState) -> None:
         problems.append(f"rel_type: wanted one of {', '.join(REL_TYPES)}, got {state.rel_type!r}")
     if state.source not in SOURCES:
         problems.append(f"source: wanted one of {', '.join(SOURCES)}, got {state.source!r}")
-    for name, limit in (("unit", 32), ("find_number", 32)):
-        value = getattr(state, name)
-        if value is not None and len(value) > limit:
+    for name, field in LineTexts.model_fields.items():
+        value, limit = getattr(state, name), text_hints(field).get("maxLength")
+        if value is not None and limit and len(value) > limit:
             problems.append(f"{name}: wanted at most {limit} characters, got {len(value)}")
-    for name in ("unit", "find_number", "notes", "reason", "reference_designators"):
+    for name in (*LineTexts.model_fields, "reason", "reference_designators"):
         for written in (value,) if isinstance(value := getattr(state, name), str) else value or ():
             if problem := character_problem(written):
                 problems.append(f"{name}: {problem}")
@@ -261,8 +283,8 @@ def review(tx: Tx, part_number: str) -> Review:
 def open_conflicts(tx: Tx, parent: Item, lines: Sequence[Line]) -> list[Conflict]:
     """Return the conflicts of one BOM, in the order of its lines."""
     graph = Graph(parent, {parent.id: lines}, conflicts_in(tx, [parent.id]))
-    found = graph.conflicts.get(parent.id, {})
-    return [Conflict(line, *found[line.child_id]) for line in lines if graph.told(line) is not None]
+    conflict = graph.conflicts.get(parent.id, {})
+    return [Conflict(line, *conflict[line.child_id]) for line in lines if graph.told(line) is not None]
 
 
 def told_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[int, float]]:
@@ -273,10 +295,10 @@ def told_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[int, 
             one_of(tx, bom_conflicts.c.parent_id, parent_ids)
         )
     )
-    found: dict[int, dict[int, float]] = {}
+    quantities: dict[int, dict[int, float]] = {}
     for row in rows:
-        found.setdefault(row.parent_id, {})[row.child_id] = row.cad_quantity
-    return found
+        quantities.setdefault(row.parent_id, {})[row.child_id] = row.cad_quantity
+    return quantities
 
 
 def resolve(
@@ -329,8 +351,8 @@ def resolve(
 
 def marks_of(lines: Sequence[Line], conflicts: Mapping[str, Conflict]) -> dict[str, str]:
     """Line id → mark of what a page shows of it: its state, and what CAD says where they differ."""
-    told = {line_id: conflict.cad_quantity for line_id, conflict in conflicts.items()}
-    return {line.id: mark_of(line.state, told.get(line.id)) for line in lines}
+    quantities = {line_id: conflict.cad_quantity for line_id, conflict in conflicts.items()}
+    return {line.id: mark_of(line.state, quantities.get(line.id)) for line in lines}
 
 
 def _decided(line: Line, decision: Decision, conflict: Conflict | None) -> LineState | None:
@@ -411,6 +433,7 @@ class Waiting(NamedTuple):
     document_file: str
     synced_at: str | None
     told: Told
+    assignee: str
     unreferenced: int
     left_out: int
     unregistered: int
@@ -433,35 +456,62 @@ def waiting(tx: Tx) -> list[Waiting]:
     """
     unreferenced, conflicts, gaps = _unreferenced(tx), conflicts_in(tx), _gaps(tx)
     row, last, nobody = items.c, bom_last_syncs.c, Told()
+    shown = (row.id, row.part_number, row.name, row.bom_version, last.folder, last.document_file, last.at)
     query = (
-        select(row.id, row.part_number, row.name, row.bom_version, last.folder, last.document_file, last.at)
+        select(*shown, users.c.username)
         .outerjoin_from(items, bom_last_syncs, last.parent_id == row.id)
+        .outerjoin(assignees, assignees.c.item_id == row.id)
+        .outerjoin(users, users.c.id == assignees.c.user_id)
         .where(one_of(tx, row.id, {*unreferenced, *conflicts, *gaps}), row.archived_at.is_(None))
     )
-    found = [
+    waitings = [
         Waiting(
             *(number, name, version, folder or "", file or "", at),
-            *(conflicts.get(one, nobody), unreferenced[one], *gaps.get(one, (0, 0))),
+            *(
+                conflicts.get(each_row, nobody),
+                who or "",
+                unreferenced[each_row],
+                *gaps.get(each_row, (0, 0)),
+            ),
         )
-        for one, number, name, version, folder, file, at in tx.conn.execute(query)
+        for each_row, number, name, version, folder, file, at, who in tx.conn.execute(query)
     ]
-    return sorted(found, key=lambda one: one.part_number.casefold())
+    return sorted(waitings, key=lambda each_row: each_row.part_number.casefold())
 
 
 def waiting_count(tx: Tx) -> int:
     """How many BOMs wait."""
+    return _count(tx, lambda _: true())
+
+
+def open_among(tx: Tx, item_ids: Collection[int]) -> int:
+    """How many of these BOMs wait."""
+    return _count(tx, lambda element: one_of(tx, element, item_ids))
+
+
+def waiting_in(tx: Tx, folder: str) -> int:
+    """How many BOMs wait in a project folder and those in it."""
+    last = bom_last_syncs.c
+    inside = or_(last.folder == folder, last.folder.startswith(f"{folder}/", autoescape=True))
+    return _count(tx, lambda element: element.in_(select(last.parent_id).where(inside)))
+
+
+def _count(tx: Tx, which: Callable[[ColumnElement[int]], ColumnElement[bool]]) -> int:
     unreferenced = select(bom_lines.c.parent_id).where(text(f"bom_lines.{UNREFERENCED}"))
     incomplete = select(bom_last_syncs.c.parent_id).where(text(f"({INCOMPLETE})"))
     disputed = select(items.c.id).where(one_of(tx, items.c.id, conflicts_in(tx)))
-    ids = union(unreferenced, incomplete, disputed)
-    alive = select(func.count()).select_from(items).where(items.c.id.in_(ids), items.c.archived_at.is_(None))
-    return tx.conn.scalar(alive) or 0
+    parent_id = union(unreferenced, incomplete, disputed).subquery().c.parent_id
+    # Archived items are few: PostgreSQL reads all items, for each page, if asked which of these are not.
+    archived = select(items.c.id).where(items.c.archived_at.is_not(None))
+    return (
+        tx.conn.scalar(select(func.count(parent_id)).where(parent_id.not_in(archived), which(parent_id))) or 0
+    )
 
 
 def _mark(version: int, conflicts: Told) -> str:
     # A sync that only brings other conflicts changes no line, and so not the version.
-    told = repr(sorted((child, said[0]) for child, said in conflicts.items()))
-    return f"{version}-{hashlib.sha256(told.encode()).hexdigest()[:16]}"
+    digest = repr(sorted((child, said[0]) for child, said in conflicts.items()))
+    return f"{version}-{hashlib.sha256(digest.encode()).hexdigest()[:16]}"
 
 
 def lines_for(tx: Tx, part_number: str, action: Action, seen: str) -> tuple[list[Line], list[Line]]:
@@ -470,15 +520,21 @@ def lines_for(tx: Tx, part_number: str, action: Action, seen: str) -> tuple[list
     seen
         the mark of what the person saw; VersionConflictError if the BOM is another one by now.
     """
-    found = review(tx, part_number)
+    open_lines = review(tx, part_number)
     if action in (Action.TAKE_CAD, Action.KEEP_SILO):
-        lines = [one.line for one in found.conflicts]
-        gone = [one.line for one in found.conflicts if action is Action.TAKE_CAD and not one.cad_quantity]
+        lines = [conflict.line for conflict in open_lines.conflicts]
+        gone = [
+            conflict.line
+            for conflict in open_lines.conflicts
+            if action is Action.TAKE_CAD and not conflict.cad_quantity
+        ]
     else:
-        lines = list(found.unreferenced)
+        lines = list(open_lines.unreferenced)
         gone = lines if action is Action.REMOVE else []
-    conflicts = {one.line.child_id: (one.cad_quantity, one.since) for one in found.conflicts}
-    if lines and seen != _mark(found.parent.bom_version, conflicts):
+    conflicts = {
+        conflict.line.child_id: (conflict.cad_quantity, conflict.since) for conflict in open_lines.conflicts
+    }
+    if lines and seen != _mark(open_lines.parent.bom_version, conflicts):
         raise VersionConflictError(f"the BOM of {part_number} is not as it was seen")
     return lines, gone
 
@@ -501,9 +557,188 @@ def _gaps(tx: Tx) -> dict[int, tuple[int, int]]:
     """By BOM how much its last sync left out: what is registered or cannot be, and what is not yet."""
     row = bom_last_syncs.c
     query = select(row.parent_id, row.left_out, row.refused_at).where(text(f"({INCOMPLETE})"))
-    found: dict[int, tuple[int, int]] = {}
+    gaps: dict[int, tuple[int, int]] = {}
     for parent_id, left_out, refused_at in tx.conn.execute(query):
-        reasons = [one["reason"] for one in json.loads(left_out)]
+        reasons = [load["reason"] for load in json.loads(left_out)]
         missing = reasons.count(Reason.UNREGISTERED)
-        found[parent_id] = len(reasons) + bool(refused_at) - missing, missing
-    return found
+        gaps[parent_id] = len(reasons) + bool(refused_at) - missing, missing
+    return gaps
+
+
+SAME_LOOK = timedelta(hours=1)
+ITEM, FOLDER = "item:", "folder:"
+MOST_FOLLOWED = 200
+
+
+class Followed(NamedTuple):
+    """What a person follows: an item, or a folder if there is none.
+
+    since
+        when the person looked at the item.
+    news
+        somebody else changed something in it since then.
+    waiting
+        how many BOMs with something open are in a folder.
+    """
+
+    target: str
+    item: Item | None
+    folder: str
+    summary: Summary | None
+    changed: LastChange | None
+    news: bool
+    waiting: int = 0
+    since: str = ""
+
+
+def follow(tx: Tx, target: str, *, on: bool) -> None:
+    """Begin or end to follow ``item:UUID`` or ``folder:PATH``."""
+    kind, _, name = target.partition(":")
+    folder = name.strip("/")
+    if kind == "item" and get_by_uuids(tx, [name], include_archived=True):
+        target = ITEM + name.lower()
+    elif kind == "folder" and folder and len(folder) <= 1000:
+        target = FOLDER + folder
+    else:
+        raise RejectedError(f"target: wanted an item or a project folder, got {target[:80]!r}")
+    row, user_id = follows.c, tx.actor.own_id
+    rowcount = tx.conn.execute(delete(follows).where(row.user_id == user_id, row.target == target)).rowcount
+    count = tx.conn.scalar(select(func.count()).select_from(follows).where(row.user_id == user_id)) or 0
+    if on and not rowcount and count >= MOST_FOLLOWED:
+        raise RejectedError(f"one person follows at most {MOST_FOLLOWED} items and folders; end some first")
+    if on:
+        seen = {"seen": tx.stamp, "event": events.bounds(tx)[1]}
+        tx.conn.execute(insert(follows).values(user_id=user_id, target=target, **seen))
+
+
+def is_followed(tx: Tx, user_id: int, item: Item) -> bool:
+    """Return whether this person follows the item."""
+    row = follows.c
+    query = select(row.seen).where(row.user_id == user_id, row.target == ITEM + item.uuid)
+    return tx.conn.scalar(query) is not None
+
+
+def have_seen(tx: Tx) -> None:
+    """Note that the person has seen all news."""
+    seen = {"seen": tx.stamp, "event": events.bounds(tx)[1]}
+    tx.conn.execute(follows.update().where(follows.c.user_id == tx.actor.own_id).values(seen))
+
+
+def followed(tx: Tx, actor: Actor, *, whole: bool = True) -> list[Followed]:
+    """Return what a person follows, news first; not ``whole``: without how many BOMs wait in folders."""
+    rows = tx.conn.execute(select(follows).where(follows.c.user_id == actor.own_id)).all()
+    if not rows:
+        return []
+    by_uuid = {row.target.removeprefix(ITEM): row for row in rows if row.target.startswith(ITEM)}
+    items_followed = get_by_uuids(tx, list(by_uuid), include_archived=True)
+    sums = at_once(tx, {item.id for item in items_followed})
+    look = product_looks.c
+    query = select(look.item_id, look.at).where(look.user_id == actor.own_id, one_of(tx, look.item_id, sums))
+    looked = dict(tx.conn.execute(query).all())
+    subjects = []
+    for item in items_followed:
+        row, summary = by_uuid[item.uuid], sums.get(item.id)
+        changed = summary.changed if summary else None
+        last = max(row.seen, looked.get(item.id, ""))
+        news = changed is not None and changed.at > last and changed.username != actor.username
+        subjects.append(Followed(row.target, item, "", summary, changed, news, since=last))
+    for row in rows:
+        if row.target.startswith(FOLDER):
+            folder = row.target.removeprefix(FOLDER)
+            changed = _newest_in(tx, folder, row.event, actor.username)
+            waits = waiting_in(tx, folder) if whole else 0
+            subjects.append(Followed(row.target, None, folder, None, changed, changed is not None, waits))
+    return sorted(
+        subjects,
+        key=lambda subject: (not subject.news, subject.item.part_number if subject.item else subject.folder),
+    )
+
+
+def _newest_in(tx: Tx, folder: str, after: int, but: str) -> LastChange | None:
+    """The newest event of somebody else in the BOMs of a folder."""
+    event, last = event_log.c, bom_last_syncs.c
+    query = (
+        select(event.at, event.username, items.c.part_number)
+        .join(items, items.c.uuid == event.item_uuid)
+        .join(bom_last_syncs, last.parent_id == items.c.id)
+        .where(event.id > after, event.username != but)
+        .where(or_(last.folder == folder, last.folder.startswith(f"{folder}/", autoescape=True)))
+    )
+    row = tx.conn.execute(query.order_by(event.id.desc()).limit(1)).one_or_none()
+    return None if row is None else LastChange(*row)
+
+
+def assign(tx: Tx, part_number: str, username: str) -> None:
+    """Let a person settle what is open in a BOM; username "": nobody in particular."""
+    item = get_item(tx, part_number, lock=True)
+    tx.conn.execute(delete(assignees).where(assignees.c.item_id == item.id))
+    if username:
+        user = access.get_user(tx, username)
+        if not (user.active and user.role.covers(Role.EDITOR)):
+            raise ForbiddenError(f"{user.username} cannot change BOMs, so cannot settle what is open in one")
+        tx.conn.execute(insert(assignees).values(item_id=item.id, user_id=user.id, at=tx.stamp))
+    access.note(tx, "bom.assigned", item.part_number, username or "nobody")
+
+
+def assignee_of(tx: Tx, item: Item) -> str:
+    """Return the name of the person who settles what is open in a BOM; "" if it is nobody in particular."""
+    query = select(users.c.username).join(assignees, assignees.c.user_id == users.c.id)
+    return tx.conn.scalar(query.where(assignees.c.item_id == item.id)) or ""
+
+
+def editors(tx: Tx) -> list[str]:
+    """Return the names of all who may settle what is open."""
+    return [user.username for user in access.list_users(tx) if user.active and user.role.covers(Role.EDITOR)]
+
+
+def badge(tx: Tx, actor: Actor) -> int:
+    """How much waits for one person: the open BOMs that are theirs, and the news of what they follow."""
+    theirs = select(assignees.c.item_id).where(assignees.c.user_id == actor.own_id)
+    ids = list(tx.conn.scalars(theirs))
+    mine = open_among(tx, ids) if ids else 0
+    return mine + sum(subject.news for subject in followed(tx, actor, whole=False))
+
+
+def last_look(tx: Tx, user_id: int, item: Item) -> str | None:
+    """When this person looked at the product before; another look within the hour is the same one."""
+    row = tx.conn.execute(select(product_looks).where(_look_of([(user_id, item.id)]))).one_or_none()
+    if row is None:
+        return None
+    return str(row.at) if _is_another(row.at, tx.stamp) else row.since
+
+
+def keep_looks(db: Database) -> None:
+    """Note who looked at what; no page waits for this."""
+    looks = dict(db.looks)
+    if not looks:
+        return
+    with db.write(even_when_read_only=True) as tx:
+        ours = _look_of(looks)
+        before = {
+            (row.user_id, row.item_id): row for row in tx.conn.execute(select(product_looks).where(ours))
+        }
+        tx.conn.execute(delete(product_looks).where(ours))
+        rows = []
+        for who, at in looks.items():
+            looks_before = before.get(who)
+            since = (
+                None
+                if looks_before is None
+                else looks_before.at
+                if _is_another(looks_before.at, at)
+                else looks_before.since
+            )
+            rows.append({"user_id": who[0], "item_id": who[1], "at": at, "since": since})
+        insert_rows(tx, product_looks, rows)
+    for who, at in looks.items():
+        if db.looks.get(who) == at:
+            del db.looks[who]
+
+
+def _look_of(whose: Iterable[tuple[int, int]]) -> ColumnElement[bool]:
+    row = product_looks.c
+    return or_(*((row.user_id == user) & (row.item_id == item) for user, item in whose))
+
+
+def _is_another(last: str, now: str) -> bool:
+    return datetime.fromisoformat(now) - datetime.fromisoformat(last) > SAME_LOOK

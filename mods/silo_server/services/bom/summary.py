@@ -31,7 +31,7 @@ from decimal import Decimal
 from itertools import chain, zip_longest
 from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, delete, or_, select
+from sqlalchemy import delete, select
 
 from silo.bom.errors import BusyError, CycleError, counted
 from silo.bom.numbers import as_decimal, exact_product, exact_sum
@@ -42,7 +42,6 @@ from silo_server.db.tables import (
     bom_last_syncs,
     bom_lines,
     items,
-    product_looks,
     product_summaries,
 )
 from silo_server.db.tables import events as event_log
@@ -58,7 +57,6 @@ MOST_NAMED = 12
 BATCH_LINES = 20_000
 # A list of items sums up what has so many lines in all.
 MOST_FOR_A_LIST = 2000
-SAME_LOOK = timedelta(hours=1)
 # [s] Its waits and its statements.
 LONGEST_CHANGE = 300
 
@@ -74,8 +72,8 @@ class OpenBom(NamedTuple):
     @property
     def questions(self) -> str:
         """What a person has to decide there, in words."""
-        told = ((self.unreferenced, "unreferenced line"), (self.conflicts, "conflict"))
-        return ", ".join(counted(count, word) for count, word in told if count)
+        counts = ((self.unreferenced, "unreferenced line"), (self.conflicts, "conflict"))
+        return ", ".join(counted(count, word) for count, word in counts if count)
 
     @property
     def words(self) -> str:
@@ -83,7 +81,7 @@ class OpenBom(NamedTuple):
         return ", ".join(filter(None, (self.questions, self.incomplete)))
 
 
-class Worth(NamedTuple):
+class MassAndCost(NamedTuple):
     """What one piece of an item weighs [kg] and costs, per currency; of an assembly, all that is in it.
 
     ``whole``: nothing that belongs to it is without a value.
@@ -124,8 +122,8 @@ class Summary:
     """
 
     open: Mapping[int, OpenBom]
-    worth: Worth
-    as_part: Worth
+    worth: MassAndCost
+    as_part: MassAndCost
     changed: LastChange
     levels: Sequence[int] = ()
     parts: int = 0
@@ -139,7 +137,7 @@ class Summary:
 
     def told(self, but: int | None = None) -> list[tuple[str, str]]:
         """Return (part number, what is open there) of each BOM, ``but`` one, by part number."""
-        return sorted((one.part_number, one.words) for item_id, one in self.open.items() if item_id != but)
+        return sorted((bom.part_number, bom.words) for item_id, bom in self.open.items() if item_id != but)
 
     def inside(self, own: int, *, is_open: bool) -> list[str]:
         """Return what its row in a tree says; ``own`` is its internal id, an open row shows its lines."""
@@ -158,12 +156,12 @@ class Summary:
     @property
     def questions(self) -> int:
         """How many lines wait for a person."""
-        return sum(one.unreferenced + one.conflicts for one in self.open.values())
+        return sum(bom.unreferenced + bom.conflicts for bom in self.open.values())
 
     @property
     def incomplete(self) -> int:
         """How many BOMs do not hold all that they should."""
-        return sum(bool(one.incomplete) for one in self.open.values())
+        return sum(bool(bom.incomplete) for bom in self.open.values())
 
 
 class _Node(NamedTuple):
@@ -204,31 +202,34 @@ def summary_of(tx: Tx, item: Item) -> Summary:
 def summaries(tx: Tx, item_ids: Collection[int]) -> dict[int, Summary]:
     """The summaries of these items, by internal id: what is kept, and what is made for it."""
     wanted = set(item_ids)
-    found = dict(_kept(tx, wanted))
-    made = _make(tx, wanted - found.keys(), tx.settings.max_expanded_rows)
-    return found | {one: node.summary for one, node in made.items()}
+    by_item = dict(_stored(tx, wanted))
+    made = _make(tx, wanted - by_item.keys(), tx.settings.max_expanded_rows)
+    return by_item | {item_id: node.summary for item_id, node in made.items()}
 
 
 def marks_of(tx: Tx, listed: Iterable[Item]) -> dict[int, list[str]]:
-    """Say what is open in each of these products, for a list of them.
-
-    So that no list waits for large products, those have no mark before the server has summed them up.
-    """
+    """Say what is open in each of these products, for a list of them."""
     wanted = {item.id for item in listed if item.item_type == "assembly" or item.bom_version}
-    found = dict(_kept(tx, wanted))
+    by_item = at_once(tx, wanted)
+    return {item_id: summary.inside(item_id, is_open=False) for item_id, summary in by_item.items()}
+
+
+def at_once(tx: Tx, wanted: Set[int]) -> dict[int, Summary]:
+    """Return the summaries of these items; those of large products once the server has summed them up."""
+    result = dict(_stored(tx, wanted))
     with suppress(BusyError, CycleError):
-        made = _make(tx, wanted - found.keys(), MOST_FOR_A_LIST)
-        found |= {one: node.summary for one, node in made.items()}
-    return {one: summary.inside(one, is_open=False) for one, summary in found.items()}
+        made = _make(tx, wanted - result.keys(), MOST_FOR_A_LIST)
+        result |= {item_id: node.summary for item_id, node in made.items()}
+    return result
 
 
 def standing_alone(tx: Tx, graph: Graph) -> set[int]:
     """Return the assemblies in a graph that state a mass for parts without a mass, by internal id."""
-    found = summaries(tx, graph.lines.keys() - {graph.root.id})
-    return {one for one, summary in found.items() if summary.stands_alone}
+    by_item = summaries(tx, graph.lines.keys() - {graph.root.id})
+    return {item_id for item_id, summary in by_item.items() if summary.stands_alone}
 
 
-def _kept(tx: Tx, item_ids: Collection[int]) -> Iterator[tuple[int, Summary]]:
+def _stored(tx: Tx, item_ids: Collection[int]) -> Iterator[tuple[int, Summary]]:
     row = product_summaries.c
     query = select(row.item_id, row.summary).where(one_of(tx, row.item_id, item_ids))
     for item_id, written in tx.conn.execute(query):
@@ -243,16 +244,27 @@ def _make(tx: Tx, wanted: Collection[int], most: int | None = None) -> dict[int,
     children = {line.child_id for below in lines.values() for line in below}
     own = _own(tx, {*wanted, *lines, *children} - nodes.keys())
     maker = _Maker(lines, nodes, own, _open(tx, lines, own), _bom_changes(tx, lines))
-    edges = {one: [line.child_id for line in rows if _followed(line)] for one, rows in lines.items()}
-    for item_id in _children_first(edges, wanted, {one: known.part_number for one, known in own.items()}):
+    edges = {
+        each_item_id: [line.child_id for line in rows if _followed(line)]
+        for each_item_id, rows in lines.items()
+    }
+    for item_id in _children_first(
+        edges, wanted, {each_item_id: own_facts.part_number for each_item_id, own_facts in own.items()}
+    ):
         maker.node(item_id)
-    products = {one for one in own if one in lines or own[one].is_assembly}
+    products = {
+        each_item_id for each_item_id in own if each_item_id in lines or own[each_item_id].is_assembly
+    }
     if products and tx.built is not None:
         head = events.bounds(tx)[1]
         tx.built.append(
-            Built(head, tx.stamp, [_row(one, nodes[one]) for one in sorted(products) if one in nodes])
+            Built(
+                head,
+                tx.stamp,
+                [_row(product, nodes[product]) for product in sorted(products) if product in nodes],
+            )
         )
-    return {one: nodes[one] for one in wanted}
+    return {each_item_id: nodes[each_item_id] for each_item_id in wanted}
 
 
 def _followed(line: Line) -> bool:
@@ -290,8 +302,8 @@ def _lines_below(
         seen |= level
         row_of = product_summaries.c
         kept = select(product_summaries).where(one_of(tx, row_of.item_id, level))
-        for found in tx.conn.execute(kept):
-            nodes[found.item_id] = _node(found)
+        for row_below in tx.conn.execute(kept):
+            nodes[row_below.item_id] = _node(row_below)
         level -= nodes.keys()
     return lines, nodes
 
@@ -301,7 +313,7 @@ class _Own(NamedTuple):
 
     part_number: str
     is_assembly: bool
-    worth: Worth
+    worth: MassAndCost
     changed: LastChange
 
 
@@ -321,28 +333,28 @@ def _own(tx: Tx, item_ids: Collection[int]) -> dict[int, _Own]:
     }
 
 
-def own_worth(properties: Mapping[str, Any]) -> Worth:
+def own_worth(properties: Mapping[str, Any]) -> MassAndCost:
     """What an item states of itself."""
     mass, cost = (positive_number(properties, name) for name in ("mass_kg", "standard_cost"))
     costs = {currency_of(properties): as_decimal(cost)} if cost is not None else {}
-    return Worth(None if mass is None else as_decimal(mass), mass is not None, costs, bool(costs))
+    return MassAndCost(None if mass is None else as_decimal(mass), mass is not None, costs, bool(costs))
 
 
 def _open(tx: Tx, lines: Mapping[int, Sequence[Line]], own: Mapping[int, _Own]) -> dict[int, OpenBom]:
     """What is open in each of these BOMs itself."""
-    ids = {one for one in own if one in lines or own[one].is_assembly}
-    syncs, told = last_syncs(tx, ids), conflicts_in(tx, lines)
-    found: dict[int, OpenBom] = {}
-    for one in ids:
-        last, below = syncs.get(one, NEVER), lines.get(one, ())
+    ids = {item_id for item_id in own if item_id in lines or own[item_id].is_assembly}
+    syncs, conflicts = last_syncs(tx, ids), conflicts_in(tx, lines)
+    boms: dict[int, OpenBom] = {}
+    for item_id in ids:
+        last, below = syncs.get(item_id, NEVER), lines.get(item_id, ())
         incomplete = f"incomplete: {last.words}" if last.gaps else ""
         if not incomplete and last.at is None and not below:
             incomplete = "never synced"
         gone = sum(line.state.unreferenced_since is not None for line in below)
-        made = OpenBom(own[one].part_number, gone, len(told.get(one, ())), incomplete)
+        made = OpenBom(own[item_id].part_number, gone, len(conflicts.get(item_id, ())), incomplete)
         if made.words:
-            found[one] = made
-    return found
+            boms[item_id] = made
+    return boms
 
 
 def _bom_changes(tx: Tx, parent_ids: Collection[int]) -> dict[int, tuple[str, str]]:
@@ -371,7 +383,9 @@ def _children_first(
                 yield item_id
             elif child in way:
                 ring = list(way)
-                raise CycleError([names[one] for one in [*ring[ring.index(child) :], child]])
+                raise CycleError(
+                    [names[each_item_id] for each_item_id in [*ring[ring.index(child) :], child]]
+                )
             elif child in below and child not in done:
                 way[child] = iter(below[child])
 
@@ -399,7 +413,7 @@ class _Maker:
         worth = _sum_of(below) if below else own.worth
         states_all = not worth.mass_whole and own.worth.mass is not None
         as_part = worth._replace(mass=own.worth.mass, mass_whole=True) if states_all else worth
-        open_ones = {one: told for node in nodes for one, told in node.summary.open.items()}
+        open_ones = {each_item_id: bom for node in nodes for each_item_id, bom in node.summary.open.items()}
         changes = [own.changed, *(node.summary.changed for node in nodes)]
         if item_id in self.open:
             open_ones[item_id] = self.open[item_id]
@@ -410,7 +424,9 @@ class _Maker:
         unweighed = [node for node in nodes if not node.summary.as_part.mass_whole]
         no_mass = (set() if worth.mass_whole else me).union(*(node.no_mass for node in unweighed))
         no_cost = (set() if worth.cost_whole else me).union(*(node.no_cost for node in nodes))
-        assemblies = {one: counts for node in nodes for one, counts in node.assemblies.items()}
+        assemblies = {
+            each_item_id: counts for node in nodes for each_item_id, counts in node.assemblies.items()
+        }
         older = sum(newer_exists(line) for line in lines)
         summary = Summary(
             open=open_ones,
@@ -436,7 +452,7 @@ def _first(me: Collection[int], own: _Own, below: Iterable[Sequence[str]]) -> li
     return sorted({*chain.from_iterable(below), *(own.part_number for _ in me)})[:MOST_NAMED]
 
 
-def _sum_of(below: Sequence[tuple[Line, _Node]]) -> Worth:
+def _sum_of(below: Sequence[tuple[Line, _Node]]) -> MassAndCost:
     mass: Decimal | None = None
     costs: dict[str, Decimal] = {}
     parts = [node.summary.as_part for _, node in below]
@@ -447,7 +463,7 @@ def _sum_of(below: Sequence[tuple[Line, _Node]]) -> Worth:
         for currency, cost in worth.costs.items():
             costs[currency] = exact_sum((costs.get(currency, Decimal(0)), exact_product((quantity, cost))))
     whole = (all(worth.mass_whole for worth in parts), all(worth.cost_whole for worth in parts))
-    return Worth(mass, whole[0], costs, whole[1])
+    return MassAndCost(mass, whole[0], costs, whole[1])
 
 
 def _levels(rows: int, below: Iterable[Sequence[int]]) -> list[int]:
@@ -466,19 +482,19 @@ def _row(item_id: int, node: _Node) -> dict[str, Any]:
 
 
 def _summary(text: str) -> Summary:
-    told = json.loads(text)
+    loads = json.loads(text)
     for name in ("worth", "as_part"):
-        mass, mass_whole, costs, cost_whole = told[name]
+        mass, mass_whole, costs, cost_whole = loads[name]
         exact = {currency: Decimal(cost) for currency, cost in costs.items()}
-        told[name] = Worth(None if mass is None else Decimal(mass), mass_whole, exact, cost_whole)
-    told["open"] = {int(one): OpenBom(*values) for one, values in told["open"].items()}
-    return Summary(**told | {"changed": LastChange(*told["changed"])})
+        loads[name] = MassAndCost(None if mass is None else Decimal(mass), mass_whole, exact, cost_whole)
+    loads["open"] = {int(parent_id): OpenBom(*values) for parent_id, values in loads["open"].items()}
+    return Summary(**loads | {"changed": LastChange(*loads["changed"])})
 
 
 def _node(row: Any) -> _Node:
     sets = json.loads(row.sets)
     parts, no_mass, no_cost = (frozenset(sets[name]) for name in ("parts", "no_mass", "no_cost"))
-    assemblies = {int(one): counts for one, counts in sets["assemblies"].items()}
+    assemblies = {int(item_id): counts for item_id, counts in sets["assemblies"].items()}
     return _Node(_summary(row.summary), parts, no_mass, no_cost, assemblies)
 
 
@@ -515,7 +531,7 @@ def _keep(tx: Tx, built: Built) -> None:
 
 
 def keep_all(db: Database, report: Callable[[str], None] = lambda _: None) -> int:
-    """Make the summaries of all assemblies anew; return how many. The server may run meanwhile."""
+    """Make the summaries of all assemblies again; return how many. The server may run meanwhile."""
     with db.write(even_when_read_only=True) as tx:
         tx.lock(EVENT_LOCK)
         tx.conn.execute(delete(product_summaries))
@@ -540,8 +556,8 @@ def _keep_below(
     with db.read() as tx:
         line = bom_lines.c
         kept = select(product_summaries.c.item_id)
-        known = tx.conn.scalars(kept.where(one_of(tx, product_summaries.c.item_id, wanted)))
-        level = set(wanted).difference(known)
+        scalars = tx.conn.scalars(kept.where(one_of(tx, product_summaries.c.item_id, wanted)))
+        level = set(wanted).difference(scalars)
         unmade = set(level)
         while level:
             query = select(line.parent_id, line.child_id, line.rel_type)
@@ -573,50 +589,11 @@ def _parts(order: Iterable[int], counts: Mapping[int, int]) -> Iterator[list[int
     """The assemblies, as many at a time as have :data:`BATCH_LINES` lines in all."""
     part: list[int] = []
     lines = 0
-    for one in order:
-        if part and lines + counts[one] > BATCH_LINES:
+    for item_id in order:
+        if part and lines + counts[item_id] > BATCH_LINES:
             yield part
             part, lines = [], 0
-        part.append(one)
-        lines += counts[one]
+        part.append(item_id)
+        lines += counts[item_id]
     if part:
         yield part
-
-
-def last_look(tx: Tx, user_id: int, item: Item) -> str | None:
-    """When this person looked at the product before; another look within the hour is the same one."""
-    row = tx.conn.execute(select(product_looks).where(_look_of([(user_id, item.id)]))).one_or_none()
-    if row is None:
-        return None
-    return str(row.at) if _is_another(row.at, tx.stamp) else row.since
-
-
-def keep_looks(db: Database) -> None:
-    """Note who looked at what; no page waits for this."""
-    looks = dict(db.looks)
-    if not looks:
-        return
-    with db.write(even_when_read_only=True) as tx:
-        ours = _look_of(looks)
-        before = {
-            (row.user_id, row.item_id): row for row in tx.conn.execute(select(product_looks).where(ours))
-        }
-        tx.conn.execute(delete(product_looks).where(ours))
-        rows = []
-        for who, at in looks.items():
-            known = before.get(who)
-            since = None if known is None else known.at if _is_another(known.at, at) else known.since
-            rows.append({"user_id": who[0], "item_id": who[1], "at": at, "since": since})
-        insert_rows(tx, product_looks, rows)
-    for who, at in looks.items():
-        if db.looks.get(who) == at:
-            del db.looks[who]
-
-
-def _look_of(whose: Iterable[tuple[int, int]]) -> ColumnElement[bool]:
-    row = product_looks.c
-    return or_(*((row.user_id == user) & (row.item_id == item) for user, item in whose))
-
-
-def _is_another(last: str, now: str) -> bool:
-    return datetime.fromisoformat(now) - datetime.fromisoformat(last) > SAME_LOOK

@@ -14,8 +14,8 @@ import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from functools import cache
-from itertools import islice
+from functools import cache, lru_cache
+from itertools import chain, islice
 from typing import Any, NamedTuple, TypeVar
 
 from sqlalchemy import ColumnElement, Select, func, literal, select
@@ -23,13 +23,13 @@ from sqlalchemy import ColumnElement, Select, func, literal, select
 from silo.bom.compare import says_the_same
 from silo.bom.errors import ConflictError, CycleError
 from silo.bom.numbers import as_decimal, exact_product, exact_sum, plain, read_number
-from silo_server.db.engine import Tx, one_of
+from silo_server.db.engine import Tx, among, one_of
 from silo_server.db.tables import bom_conflicts, bom_lines, items
-from silo_server.services.bom.lines import select_lines, to_line
+from silo_server.services.bom.lines import child_of, select_lines, to_line
 from silo_server.services.items import by_ids
 from silo_server.services.search import fits
 from silo_server.settings import TooLargeError
-from silo_server.values import Item, Line
+from silo_server.values import Item, Line, bought
 
 MAX_DEPTH = 20
 # Properties that a filter looks in beside number, name and description.
@@ -63,11 +63,11 @@ class Graph:
 
     def doubts(self, line: Line) -> list[str]:
         """Return what a person still has to decide about a line, in words."""
-        told = self.told(line)
-        found = ["unreferenced"] if line.state.unreferenced_since else []
-        if told is not None:
-            found.append(f"CAD says {plain(told)}" if told else "CAD has it no more")
-        return found
+        quantity = self.told(line)
+        result = ["unreferenced"] if line.state.unreferenced_since else []
+        if quantity is not None:
+            result.append(f"CAD says {plain(quantity)}" if quantity else "CAD has it no more")
+        return result
 
     def names(self) -> dict[int, str]:
         """Internal id → part number, of the root and of all below it."""
@@ -88,8 +88,7 @@ class Occurrence(NamedTuple):
     total: Exact
 
 
-@dataclass(frozen=True, slots=True)
-class FlatRow:
+class FlatRow(NamedTuple):
     """A leaf part: how much of it one root needs in all.
 
     gone
@@ -106,10 +105,10 @@ class FlatRow:
 
     def doubts(self, pieces: int = 1) -> list[str]:
         """Return what a person still has to decide about it, in words."""
-        found = ["unreferenced"] if self.gone else []
+        doubt_texts = ["unreferenced"] if self.gone else []
         if 0 < self.gone < self.total:
-            found = [f"{plain(self.gone * pieces)} of {plain(self.total * pieces)} unreferenced"]
-        return [*found, "a quantity in conflict"] if self.disputed else found
+            doubt_texts = [f"{plain(self.gone * pieces)} of {plain(self.total * pieces)} unreferenced"]
+        return [*doubt_texts, "a quantity in conflict"] if self.disputed else doubt_texts
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,24 +134,27 @@ def load_graph(tx: Tx, root: Item, depth: int | None = None, *, bare: bool = Fal
     if depth == 1:
         query = query.where(bom_lines.c.parent_id == root.id)
     else:
-        query = query.where(bom_lines.c.parent_id.in_(_reach(root, depth)))
+        query = query.where(among(tx, bom_lines.c.parent_id, _reach(root, depth)))
     most = tx.settings.max_expanded_rows
     lines: dict[int, list[Line]] = {}
     # What many lines say of one child is kept once.
     names: dict[int, tuple[Any, ...]] = {}
     with tx.conn.execute(query.limit(most + 1), execution_options={"yield_per": 2000}) as rows:
-        for number, row in enumerate(rows):
+        for number, row in enumerate(chain.from_iterable(rows.partitions())):
             if number == most:
                 raise TooLargeError(
                     f"there are more than {most} different lines below {root.part_number}; ask for one of "
                     "its sub-assemblies, or for less with depth="
                 )
-            line = to_line(row)
-            if bare:
-                line = line._replace(child_uuid="", child_name="", child_description="")
-            child = names.setdefault(line.child_id, line[4:11])
-            lines.setdefault(line.parent_id, []).append(Line._make((*line[:4], *child, line.state)))
+            if (child := names.get(row[2])) is None:
+                child = child_of(row)
+                names[row[2]] = child = (child[0], "", "", "", *child[4:]) if bare else child
+            lines.setdefault(row[1], []).append(to_line(row, child))
     return Graph(root, lines, conflicts_in(tx, lines))
+
+
+# Thousands of conflicts are of a few quantities.
+_says_the_same = lru_cache(maxsize=4096)(says_the_same)
 
 
 def conflicts_in(tx: Tx, parent_ids: Collection[int] | None = None) -> dict[int, Told]:
@@ -161,22 +163,29 @@ def conflicts_in(tx: Tx, parent_ids: Collection[int] | None = None) -> dict[int,
     parent_ids
         of these BOMs only; None: of all.
     """
-    told, line = bom_conflicts.c, bom_lines.c
+    collection, line = bom_conflicts.c, bom_lines.c
     # An outer join begins with the few that are asked about: else SQLite reads all lines, for each page.
-    theirs = (line.parent_id == told.parent_id) & (line.child_id == told.child_id)
+    theirs = (line.parent_id == collection.parent_id) & (line.child_id == collection.child_id)
     whose = theirs & (line.rel_type == "component") & (line.source == "manual")
-    query = select(told.parent_id, told.child_id, told.cad_quantity, told.since, line.quantity, line.unit)
-    query = query.outerjoin_from(bom_conflicts, bom_lines, whose).where(~told.accepted)
+    query = select(
+        collection.parent_id,
+        collection.child_id,
+        collection.cad_quantity,
+        collection.since,
+        line.quantity,
+        line.unit,
+    )
+    query = query.outerjoin_from(bom_conflicts, bom_lines, whose).where(~collection.accepted)
     if parent_ids is not None:
-        query = query.where(one_of(tx, told.parent_id, parent_ids))
-    found: dict[int, Told] = {}
+        query = query.where(one_of(tx, collection.parent_id, parent_ids))
+    conflicts: dict[int, Told] = {}
     for parent_id, child_id, cad_quantity, since, quantity, unit in tx.conn.execute(query):
-        if quantity is not None and not says_the_same(cad_quantity, quantity, unit):
-            found.setdefault(parent_id, {})[child_id] = (cad_quantity, since)
-    return found
+        if quantity is not None and not _says_the_same(cad_quantity, quantity, unit):
+            conflicts.setdefault(parent_id, {})[child_id] = (cad_quantity, since)
+    return conflicts
 
 
-def sought(words: str, item_type: str, parts: Mapping[int, Part]) -> Callable[[Line], bool]:
+def sought(words: str, item_type: str, parts: Mapping[int, RolledItem]) -> Callable[[Line], bool]:
     """Return the test that a filter is, for tree, flat list, totals, print and exports.
 
     All words are in a part's number, name, description, supplier or manufacturer, and it has the type.
@@ -228,12 +237,14 @@ def narrowed(graph: Graph, fitting: Callable[[Line], bool], leaves: Sequence[Fla
     leaves
         the flat list, if only its parts count; else what fits first on each way down, with all that is in it.
     """
+    inside: Mapping[int, Sequence[Line]] = {}  # nothing is in a leaf
     if leaves is None:
-        below = (line for lines in graph.lines.values() for line in lines)
+        inside = graph.lines
+        below = (line for lines in inside.values() for line in lines)
         leaves = flatten(graph, {line.child_id for line in below if fitting(line)})
     rows = [row for row in leaves if fitting(row.line)]
     lines = [row.line._replace(state=replace(row.line.state, quantity=float(row.total))) for row in rows]
-    return Graph(graph.root, {**graph.lines, graph.root.id: lines})
+    return Graph(graph.root, {**inside, graph.root.id: lines})
 
 
 def ids_below(root: Item) -> Select[tuple[int]]:
@@ -258,8 +269,8 @@ def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
     order_of(graph)  # finds a cycle before it is walked
     count = 0
     graph_lines = graph.lines
-    one: Exact = 1
-    stack = [(graph.root.part_number, 1, one, iter(graph_lines.get(graph.root.id, ())))]
+    exact: Exact = 1
+    stack = [(graph.root.part_number, 1, exact, iter(graph_lines.get(graph.root.id, ())))]
     while stack:
         parent, level, factor, lines = stack[-1]
         for line in lines:
@@ -292,35 +303,38 @@ def flatten(graph: Graph, closed: Collection[int] = ()) -> list[FlatRow]:
     totals: dict[tuple[int, str | None], tuple[Exact, Exact, bool]] = {}
     shown: dict[tuple[int, str | None], Line] = {}
     components = {item_id: graph.components(item_id) for item_id in order_of(graph)}
+    assemblies = {item_id for item_id, lines in components.items() if lines}.difference(closed)
     for item_id, lines in components.items():
         if item_id not in needs:
             continue  # below a closed one only
         factor, lost, disputed = needs[item_id]
+        conflict = graph.conflicts.get(item_id, ())
         for line in lines:
-            amount = multiplied(factor, line)
-            gone = amount if line.state.unreferenced_since else multiplied(lost, line)
-            unsure = disputed or graph.told(line) is not None
-            key = (line.child_id, line.state.unit)
-            below = line.child_id not in closed and components.get(line.child_id)
-            before = needs.get(line.child_id, nothing) if below else totals.get(key, nothing)
-            sums = added(before[0], amount, line), added(before[1], gone, line), before[2] or unsure
-            if below:
-                needs[line.child_id] = sums
-            else:
+            child, state = line.child_id, line.state
+            quantity = _exact(state.quantity)
+            amount = factor * quantity
+            gone = amount if state.unreferenced_since else lost * quantity
+            key = child, state.unit
+            is_leaf = child not in assemblies
+            before = totals.get(key, nothing) if is_leaf else needs.get(child, nothing)
+            total = _counted(before[0] + amount, line)  # the other amounts are parts of it
+            sums = total, before[1] + gone, before[2] or disputed or child in conflict
+            if is_leaf:
                 totals[key] = sums
                 shown.setdefault(key, line)
+            else:
+                needs[child] = sums
     return [FlatRow(line, key[1], *totals[key]) for key, line in shown.items()]
+
+
+@lru_cache(maxsize=4096)
+def _exact(quantity: float) -> Exact:
+    return int(quantity) if quantity.is_integer() else as_decimal(quantity)
 
 
 def multiplied(factor: Exact, line: Line) -> Exact:
     """So much of the line's child for ``factor`` of its parent; ConflictError above :data:`MAX_TOTAL`."""
-    quantity = line.state.quantity
-    return _counted(factor * (int(quantity) if quantity.is_integer() else as_decimal(quantity)), line)
-
-
-def added(one: Exact, other: Exact, line: Line) -> Exact:
-    """The sum; ConflictError above :data:`MAX_TOTAL`."""
-    return _counted(one + other, line)
+    return _counted(factor * _exact(line.state.quantity), line)
 
 
 def _counted(amount: Exact, line: Line) -> Exact:
@@ -339,15 +353,15 @@ def where_used(
 
     With ``indirect`` also their parents, the nearest first, each line once; by part number in each level.
     """
-    found: list[Usage] = []
+    usages: list[Usage] = []
     total = 0
     for depth, level in enumerate(_levels_above(tx, item, MAX_DEPTH if indirect else 1), start=1):
         of_level = one_of(tx, bom_lines.c.child_id, level)
-        skip, room = max(0, offset - total), limit - len(found)
+        skip, room = max(0, offset - total), limit - len(usages)
         total += tx.conn.scalar(select(func.count()).select_from(bom_lines).where(of_level)) or 0
         if room > 0 and offset < total:
-            found.extend(_uses(tx, of_level, depth, room, skip))
-    return found, total
+            usages.extend(_uses(tx, of_level, depth, room, skip))
+    return usages, total
 
 
 def use_counts(tx: Tx, item_ids: Collection[int]) -> dict[int, int]:
@@ -459,7 +473,7 @@ class MassRollup:
     stated: float | None
 
 
-class Part(NamedTuple):
+class RolledItem(NamedTuple):
     """What a roll-up reads of an item."""
 
     part_number: str
@@ -467,17 +481,16 @@ class Part(NamedTuple):
     description: str
     properties: Mapping[str, Any]
     thumbnail_key: str | None = None
+    is_bought: bool = False
+    has_bom: bool = False
 
 
-def parts_of(tx: Tx, graph: Graph) -> dict[int, Part]:
+def parts_of(tx: Tx, graph: Graph) -> dict[int, RolledItem]:
     """Everything in the graph, by internal id, read once for both roll-ups."""
-    parts = some_parts(tx, {line.child_id for below in graph.lines.values() for line in below})
-    root = graph.root
-    own = Part(root.part_number, root.name, root.description, root.properties, root.thumbnail_key)
-    return {**parts, root.id: own}
+    return some_parts(tx, graph.names())
 
 
-def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, Part]:
+def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, RolledItem]:
     """These items, by internal id."""
     rows = tx.conn.execute(
         select(
@@ -487,9 +500,29 @@ def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, Part]:
             items.c.description,
             items.c.properties,
             items.c.thumbnail_key,
+            items.c.supplier_parts,
+            items.c.sourcing_type,
+            items.c.item_type,
+            items.c.bom_version,
         ).where(one_of(tx, items.c.id, item_ids))
     )
-    return {row[0]: Part(*row[1:4], json.loads(row[4]), row[5]) for row in rows}
+    rolled_items = {}
+    for row in rows:
+        properties = with_supplier(json.loads(row[4]), json.loads(row[6]) if row[6] else ())
+        is_bought, has_bom = bought(row[7], properties.get("supplier")), row[8] == "assembly" or row[9] > 0
+        rolled_items[row[0]] = RolledItem(*row[1:4], properties, row[5], is_bought, has_bom)
+    return rolled_items
+
+
+def with_supplier(
+    properties: Mapping[str, Any], listed: Sequence[Mapping[str, Any]] | None
+) -> Mapping[str, Any]:
+    """Return properties with the supplier that a list shows: the preferred one, else the first."""
+    if not listed:
+        return properties
+    shown = next((line for line in listed if line["preferred"]), listed[0])
+    names = {"supplier": "supplier", "supplier_part_number": "number", "lead_time_days": "lead_time_days"}
+    return {**properties, **{name: shown[key] for name, key in names.items()}}
 
 
 def currency_of(properties: Mapping[str, Any]) -> str:
@@ -497,7 +530,7 @@ def currency_of(properties: Mapping[str, Any]) -> str:
     return str(properties.get("currency") or DEFAULT_CURRENCY)
 
 
-def roll_up_cost(graph: Graph, parts: Mapping[int, Part]) -> CostRollup:
+def roll_up_cost(graph: Graph, parts: Mapping[int, RolledItem]) -> CostRollup:
     """Flat BOM times standard cost."""
     flat = flatten(graph)
     rows, totals, missing = [], dict[str, Decimal](), []
@@ -515,13 +548,16 @@ def roll_up_cost(graph: Graph, parts: Mapping[int, Part]) -> CostRollup:
     return CostRollup(rows, {name: float(total) for name, total in totals.items()}, missing)
 
 
-def roll_up_mass(graph: Graph, parts: Mapping[int, Part], assemblies: Collection[int]) -> MassRollup:
+def roll_up_mass(graph: Graph, parts: Mapping[int, RolledItem], assemblies: Collection[int]) -> MassRollup:
     """Masses from the leaves up; those ``assemblies`` stand for all that is in them with their own."""
     amounts: dict[int, Exact] = {}
     for row in flatten(graph, assemblies):
         item_id = row.line.child_id
-        amounts[item_id] = added(amounts.get(item_id, 0), row.total, row.line)
-    rows = [_mass_row(parts[one], amount, one in assemblies) for one, amount in amounts.items()]
+        amounts[item_id] = _counted(amounts.get(item_id, 0) + row.total, row.line)
+    rows = [
+        _mass_row(parts[each_item_id], amount, each_item_id in assemblies)
+        for each_item_id, amount in amounts.items()
+    ]
     return MassRollup(
         rows,
         float(exact_sum(row.total_mass_kg for row in rows if row.total_mass_kg is not None)),
@@ -540,7 +576,7 @@ def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
     return float(value) if 0 <= value < 1e15 else None
 
 
-def _mass_row(item: Part, amount: Exact, is_assembly: bool) -> MassRow:
+def _mass_row(item: RolledItem, amount: Exact, is_assembly: bool) -> MassRow:
     mass = positive_number(item.properties, "mass_kg")
     total = float(exact_product((mass, amount))) if mass is not None else None
     return MassRow(item.part_number, item.name, plain(amount), mass, total, is_assembly)

@@ -3,6 +3,7 @@
 
 import { listen } from "./live.js";
 import { root } from "./root.js";
+import { _ } from "./words.js";
 
 const MOST = 300;
 const list = document.getElementById("entries");
@@ -28,7 +29,7 @@ async function refresh() {
     while (list.children.length > MOST) list.lastElementChild.remove();
     document.getElementById("empty")?.remove();
   } catch {
-    state.textContent = "The server cannot be reached.";
+    state.textContent = _("The server cannot be reached.");
   } finally {
     busy = false;
     if (again) refresh();
@@ -36,6 +37,6 @@ async function refresh() {
 }
 
 listen(`${root}/api/events`, list.dataset.last, names, refresh, (live) => {
-  state.textContent = live ? "Live: new entries appear by themselves." : "Not connected; trying again.";
+  state.textContent = live ? _("Live: new entries appear by themselves.") : _("Not connected; trying again.");
   state.classList.toggle("on", live);
 });

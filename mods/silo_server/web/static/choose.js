@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // The boxes of a bulk decision: "choose all", how many are chosen, and those that a filter hides stay chosen.
 
+import { _ } from "./words.js";
+
 const all = document.getElementById("all");
 const told = document.getElementById("count");
 const form = document.getElementById("bulk");
@@ -17,8 +19,8 @@ function recount() {
   const here = chosen.size - hidden.length;
   all.checked = here > 0 && here === found.length;
   all.indeterminate = chosen.size > 0 && !all.checked;
-  const rest = hidden.length ? `${chosen.size} chosen, ${hidden.length} of them not shown` : "";
-  told.textContent = rest || (here ? `${here} of ${found.length} chosen` : "");
+  const rest = hidden.length ? _("%(chosen)s chosen, %(hidden)s of them not shown", { chosen: chosen.size, hidden: hidden.length }) : "";
+  told.textContent = rest || (here ? _("%(here)s of %(found)s chosen", { here, found: found.length }) : "");
   for (const input of form.querySelectorAll("input[type=hidden][name=chosen]")) input.remove();
   for (const value of hidden) {
     const input = document.createElement("input");

@@ -3,6 +3,7 @@
 
 import { complete } from "./complete.js";
 import { listen } from "./live.js";
+import { _ } from "./words.js";
 
 const place = document.getElementById("live");
 let count = 0;
@@ -11,14 +12,14 @@ let count = 0;
 function announce(name, data) {
   const told = name === "reset" ? {} : JSON.parse(data);
   if (name === "server.state") {
-    show(told.mode === "normal" ? "The server takes changes again." : "The server takes no changes now.");
+    show(told.mode === "normal" ? _("The server takes changes again.") : _("The server takes no changes now."));
     return;
   }
   count += 1;
-  const what = name === "bom_merge" ? "A new merge arrived" : "The BOM changed";
+  const what = name === "bom_merge" ? _("A new merge arrived") : _("The BOM changed");
   const detail = told.summary ? `: ${told.summary}` : "";
   const who = told.user ? ` (${told.user})` : "";
-  show(`${what}${detail}${who}.${count > 1 ? ` ${count} changes since you opened this page.` : ""}`);
+  show(`${what}${detail}${who}.${count > 1 ? ` ${_("%(count)s changes since you opened this page.", { count })}` : ""}`);
 }
 
 function show(sentence) {
@@ -27,7 +28,7 @@ function show(sentence) {
   const link = document.createElement("a");
   link.href = location.pathname + location.search.replace(/([?&])edit=[^&]*&?/, "$1");
   link.className = "button small";
-  link.textContent = "Show it";
+  link.textContent = _("Show it");
   place.replaceChildren(words, " ", link);
   place.classList.add("news");
 }

@@ -3,6 +3,7 @@
 // only the table (#shown). Without this script the links and the form do the same.
 
 import { afterTyping } from "./typing.js";
+import { _ } from "./words.js";
 
 const form = document.getElementById("view");
 const here = () => location.pathname + location.search;
@@ -29,13 +30,14 @@ async function show(url, push) {
     if (found) document.getElementById("found").replaceChildren(...found.childNodes);
     // The link that was used is another element now.
     if (other === focus && focus) document.getElementById(focus)?.focus({ preventScroll: true });
+    if (new URL(url, location).searchParams.get("beside") && !new URL(address, location).searchParams.get("beside")) document.getElementById("beside")?.focus();
     if (push) history[push]({ view: true }, "", url);
     address = here();
     document.dispatchEvent(new CustomEvent("shown"));
   } catch (error) {
     shown.removeAttribute("aria-busy");
     // Without the server the form's button still says what is wrong.
-    if (error.name !== "AbortError") document.getElementById("found").textContent = "The server cannot be reached.";
+    if (error.name !== "AbortError") document.getElementById("found").textContent = _("The server cannot be reached.");
   }
 }
 
@@ -53,6 +55,8 @@ document.addEventListener("click", (event) => {
   const paging = link.rel === "prev" || link.rel === "next";
   show(link.href, "pushState").then(() => paging && document.getElementById("shown").scrollIntoView());
 });
+
+addEventListener("keydown", (event) => event.key === "Escape" && document.querySelector("a[data-close]")?.click());
 
 if (form) {
   for (const input of form.querySelectorAll('input[type="search"], input[inputmode]')) {

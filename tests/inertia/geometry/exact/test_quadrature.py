@@ -16,13 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.inertia.geometry.exact import (
-    Asked,
     Basis,
     Curve,
     Elementary,
     Face,
     Moments,
     Nurbs,
+    SampledSurface,
     Surface,
     Turned,
     basis_functions,
@@ -291,7 +291,7 @@ class Answering:
 def test_a_surface_that_is_asked_point_by_point_gives_the_same() -> None:
     """Refined until nothing changes any more."""
     face = torus_face(5, 1)
-    asked = Face(Asked(Answering(face.surface), np.linspace(0, TURN, 5)), face.edges)
+    asked = Face(SampledSurface(Answering(face.surface), np.linspace(0, TURN, 5)), face.edges)
     one, other = measured([face], 100), measured([asked], 100)
     assert other.volume == pytest.approx(one.volume, rel=1e-10)
     np.testing.assert_allclose(other.inertia, one.inertia, rtol=1e-9, atol=1e-7)
@@ -360,7 +360,7 @@ def test_a_face_beside_its_own_edges_is_doubted(
     from OCP.gp import gp_Vec
     from OCP.TopLoc import TopLoc_Location
 
-    from silo.inertia.geometry.kernel import occt
+    from silo.inertia.geometry import kernel as occt
     from silo.inertia.geometry.kernel.solids import load_shape
 
     shape = load_shape(WAVY, "wavy")
@@ -416,11 +416,11 @@ def splines(kind: str) -> tuple[Any, float]:
 @pytest.mark.parametrize("kind", ["periodic", "drawn", "turned"])
 def test_splines_of_the_kernel_are_read_as_such(kind: str) -> None:
     """Nothing is asked point by point where numpy can have the surface as a whole; the volume is exact."""
-    from silo.inertia.geometry.kernel import occt
+    from silo.inertia.geometry import kernel as occt
     from silo.inertia.geometry.kernel.solids import _surface, moments
 
     shape, volume = splines(kind)
-    assert not [face for face in occt.faces_of(shape) if isinstance(_surface(face), Asked)]
+    assert not [face for face in occt.faces_of(shape) if isinstance(_surface(face), SampledSurface)]
     assert moments(shape, volume, 1e-10).volume == pytest.approx(volume, rel=1e-10)
 
 

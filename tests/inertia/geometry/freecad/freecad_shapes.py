@@ -2,7 +2,8 @@
 """Runs inside FreeCAD: writes an assembly that places parts in every way, and what FreeCAD says of each leaf.
 
 ``SILO_OUT`` names the folder; ``leaves.json`` in it has, for each leaf of ``top.FCStd``, its path of object
-names, the object it ends in, its volume [mm^3] and its centre of volume [mm] in the assembly's axes.
+names, the object it ends in, its volume [mm^3], its centre of volume [mm] and its matrix, in the assembly's
+axes.
 """
 
 from __future__ import annotations
@@ -199,7 +200,10 @@ def leaves(whole: Any) -> list[dict[str, Any]]:
             volume = sum(s.Volume for s in solids)
             if volume:
                 centre = [sum(s.Volume * s.CenterOfMass[i] for s in solids) / volume for i in range(3)]
-                found.append({"path": path, "object": end.Name, "volume": volume, "centre": centre})
+                matrix = list(whole.getSubObject(path, retType=4).A)
+                found.append(
+                    {"path": path, "object": end.Name, "volume": volume, "centre": centre, "matrix": matrix}
+                )
 
     # In the assembly's own axes: without its own placement.
     whole.Placement = Placement()

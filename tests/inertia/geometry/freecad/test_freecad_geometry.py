@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fcstd_writer import Doc, Raw, XLink, locals_
+from drawn import drawn
+from fcstd_writer import Doc, Local, Raw, XLink, locals_
 from freecad_cases.machines import WANTED, need
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.BRepTools import BRepTools
@@ -21,10 +22,10 @@ from silo.bom.errors import DocumentError
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.inertia.core import place
 from silo.inertia.geometry import ReadOptions, read
-from silo.inertia.geometry.freecad.files import placed
-from silo.inertia.model import Assembly, GeometryCode
+from silo.inertia.geometry.fcstd import placed
+from silo.inertia.geometry.together import Mesh
+from silo.inertia.model import Assembly, GeometryCode, place
 
 SCRIPT = Path(__file__).with_name("freecad_shapes.py")
 
@@ -33,6 +34,18 @@ NOT_COUNTED = {
     "Part.Base.", "Part.Drill.", "Part.Spare.", "Mirrored.Base.", "Mirrored.Drill.", "Mirrored.Spare.",
     "ArrayBase.", "ArrayCube.",
 }  # fmt: skip
+
+OWN_PLACEMENT = {
+    "WithTransform.", "Scaled.", "SubByLink.BoltB.", "SubObject.", "Instance.BoltB001.", "Flexible.BoltB.",
+}  # fmt: skip
+
+
+def middle_of(mesh: Mesh) -> np.ndarray:
+    """Centre of volume [m]."""
+    corners = mesh.vertices[mesh.faces]
+    volumes = np.linalg.det(corners)
+    middle: np.ndarray = volumes @ corners.sum(axis=1) / 4 / volumes.sum()
+    return middle
 
 
 def placed_bodies(assembly: Assembly) -> list[tuple[str, float, np.ndarray]]:
@@ -82,6 +95,22 @@ def test_every_way_of_placing_is_as_freecad_places_it(version: str, tmp_path: Pa
             if v == pytest.approx(leaf["volume"], rel=2e-3) and np.linalg.norm(c - leaf["centre"]) < 0.05
         ]
         assert close, f"{path} of FreeCAD {version} is not among ours"
+    # What is drawn stands where FreeCAD itself puts it.
+    occurrences, missing = drawn(out / "top.FCStd")
+    assert missing == []
+    assert len(occurrences) == len(assembly.instances)
+    alike = set()
+    for path, leaf in wanted.items():
+        matrix = np.array(leaf["matrix"]).reshape(4, 4)
+        matrix[:3, 3] /= 1000
+        if any(np.allclose(matrix, one.matrix, atol=1e-6) for one in occurrences):
+            alike.add(path)
+    # FreeCAD counts the own placement of these as part of the way, we as part of the shape.
+    assert set(wanted) - alike <= OWN_PLACEMENT
+    bodies = [one.mesh.moved(one.matrix) for one in occurrences]
+    middles = [middle_of(one) * 1e3 for one in bodies]
+    for path in OWN_PLACEMENT & set(wanted):
+        assert min(np.linalg.norm(one - wanted[path]["centre"]) for one in middles) < 0.5, path
     by_name = {p.name: p for p in assembly.prototypes.values()}
     assert (by_name["Bracket"].step_material, by_name["Bracket"].step_density) == ("Steel", 7900.0)
     assert {p.code for p in assembly.problems} == {"hidden", GeometryCode.SCALED}
@@ -241,7 +270,7 @@ def test_a_missing_file_keeps_its_place(body: Any, tmp_path: Path, read_in: Any,
     (instance,) = read_in(path).instances
     part = read_in(path).prototypes[instance.prototype]
     assert (part.name, part.has_solid) == ("bolt", False)
-    assert codes_of(part) == [GeometryCode.NO_GEOMETRY]
+    assert codes_of(part) == [GeometryCode.NOT_READ]
     assert instance.transform[0, 3] == pytest.approx(0.007)
 
 
@@ -420,6 +449,30 @@ def test_the_object_can_be_named(body: Any, tmp_path: Path, read_in: Any) -> Non
         read_in(path, object_name="Three")
 
 
+@pytest.mark.parametrize("base", ["Bolt", "Pair"])
+@pytest.mark.parametrize("name", ["part.FCStd", "top.FCStd"])
+def test_an_array_of_one_shape_that_another_file_links_to(
+    name: str, base: str, body: Any, tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """Without links an array is saved as one shape: one product, whatever many components it shows."""
+    body(Doc("bolt")).save(tmp_path / "bolt.FCStd")
+    body(Doc("nut")).save(tmp_path / "nut.FCStd")
+    doc = body(Doc("part"), "Array", (40, 20, 30))
+    doc.objects["Array"] = ("Part::FeaturePython", doc.objects["Array"][1])
+    shown: dict[str, Any] = {"Base": Local(base), "Count": 4, "ArrayType": "ortho"}
+    doc.objects["Array"][1].update(shown)
+    doc.link("Bolt", "bolt.FCStd", "Box")
+    if base == "Pair":
+        doc.link("Nut", "nut.FCStd", "Box").add("App::Part", "Pair", Group=locals_("Bolt", "Nut"))
+    doc.add("Assembly::AssemblyObject", "Part", Group=locals_("Array")).save(tmp_path / "part.FCStd")
+    Doc("top").link("Link", "part.FCStd", "Array").add(
+        "Assembly::AssemblyObject", "Top", Group=locals_("Link")
+    ).save(tmp_path / "top.FCStd")
+    assembly = read_in(tmp_path / name)
+    assert codes_of(assembly) == []
+    assert sum(v for _, v, _ in placed_bodies(assembly)) == pytest.approx(24_000)
+
+
 def test_a_link_array_takes_its_placements_from_the_side_entry(
     body: Any, tmp_path: Path, read_in: Any
 ) -> None:
@@ -469,7 +522,7 @@ def test_an_array_of_a_million_million_is_refused(body: Any, tmp_path: Path, rea
 def test_a_damaged_shape_is_that_part_s_problem(
     content: bytes | None, body: Any, tmp_path: Path, read_in: Any, codes_of: Any
 ) -> None:
-    """Empty, nonsense or missing: the other part is measured all the same."""
+    """Empty, nonsense or missing: the other part is measured anyway."""
     doc = body(body(Doc("top"), "Good"), "Bad")
     if content is None:
         del doc.entries["Bad.Shape.brp"]
@@ -479,7 +532,8 @@ def test_a_damaged_shape_is_that_part_s_problem(
     by_name = {p.name: p for p in read_in(assembly_of(tmp_path, doc)).prototypes.values()}
     assert by_name["Good"].volume_m3 == pytest.approx(6e-6)
     assert not by_name["Bad"].has_solid
-    assert GeometryCode.NO_GEOMETRY in codes_of(by_name["Bad"])
+    why = GeometryCode.NO_GEOMETRY if content == b"" else GeometryCode.NOT_READ
+    assert why in codes_of(by_name["Bad"])
 
 
 def test_curves_are_no_solid(tmp_path: Path, read_in: Any, codes_of: Any) -> None:

@@ -30,11 +30,11 @@ from OCP.BRepTools import BRepTools
 from OCP.GeomAPI import GeomAPI_Interpolate
 from OCP.gp import gp_Ax1, gp_Dir, gp_GTrsf, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.TopAbs import TopAbs_INTERNAL
+from OCP.TopoDS import TopoDS_Compound
 
-from silo.inertia.core import MassProps, combine, combine_arrays, place
-from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.kernel.solids import moments
-from silo.inertia.model import Assembly, GeometryCode, Prototype
+from silo.inertia.model import Assembly, GeometryCode, MassProps, Prototype, combine, combine_arrays, place
 
 EXACT = 1e-9
 MM = 1e-3
@@ -286,3 +286,31 @@ def test_crossed_cylinders_are_exact(step_part: Any, trsf: Any, read_in: Any) ->
     fused = BRepAlgoAPI_Fuse(one, other).Shape()
     part = only(read_in(step_part(fused)))
     assert part.volume_m3 == pytest.approx((2 * math.pi * 100 * 60 - 16 / 3 * 1000) * 1e-9, rel=1e-8)
+
+
+def test_the_box_of_bodies_is_that_of_their_surfaces() -> None:
+    """A turned torus, a ball inside, an edge outside, nested; what is empty adds nothing."""
+
+    def together(*parts: Any) -> Any:
+        builder, whole = BRep_Builder(), TopoDS_Compound()
+        builder.MakeCompound(whole)
+        for part in parts:
+            builder.Add(whole, part)
+        return whole
+
+    turn = gp_Trsf()
+    turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(1, 0, 0)), math.radians(30))
+    torus = BRepBuilderAPI_Transform(BRepPrimAPI_MakeTorus(20, 5).Shape(), turn).Shape()
+    ball, edge = (
+        BRepPrimAPI_MakeSphere(4).Shape(),
+        BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 0), gp_Pnt(0, 0, 40)).Shape(),
+    )
+    rise = 20 * math.sin(math.radians(30)) + 5
+    wanted = [
+        [-25, -(20 * math.cos(math.radians(30)) + 5), -rise],
+        [25, 20 * math.cos(math.radians(30)) + 5, 40],
+    ]
+    for shapes in ([together(together(torus, ball), together(), edge)], [edge, together(), torus, ball]):
+        np.testing.assert_allclose(occt.exact_bounds(shapes), wanted, atol=1e-5)
+    np.testing.assert_allclose(occt.exact_bounds([together()]), np.zeros((2, 3)))
+    np.testing.assert_allclose(occt.exact_bounds([]), np.zeros((2, 3)))

@@ -19,7 +19,7 @@ import same_bits
 from OCP.Standard import Standard_ConstructionError
 from OCP.StdFail import StdFail_NotDone
 
-from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry import kernel as occt
 
 SAME = os.environ.get("SILO_SAME", "30 2").split()
 """Products and rounds; the long run is ``SILO_SAME="2000 20"``."""

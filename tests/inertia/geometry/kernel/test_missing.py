@@ -37,5 +37,5 @@ def test_a_kernel_that_cannot_be_used(
 
 def test_the_text_of_a_step_file_is_read_without_the_kernel() -> None:
     """So that another process can begin with it while this one loads the kernel."""
-    code = "import sys, silo.inertia.geometry.step.text; sys.exit('OCP' in sys.modules)"
+    code = "import sys, silo.inertia.geometry.step_text; sys.exit('OCP' in sys.modules)"
     assert not subprocess.run([sys.executable, "-c", code], env={"PYTHONPATH": ":".join(sys.path)}).returncode

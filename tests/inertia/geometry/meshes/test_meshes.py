@@ -367,7 +367,7 @@ def test_a_box_anywhere_has_its_closed_form(size: Any, at: Any) -> None:
 
 def test_trimesh_agrees_on_a_scene_of_two_bodies() -> None:
     """trimesh's own Scene is the independent witness for placing and summing."""
-    from silo.inertia.core import combine_arrays, place
+    from silo.inertia.model import combine_arrays, place
 
     one, two = trimesh.creation.icosphere(radius=0.3), brick((0.1, 0.2, 0.4))
     turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3], [0.1, 0, 0])

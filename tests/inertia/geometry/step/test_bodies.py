@@ -21,8 +21,8 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell
 from step_bodies import KINDS, MM, Bodies, begun, some
 from step_writer import StepDocument, trsf_of
 
-from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.step.part21 import WANTED, read_products, scan
+from silo.inertia.geometry import kernel as occt
+from silo.inertia.geometry.part21 import WANTED, read_products, scan
 from silo.inertia.model import GeometryCode, Prototype
 
 COUNT = int(os.environ.get("SILO_HUNT", "60"))
@@ -219,15 +219,22 @@ def test_an_open_surface_of_triangles_beside_a_solid(
     assert GeometryCode.BODY_MISSING in codes_of(part)
 
 
-@pytest.mark.parametrize("over", ["STYLED_ITEM('',(),#{})", "PRESENTATION_LAYER_ASSIGNMENT('','',(#{}))", ""])
+STYLE, LAYER = "STYLED_ITEM('',(),#{})", "PRESENTATION_LAYER_ASSIGNMENT('','',(#{}))"
+IN_ONE_PLACE = "CONTEXT_DEPENDENT_OVER_RIDING_STYLED_ITEM('',(),#{},$,())"
+
+
+@pytest.mark.parametrize("over", [(STYLE,), (LAYER,), (STYLE, LAYER), (IN_ONE_PLACE,), ()])
 def test_what_the_file_hides_is_counted_and_noted(
-    over: str, tmp_path: Path, read_in: ReadIn, codes_of: Any
+    over: tuple[str, ...], tmp_path: Path, read_in: ReadIn, codes_of: Any
 ) -> None:
-    """INVISIBILITY of a body itself, of its style or of its layer."""
+    """INVISIBILITY of a body itself, of its style, its layer, its style's layer, or in one place."""
     path = tmp_path / "part.step"
     made = begun(path)
     body = KINDS["BLOCK"](made, 50.0)
-    made.add(f"INVISIBILITY((#{made.add(over.format(body)) if over else body}))")
+    hidden = body
+    for entity in over:
+        hidden = made.add(entity.format(hidden))
+    made.add(f"INVISIBILITY((#{hidden}))")
     part = only(read_in(made.write(path)))
     assert codes_of(part) == [GeometryCode.HIDDEN]
     assert part.volume_m3 == pytest.approx(1.006e-6)

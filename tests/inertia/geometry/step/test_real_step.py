@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from silo.inertia.core import MassProps, combine_arrays, place
-from silo.inertia.model import Assembly, GeometryCode
+from silo.inertia.model import Assembly, GeometryCode, MassProps, combine_arrays, place
 
 
 def volumes(assembly: Assembly) -> dict[str, float]:

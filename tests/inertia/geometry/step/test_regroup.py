@@ -11,8 +11,8 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from step_writer import StepDocument, trsf_of
 
-from silo.inertia.geometry.step.part21 import WANTED, read_products, scan
-from silo.inertia.geometry.step.text import GROUP_FROM, GROUP_SIZE, MARK, regrouped
+from silo.inertia.geometry.part21 import WANTED, read_products, scan
+from silo.inertia.geometry.step_text import GROUP_FROM, GROUP_SIZE, MARK, regrouped
 
 COUNT = GROUP_FROM + 7
 

@@ -132,3 +132,11 @@ def test_stated_volume_and_centroid_that_differ_are_reported(
     assert codes_of(part) == [GeometryCode.STATED_VOLUME, GeometryCode.STATED_CENTROID]
     assert "-9.09%" in part.problems[0].message
     assert "3 mm away" in part.problems[1].message
+
+
+@pytest.mark.parametrize(("share", "codes"), [(0.5, []), (2.0, [GeometryCode.STATED_CENTROID])])
+def test_a_stated_centre_is_compared_by_the_size_of_the_part(share: float, codes: list[GeometryCode]) -> None:
+    """The tolerance is a share of the edge of a cube of the part's volume: 10 mm."""
+    step = pytest.importorskip("silo.inertia.geometry.step", exc_type=ImportError)
+    stated = step.StatedInStep(centroid_m=(share * step.STATED_TOLERANCE * 0.01, 0.0, 0.0))
+    assert [note.code for note in step.against_stated(1e-6, (0.0, 0.0, 0.0), stated)] == codes

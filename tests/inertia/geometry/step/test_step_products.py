@@ -29,12 +29,11 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
 
 from silo.bom.errors import DocumentError
-from silo.inertia.core import place
+from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.graph import Child, Node
-from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.solids import beside_edges, solid_moments
-from silo.inertia.geometry.step.read import Stated, StepFile, against_stated, stated_totals
-from silo.inertia.model import GeometryCode, Note, Prototype
+from silo.inertia.geometry.step import StatedInStep, StepFile, against_stated, stated_totals
+from silo.inertia.model import GeometryCode, Note, Prototype, place
 
 
 def compound(*shapes: Any) -> Any:
@@ -123,7 +122,7 @@ def test_a_lone_part_is_its_own_instance(box: Any, step_part: Any, read_in: Any)
 def test_solid_and_wire_of_one_product_are_one_product(
     box: Any, step: Any, tmp_path: Path, read_in: Any
 ) -> None:
-    """The kernel makes leaves 'SOLID' and 'COMPOUND' of a mixed product; it is one product all the same."""
+    """The kernel makes leaves 'SOLID' and 'COMPOUND' of a mixed product; it is one product anyway."""
     document = step()
     top = document.assembly("top")
     document.place(top, document.part(compound(box(10, 10, 10), wire()), "mixed"), name="mixed_1")
@@ -206,7 +205,7 @@ def test_a_stated_total_counts_scaled_parts_as_they_stand(stated: float | None, 
     """A part of 1 cm³, placed twice as large and mirrored: its assembly has 8 cm³."""
     use = Child("part", "part", np.diag([-2.0, 2, 2, 1]))
     nodes = {"top": Node("top", "top", (use,)), "part": Node("part", "part", (), True)}
-    stating = {"top": Stated(stated), "part": Stated()}
+    stating = {"top": StatedInStep(stated), "part": StatedInStep()}
     step = StepFile(Path("x.step"), nodes=nodes, stated=stating, roots=[Child("top", "top")])
     found = stated_totals(step, {"part": Prototype("part", "part", volume_m3=1e-6)})
     assert [problem.code for problem in found] == doubts * [GeometryCode.STATED_VOLUME]
@@ -215,7 +214,7 @@ def test_a_stated_total_counts_scaled_parts_as_they_stand(stated: float | None, 
 @pytest.mark.parametrize(("stated", "codes"), [(1.0005e-6, []), (1.002e-6, [GeometryCode.STATED_VOLUME])])
 def test_a_stated_volume_may_be_off_by_a_thousandth(stated: float, codes: list[GeometryCode]) -> None:
     """A file's own figure for a part, and where it begins to speak against what was measured."""
-    assert [p.code for p in against_stated(1e-6, np.zeros(3), Stated(stated))] == codes
+    assert [p.code for p in against_stated(1e-6, np.zeros(3), StatedInStep(stated))] == codes
 
 
 def test_a_solid_inside_out_is_turned_and_said(box: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:

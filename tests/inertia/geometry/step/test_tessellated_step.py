@@ -14,7 +14,7 @@ from OCP.Interface import Interface_Static
 from OCP.Poly import Poly_Triangle, Poly_Triangulation
 from OCP.TopoDS import TopoDS_Face, TopoDS_Shell, TopoDS_Solid
 
-from silo.inertia.geometry.kernel.occt import tessellated
+from silo.inertia.geometry.kernel import tessellated
 from silo.inertia.geometry.together import Mesh
 from silo.inertia.model import GeometryCode
 

@@ -69,9 +69,8 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
 
 from silo.bom.errors import DocumentError
-from silo.inertia.core import place
+from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.exact import (
-    Asked,
     Basis,
     Curve,
     Elementary,
@@ -79,14 +78,14 @@ from silo.inertia.geometry.exact import (
     Floats,
     Moments,
     Nurbs,
+    SampledSurface,
     Surface,
     Turned,
     integrate,
 )
-from silo.inertia.geometry.graph import Reading, ReadOptions, Report, in_metres
+from silo.inertia.geometry.graph import GeometryReading, ReadOptions, Report, in_metres, is_binary_brep
 from silo.inertia.geometry.helpers import Helpers, Task
-from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.occt import (
+from silo.inertia.geometry.kernel import (
     MM,
     bounds,
     box,
@@ -126,7 +125,7 @@ from silo.inertia.geometry.together import (
     together,
     welded,
 )
-from silo.inertia.model import Assembly, GeometryCode, Instance, Note, SolidProps
+from silo.inertia.model import Assembly, GeometryCode, Instance, Note, SolidProps, place
 from silo.platform import remove_patiently
 
 TENSOR_SHARE = 1e-4
@@ -180,26 +179,26 @@ def by_kernel(solid: Any, eps: float) -> Moments:
     """Return the kernel's integration with a tolerance, relative to the volume."""
     system = GProp_GProps()
     error = float(BRepGProp.VolumeProperties_s(solid, system, eps, False, False))
-    return _taken(system, error)
+    return _moments_of(system, error)
 
 
 def _usual(solid: Any) -> Moments:
     """Return the kernel's integration without any control."""
     system = GProp_GProps()
     BRepGProp.VolumeProperties_s(solid, system)
-    return _taken(system, PLAIN_ERROR)
+    return _moments_of(system, PLAIN_ERROR)
 
 
-def _taken(system: Any, error: float) -> Moments:
+def _moments_of(system: Any, error: float) -> Moments:
     tensor = system.MatrixOfInertia()
     inertia = np.array([[tensor.Value(i, j) for j in (1, 2, 3)] for i in (1, 2, 3)])
     return Moments(float(system.Mass()), np.array(xyz(system.CentreOfMass())), inertia, error)
 
 
-def _difference(one: Moments, other: Moments) -> float:
+def _difference(own: Moments, other: Moments) -> float:
     """Return the difference of volumes and tensors, relative to the latter."""
-    tensor = float(np.abs(one.inertia - other.inertia).max() / max(np.abs(other.inertia).max(), 1e-300))
-    return max(abs(one.volume / other.volume - 1), tensor)
+    tensor = float(np.abs(own.inertia - other.inertia).max() / max(np.abs(other.inertia).max(), 1e-300))
+    return max(abs(own.volume / other.volume - 1), tensor)
 
 
 _ELEMENTARY_KINDS = {
@@ -291,7 +290,7 @@ def _surface(face: Any) -> Surface:
         if basis.GetType() == GeomAbs_BSplineCurve:
             along = np.array(xyz(adaptor.Direction()))
             return _drawn(basis.BSpline().Copy(), along, u_range, v_range)
-    return Asked(ask, np.linspace(*u_range, 5))
+    return SampledSurface(ask, np.linspace(*u_range, 5))
 
 
 _Range = tuple[float, float]
@@ -354,38 +353,38 @@ class KernelCommon:
         self._meshes = MeshCommon()
         self._spent = 0.0
 
-    def __call__(self, one: Body, other: Body) -> SolidProps | None:
-        """Return the moments of what both have in common; None if that cannot be found out."""
-        if one.mesh is not None and other.mesh is not None:
-            known = _by_distance(one, other, one.mesh, other.mesh)
-            if known is not None:
-                return known
-            if one.exact and other.exact:
-                exact = self._meshes(one, other)
+    def __call__(self, body: Body, other: Body) -> SolidProps | None:
+        """Return the moments of what both have in common; None if that is not known."""
+        if body.mesh is not None and other.mesh is not None:
+            solid_props = _by_distance(body, other, body.mesh, other.mesh)
+            if solid_props is not None:
+                return solid_props
+            if body.exact and other.exact:
+                exact = self._meshes(body, other)
                 if exact is not None:
                     return exact
-        faces = len(occt.faces_of(one.shape)) + len(occt.faces_of(other.shape))
+        faces = len(occt.faces_of(body.shape)) + len(occt.faces_of(other.shape))
         if faces <= MOST_FACES_COMMON and self._spent < SECONDS:
             begin = time.process_time()
-            found = _common(one, other)
+            props = _common(body, other)
             self._spent += time.process_time() - begin
-            if found is not None:
-                return found
-        near = self._meshes(one, other)
-        least = min(one.props.volume_m3, other.props.volume_m3)
+            if props is not None:
+                return props
+        near = self._meshes(body, other)
+        least = min(body.props.volume_m3, other.props.volume_m3)
         return None if near is None or 0 < near.volume_m3 <= CHORDS * least else near
 
 
-def _by_distance(one: Body, other: Body, mesh: Mesh, small: Mesh) -> SolidProps | None:
+def _by_distance(body: Body, other: Body, mesh: Mesh, small: Mesh) -> SolidProps | None:
     """Return nothing, or all of the smaller body, if the surfaces do not come near each other; else None."""
     margin = 0.02 * max(float(np.linalg.norm(mesh.extents)), float(np.linalg.norm(small.extents)))
-    low, high = np.maximum(one.low, other.low) - margin, np.minimum(one.high, other.high) + margin
+    low, high = np.maximum(body.low, other.low) - margin, np.minimum(body.high, other.high) + margin
     here, there = _within(mesh, low, high), _within(small, low, high)
     if here.any() and there.any():
         return None
     if is_inside(small, mesh):
         return other.props
-    return one.props if is_inside(mesh, small) else NOTHING
+    return body.props if is_inside(mesh, small) else NOTHING
 
 
 def _within(mesh: Mesh, low: Floats, high: Floats) -> np.ndarray:
@@ -395,18 +394,18 @@ def _within(mesh: Mesh, low: Floats, high: Floats) -> np.ndarray:
     return inside
 
 
-def _common(one: Body, other: Body) -> SolidProps | None:
+def _common(body: Body, other: Body) -> SolidProps | None:
     with occt.Attempt():
-        operation = BRepAlgoAPI_Common(one.shape, other.shape)
+        operation = BRepAlgoAPI_Common(body.shape, other.shape)
         if not operation.IsDone():
             return None
         if not occt.solids_of(operation.Shape()):
             return NOTHING
-        found = by_kernel(operation.Shape(), EPS)
-        least = min(one.props.volume_m3, other.props.volume_m3)
-        volume = found.volume * MM**3
+        common_part = by_kernel(operation.Shape(), EPS)
+        least = min(body.props.volume_m3, other.props.volume_m3)
+        volume = common_part.volume * MM**3
         if 0 <= volume <= (1 + 1e-5) * least:  # NaN is not
-            return SolidProps(volume, found.com * MM, found.inertia * MM**5)
+            return SolidProps(volume, common_part.com * MM, common_part.inertia * MM**5)
     return None
 
 
@@ -425,7 +424,7 @@ def open_edges_of(solid: Any) -> int | None:
     sewing = _sewn(occt.faces_of(solid), MEETING * size)
     edges = sewing.NbFreeEdges() + sewing.NbMultipleEdges() if sewing is not None else 0
     if sewing is not None and not edges:
-        # Closed all the same; but faces that disagreed on what is outside were turned for it.
+        # Closed anyway; but faces that disagreed on what is outside were turned for it.
         sewn = abs(_flux(sewing.SewedShape(), middle))
         if abs(sewn - abs(_flux(solid, middle))) <= CONVERGED * sewn:
             return None
@@ -445,11 +444,11 @@ def beside_edges(solid: Any, volume: float) -> float:
         edges = occt.edges_of(face)
         if all(BRep_Tool.Tolerance_s(edge) < least for edge in edges):
             continue
-        found = np.array([_gap_and_length(edge, face) for edge in edges])
-        if found[:, 0].max() >= least:
+        gaps = np.array([_gap_and_length(edge, face) for edge in edges])
+        if gaps[:, 0].max() >= least:
             system = GProp_GProps()
             BRepGProp.SurfaceProperties_s(face, system)
-            beside += abs(system.Mass()) * float(found.prod(axis=1).sum() / max(found[:, 1].sum(), 1e-300))
+            beside += abs(system.Mass()) * float(gaps.prod(axis=1).sum() / max(gaps[:, 1].sum(), 1e-300))
     return beside / abs(volume)
 
 
@@ -491,7 +490,9 @@ def closed_shells(shapes: list[Any]) -> tuple[list[Any], list[Any]]:
         size = max(box(shape)[1] for shape in shapes)
         sewing = _sewn(loose, MEETING * size)
         if sewing is not None:
-            left = [one for one in left if not all(map(occt.has_surface, occt.faces_of(one)))]
+            left = [
+                each_shell for each_shell in left if not all(map(occt.has_surface, occt.faces_of(each_shell)))
+            ]
             sewn = sewing.SewedShape()
             for shell in occt.loose_shells_of(sewn):
                 (closed if _is_closed(shell) else left).append(shell)
@@ -532,8 +533,8 @@ def _flux(shape: Any, point: Floats) -> float:
     The kernel's own sum for a shape is taken from a point of its own choice.
     """
     seen = gp_Pnt(*point.tolist())
-    found = (BRepGProp_Vinert(BRepGProp_Face(f), BRepGProp_Domain(f), seen) for f in occt.faces_of(shape))
-    return float(sum(one.Mass() for one in found))
+    vinerts = (BRepGProp_Vinert(BRepGProp_Face(f), BRepGProp_Domain(f), seen) for f in occt.faces_of(shape))
+    return float(sum(vinert.Mass() for vinert in vinerts))
 
 
 SMALL = 0.1
@@ -553,34 +554,34 @@ def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
     """
     problems: list[Note] = []
     bodies: list[Body] = []
-    known: dict[tuple[int, Any], _Bare] = {}
+    bares: dict[tuple[int, Any], _Bare] = {}
     solids = [solid for shape in shapes for solid in occt.solids_of(shape)]
     shells, left = closed_shells(shapes)
     if shells:
         problems.append(shell_note(len(shells), len(solids)))
-    found = [*solids, *shells]
-    picture = _Picture.of(shapes, len(found)) if mesh_check else None
-    for number, solid in enumerate(found, start=1):
+    measured_bodies = [*solids, *shells]
+    picture = _Picture.of(shapes, len(measured_bodies)) if mesh_check else None
+    for number, solid in enumerate(measured_bodies, start=1):
         # The kernel's shared body of equal solids; kept in _Bare, so that its id stays its own.
         body = solid.TShape()
         key = (id(body), solid.Orientation())
-        if key not in known:
-            known[key] = _measured(solid.Located(TopLoc_Location()), body, eps, picture)
-            where = f"solid {number} of {len(found)}: " if len(found) > 1 else ""
-            problems += [replace(note, message=where + note.message) for note in known[key].notes]
-        bodies += _placed(known[key], solid)
+        if key not in bares:
+            bares[key] = _measured(solid.Located(TopLoc_Location()), body, eps, picture)
+            where = f"solid {number} of {len(measured_bodies)}: " if len(measured_bodies) > 1 else ""
+            problems += [replace(note, message=where + note.message) for note in bares[key].notes]
+        bodies += _placed(bares[key], solid)
     settled = together(bodies, KernelCommon(), problems)
     if settled.mixed:
         problems.append(cavity_note(settled))
     if settled.solids and left:
         problems += loose_notes([tessellated(surface)[0] for surface in left], bodies, settled.solids)
     meshes = [body.mesh for body in bodies if body.mesh is not None]
-    bare = [] if found else [shape for shape in shapes if occt.faces_of(shape)]
+    bare = [] if measured_bodies else [shape for shape in shapes if occt.faces_of(shape)]
     if mesh_check and bare:
         meshes = [tessellated(shape)[0] for shape in bare]
     whole = simplified(joined(meshes), PICTURE_TRIANGLES) if meshes else None
     wires = any(occt.has_edges(shape) for shape in shapes)
-    return Measured(settled.solids, tuple(problems), whole, bool(found or bare), wires)
+    return Measured(settled.solids, tuple(problems), whole, bool(measured_bodies or bare), wires)
 
 
 @dataclass(frozen=True, slots=True)
@@ -652,16 +653,16 @@ def _integrated(solid: Any, eps: float, notes: list[Note]) -> SolidProps | None:
         solid = _rebuilt(solid, -centre)
     else:
         centre = np.zeros(3)
-    found = solid_moments(solid, eps, notes)
-    if not np.isfinite(found.volume) or found.volume == 0.0:
+    solid_result = solid_moments(solid, eps, notes)
+    if not np.isfinite(solid_result.volume) or solid_result.volume == 0.0:
         notes.append(NO_VOLUME)
         return None
     size_m, distance_m = size * MM, distance * MM
-    volume_m3 = found.volume * MM**3
-    notes += integration_notes(volume_m3, found.error, eps, distance_m=distance_m, size_m=size_m)
-    sign = -1.0 if found.volume < 0 else 1.0
-    com = (found.com + centre) * MM
-    return SolidProps(sign * volume_m3, com, sign * found.inertia * MM**5, reversed=sign < 0)
+    volume_m3 = solid_result.volume * MM**3
+    notes += integration_notes(volume_m3, solid_result.error, eps, distance_m=distance_m, size_m=size_m)
+    sign = -1.0 if solid_result.volume < 0 else 1.0
+    com = (solid_result.com + centre) * MM
+    return SolidProps(sign * volume_m3, com, sign * solid_result.inertia * MM**5, reversed=sign < 0)
 
 
 def _rebuilt(shape: Any, offset: Floats) -> Any:
@@ -699,9 +700,7 @@ def _checked_mesh(solid: Any, props: SolidProps | None, picture: _Picture, notes
 def load_shape(path: Path, named: str) -> Any:
     """Return the shape in a file, text or binary. ``named`` is what a DocumentError calls it."""
     shape = TopoDS_Shape()
-    with path.open("rb") as stream:
-        head = stream.read(64).lstrip()
-    if head.startswith(b"Open CASCADE Topology"):
+    if is_binary_brep(path):
         done = BinTools.Read_s(shape, str(path))
     else:
         done = BRepTools.Read_s(shape, str(path), BRep_Builder())
@@ -710,7 +709,7 @@ def load_shape(path: Path, named: str) -> Any:
     return shape
 
 
-def read_brep(path: Path, options: ReadOptions, report: Report) -> Reading:
+def read_brep(path: Path, options: ReadOptions, report: Report) -> GeometryReading:
     """Return one part from a .brep file, in mm as the kernel writes them. Raises DocumentError."""
     report("reading", 0, 0)
     shape = load_shape(path, str(path))
@@ -718,7 +717,7 @@ def read_brep(path: Path, options: ReadOptions, report: Report) -> Reading:
     measured = measure([shape], eps=options.eps, mesh_check=options.mesh_check)
     part = measured.prototype("shape", path.stem)
     instance = Instance((path.stem,), (path.stem,), "shape", np.eye(4))
-    return Reading(Assembly(path.stem, {"shape": part}, (instance,), source=str(path), unit="mm"))
+    return GeometryReading(Assembly(path.stem, {"shape": part}, (instance,), source=str(path), unit="mm"))
 
 
 def measure_all(

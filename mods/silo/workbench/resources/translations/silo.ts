@@ -29,42 +29,42 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../buttons.py" />
+            <location filename="../../addon.py" />
             <source>Save a copy</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../buttons.py" />
+            <location filename="../../addon.py" />
             <source>This document is not open any more.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../buttons.py" />
+            <location filename="../../addon.py" />
             <source>[Silo] This document is not open: </source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../buttons.py" />
+            <location filename="../../addon.py" />
             <source>[Silo] Not opened, for it is not on the Silo server in use: </source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../buttons.py" />
+            <location filename="../../addon.py" />
             <source>No browser could be opened. The address was copied.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../buttons.py" />
+            <location filename="../../addon.py" />
             <source>[Silo] No browser could be opened; the address was copied: </source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../buttons.py" />
+            <location filename="../../addon.py" />
             <source>[Silo] These objects are not in the document any more.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../buttons.py" />
+            <location filename="../../addon.py" />
             <source>[Silo] The first {n} of {all} objects are selected.</source>
             <translation type="unfinished" />
         </message>
@@ -111,21 +111,23 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>{n} more was only recomputed; check it to commit it all the same.</source>
+            <source>{n} more was only recomputed; check it to commit it anyway.</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>{n} more were only recomputed; check them to commit them all the same.</source>
+            <source>{n} more were only recomputed; check them to commit them anyway.</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
             <source>File</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
             <source>State</source>
             <translation type="unfinished" />
         </message>
@@ -183,7 +185,7 @@
         <message>
             <location filename="../../commit/dialog.py" />
             <location filename="../../commit/flow.py" />
-            <location filename="../../pane/waiting.py" />
+            <location filename="../../pane/activity.py" />
             <source>Somebody</source>
             <translation type="unfinished" />
         </message>
@@ -382,12 +384,8 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../dependencies.py" />
-            <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
             <location filename="../../freecad/live_desk.py" />
+            <location filename="../../revisions/flow.py" />
             <source>in Silo</source>
             <translation type="unfinished" />
         </message>
@@ -452,60 +450,13 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../gui/installing.py" />
-            <source>Help on Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <source>The documentation is not there: {path}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <source>Install what Silo needs</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <source>Silo needs these Python packages: {names}.
-They are installed in {folder}.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <source>Install</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
             <location filename="../../gui/widgets.py" />
-            <location filename="../../mass/dialog.py" />
+            <location filename="../../mass/flow.py" />
             <location filename="../../preview/dialog.py" />
             <location filename="../../register/dialog.py" />
             <location filename="../../revisions/dialog.py" />
+            <location filename="../../settings/page.py" />
             <source>Close</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <source>Installing. This takes a minute or two…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <source>The packages are in {folder}. Start FreeCAD again to use Silo.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <location filename="../../pane/waiting.py" />
-            <source>Try again</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <source>They could not be installed: {reason}</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -524,58 +475,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../gui/widgets.py" />
             <source>Close without waiting</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <source>Mass of {name}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <source>Copy the table, for a spreadsheet</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <source>Copy</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <location filename="../../register/flow.py" />
-            <source>Part</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <source>Quantity</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <source>Mass of one</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <source>Mass</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <source>Volume of one, cm³</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <source>Material</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <location filename="../../register/dialog.py" />
-            <source>Remarks</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -606,6 +505,58 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../mass/flow.py" />
             <source>face {n} of {total}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Mass of {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Copy the table, for a spreadsheet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Copy</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <location filename="../../register/flow.py" />
+            <source>Part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Mass of one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Mass</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Volume of one, cm³</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <source>Material</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass/flow.py" />
+            <location filename="../../register/dialog.py" />
+            <source>Remarks</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -664,6 +615,164 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../pane/activity.py" />
+            <source>{who} committed {name} (revision {n}) since you opened it.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/boxes.py" />
+            <location filename="../../preview/flow.py" />
+            <source>… and {n} more</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Settings…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <location filename="../../settings/page.py" />
+            <source>Try again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <location filename="../../settings/page.py" />
+            <source>Install What Silo Needs…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>No Silo server is set up yet.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Connected to {host}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{host} is read-only now. Commits wait here until it takes changes again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{host} works only in part. What cannot be sent waits here.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>No connection to {host}. Commits wait here and are sent later.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{host} does not accept the token.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Connecting to {host}…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{host} sends no live events; what you commit is shown anyway.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{host} (live events are off)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{n} thing waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{n} things wait to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{n} thing waits for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{n} things wait for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>, {urgent} of them for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/entries.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>Show</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Send to {host}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/entries.py" />
+            <source>Same part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Retry</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Open theirs beside mine</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Compare with revision {n}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Take theirs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Commit mine on top</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/entries.py" />
+            <source>New part…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Save a copy…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>Discard</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../pane/boxes.py" />
             <source>Nothing has happened yet. Commit an assembly with File → Commit to Silo, and what becomes of it is shown here.</source>
             <translation type="unfinished" />
@@ -676,13 +785,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../pane/boxes.py" />
             <source>Stop</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/boxes.py" />
-            <location filename="../../pane/waiting.py" />
-            <location filename="../../preview/flow.py" />
-            <source>… and {n} more</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -702,7 +804,13 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/dock.py" />
+            <location filename="../../settings/page.py" />
             <source>Database Activity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/dock.py" />
+            <source>Silo Project</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -792,20 +900,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
-            <location filename="../../pane/waiting.py" />
-            <source>Same part</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <location filename="../../pane/waiting.py" />
-            <source>New part…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <location filename="../../preview/dialog.py" />
-            <source>Show</source>
+            <source>Open in {bom}</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -845,121 +940,6 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{who} committed {name} (revision {n}) since you opened it.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Settings…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>No Silo server is set up yet.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Connected to {host}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{host} is read-only now. Commits wait here until it takes changes again.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{host} works only in part. What cannot be sent waits here.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>No connection to {host}. Commits wait here and are sent later.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{host} does not accept the token.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Connecting to {host}…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{host} sends no live events; what you commit is shown all the same.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{host} (live events are off)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{n} thing waits to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{n} things wait to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{n} thing waits for your choice</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>{n} things wait for your choice</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>, {urgent} of them for your choice</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Send to {host}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Retry</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Open theirs beside mine</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Take theirs</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Commit mine on top</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Save a copy…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/waiting.py" />
-            <source>Discard</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
             <location filename="../../preview/dialog.py" />
             <source>BOM in Silo: {name}</source>
             <translation type="unfinished" />
@@ -991,6 +971,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
             <source>In Silo</source>
             <translation type="unfinished" />
         </message>
@@ -1248,6 +1229,21 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/dialog.py" />
+            <source>Source</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Supplier</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Supplier's number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
             <source>Type</source>
             <translation type="unfinished" />
         </message>
@@ -1258,12 +1254,82 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/dialog.py" />
+            <source>Filter</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Check All</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>None</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>All Certain</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Source…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Category…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Type…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Supplier…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Name, as {name} left {n}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Fill Down</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>All chosen rows get what the first of them has in this column (Ctrl+D)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>For the chosen rows:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
             <source>Ask after each commit</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../register/dialog.py" />
             <source>Register Selected</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Undo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <source>Take back what was just registered: new items are archived, the files forget them</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1348,6 +1414,41 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/flow.py" />
+            <source>made here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>bought</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>not said</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>all rows</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>unsure</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>new</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>probable duplicates</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
             <source>its unsaved edits are saved too</source>
             <translation type="unfinished" />
         </message>
@@ -1413,11 +1514,6 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/flow.py" />
-            <source>new</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/flow.py" />
             <source>{number} or later</source>
             <translation type="unfinished" />
         </message>
@@ -1459,6 +1555,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../register/flow.py" />
             <source>registering…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>as you chose in this folder before</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1563,12 +1664,22 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/flow.py" />
+            <source>Reading pictures</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
             <source>Asking for the next number</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../register/flow.py" />
             <source>Registering</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/flow.py" />
+            <source>Undoing</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1608,11 +1719,6 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>Replace edited files (copies are kept)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../revisions/dialog.py" />
             <source>Fetching…</source>
             <translation type="unfinished" />
         </message>
@@ -1634,6 +1740,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../revisions/dialog.py" />
             <source>Open</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Fetch what is newer in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1668,12 +1779,27 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
+            <source>It lies in the project already, and is open: {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
             <source>History of {name}</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
             <source>Get This Revision as a Copy…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Show the revision as a ghost beside yours; once more removes it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Compare in 3D</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1698,7 +1824,87 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
+            <source>Edited here, and newer in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>What to do</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Do It</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Choose the project's folder</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Refresh</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Search</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Not in Silo as here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Decide…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Commit All</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Looking at the files…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Choose the project's folder: it is remembered, and marked for others.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Silo: {state}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
             <source>Choose a folder</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>The ghost is removed.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Ghost: {removed} only in revision {n}, {moved} elsewhere there. Only here: {added}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Not compared: {unknown} in groups and arrays without links.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Silo has no model of revision {n} yet.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1753,6 +1959,81 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/flow.py" />
+            <source>not in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>edited since its commit</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>newer in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>edited, and newer in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>its item is not on this server</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>unsaved edits</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>was {place}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{n} files, {left} of them not in Silo as they are here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Looking at the project</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{place} links to {name}, which is not there.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{place} links to {name}, outside the project: it is not sent.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{place} cannot be read: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{place} is a copy of {name}, which has the item.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{place} is gone since its commit.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
             <source>{name} has edits that are not in Silo; it was left alone.</source>
             <translation type="unfinished" />
         </message>
@@ -1794,6 +2075,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../session/session.py" />
             <source>Sending to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/session.py" />
+            <source>Drawing models</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1962,6 +2248,52 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../settings/page.py" />
+            <source>Help on Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>The documentation is not there: {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Silo cannot start yet: FreeCAD's Python lacks {names}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Install what Silo needs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Silo needs these Python packages: {names}.
+They are installed in {folder}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Install</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Installing. This takes a minute or two…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>The packages are in {folder}. Start FreeCAD again to use Silo.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>They could not be installed: {reason}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../settings/server.py" />
             <source>Enter the server's address too: a token belongs to its server.</source>
             <translation type="unfinished" />
@@ -2047,70 +2379,168 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../start.py" />
+            <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../bom_sync.py" />
             <source>BOM Updated: {number}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../../bom_sync.py" />
             <source>+{n} added</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../../bom_sync.py" />
             <source>~{n} qty changed</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../../bom_sync.py" />
             <source>⚠{n} unreferenced</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../../bom_sync.py" />
             <source>⚡{n} in conflict</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../../bom_sync.py" />
             <source>no changes</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../../bom_sync.py" />
             <source>{n} component has no Silo part number</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../../bom_sync.py" />
             <source>{n} components have no Silo part number</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../../bom_sync.py" />
             <source>This is part of draft {draft}. Revision {released} stays released as it is.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../activity.py" />
+            <location filename="../../../bom_sync.py" />
+            <source>{value} for {n} of {all} parts</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../bom_sync.py" />
             <source>The category rules of this Silo are not used until they are mended: {problem}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>It is meant for {there}, which is not the server in use.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>for another server</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>out of date</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>A newer commit of it has arrived since; this one would undo it.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>held for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>being copied</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>Its file is being copied.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>paused</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>tried again later</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>waiting</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>file and BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>file</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>Nothing is sent to {host} before you retry: {reason}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../outbox/entry.py" />
+            <source>Nothing is sent to {host} for {time}: {reason}</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_InstallPackages</name>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Install What Silo Needs…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Install the Python packages that Silo needs</source>
             <translation type="unfinished" />
         </message>
     </context>
     <context>
         <name>Origin_Commit</name>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Commit to Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Save this document and its changed sub-assemblies, upload them as new revisions, and bring the BOM to Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Saves this document and the edited ones below it, uploads each as a new revision with your comment, and brings the BOM to Silo. Nothing is ever deleted there.</source>
             <translation type="unfinished" />
         </message>
@@ -2118,12 +2548,12 @@ Commits that are not copied by then may have to be committed again.</source>
     <context>
         <name>Silo_BOM</name>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Compare BOM with Silo…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Show how the BOM of this assembly differs from the one in Silo</source>
             <translation type="unfinished" />
         </message>
@@ -2131,12 +2561,12 @@ Commits that are not copied by then may have to be committed again.</source>
     <context>
         <name>Silo_RegisterParts</name>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Register Parts…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Give part numbers to the components of this assembly that have none</source>
             <translation type="unfinished" />
         </message>
@@ -2144,12 +2574,12 @@ Commits that are not copied by then may have to be committed again.</source>
     <context>
         <name>Silo_Mass</name>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Mass of the Assembly…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Mass and centre of mass from the parts' shapes and materials, with what is missing</source>
             <translation type="unfinished" />
         </message>
@@ -2157,12 +2587,12 @@ Commits that are not copied by then may have to be committed again.</source>
     <context>
         <name>Silo_Activity</name>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Database Activity</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Show what happens in Silo, and what waits to be sent</source>
             <translation type="unfinished" />
         </message>
@@ -2170,25 +2600,38 @@ Commits that are not copied by then may have to be committed again.</source>
     <context>
         <name>Silo_Open</name>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Open from Silo…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Find an item in Silo and open its file with all that it links to</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Project</name>
+        <message>
+            <location filename="../../start.py" />
+            <source>Project</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../start.py" />
+            <source>All files of the project, which of them Silo has, and Commit All</source>
             <translation type="unfinished" />
         </message>
     </context>
     <context>
         <name>Silo_History</name>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>History…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>The revisions of this document: who, when, and what changed in the BOM</source>
             <translation type="unfinished" />
         </message>
@@ -2196,12 +2639,12 @@ Commits that are not copied by then may have to be committed again.</source>
     <context>
         <name>Silo_Settings</name>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Silo Settings…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Server, token, and what a commit does</source>
             <translation type="unfinished" />
         </message>
@@ -2209,26 +2652,13 @@ Commits that are not copied by then may have to be committed again.</source>
     <context>
         <name>Silo_Help</name>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Help on Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commands.py" />
+            <location filename="../../start.py" />
             <source>Open the page that explains the commands, the pane and the messages</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_InstallPackages</name>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <source>Install What Silo Needs…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../gui/installing.py" />
-            <source>Install the Python packages that Silo needs</source>
             <translation type="unfinished" />
         </message>
     </context>

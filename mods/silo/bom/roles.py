@@ -1,0 +1,708 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What each object of an assembly is, and what it brings: one pass, which everything else reads.
+
+Each object in an assembly has exactly one :class:`Role`. What is a component brings what it shows. A link
+brings what its target brings, once per element; a Draft array what its original brings, once per instance; a
+link group, a compound, an inline part or a folder what its members bring. That ends in an object of another
+file, in a standard part, in an object with an identity of its own, or in geometry of this very file: an *own
+part*, which is no item yet. How an object comes to bring something is kept (:class:`Shown`), so masses and
+people can follow the same chain.
+
+* An object counts once, however many lists of the tree name it; each link group that shows it counts.
+* What shows others is counted; the others count where they lie only if they are visible there. The original
+  of an array and the members of a compound never do.
+* What lies in something suppressed or excluded is left out with it.
+* What a cut, a boolean or a fusion consumes is no piece to buy, wherever that feature lies.
+* A broken link brings a :class:`Lost` component with its quantity, and a finding that blocks.
+
+Nothing here depends on where the assembly is used, so each is read once (:class:`Reader`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+from silo.bom.document import LinkProblem, first_of, label_of, located, object_name, own, same_document
+from silo.bom.errors import DocumentError
+from silo.bom.findings import FindingCode
+from silo.bom.model import Notes, document_identity, identity_of, own_identity
+from silo.bom.objects import (
+    COMPONENTS,
+    INLINE,
+    REPEATERS,
+    Contents,
+    Contribution,
+    Count,
+    CountedObjects,
+    Key,
+    Kind,
+    Lost,
+    ObjectRole,
+    Tree,
+    add,
+    consumed,
+    draft_count,
+    elements,
+    is_array,
+    is_named_assembly,
+    kind_of,
+    left_out_by,
+    no_component,
+    sources,
+    survey_of,
+)
+from silo.bom.standard import STANDARD_PARTS, designation
+from silo.bom.targets import (
+    Inspect,
+    Target,
+    is_assembly_link,
+    is_link,
+    own_parts,
+    resolve_target,
+    stale_copies,
+)
+
+# Groups that link to groups: a file does not need many of these, an attack does.
+_MAX_NESTING = 32
+# A link without a target, and one that leads back to itself, stand for no component.
+_NO_COMPONENT_LOST = (FindingCode.UNSET_LINK, FindingCode.CYCLE)
+# What may have an identity of its own and is a component then.
+DECLARABLE = REPEATERS | {Kind.LOCAL, Kind.FOREIGN, Kind.CONTAINER, Kind.LINK_GROUP}
+_COUNTABLE = COMPONENTS | REPEATERS | {Kind.ELEMENT, Kind.STANDARD}
+SHOWING = COMPONENTS | REPEATERS | {Kind.ELEMENT}
+_GEOMETRY = REPEATERS | {Kind.LOCAL}
+
+
+_COUNTS = (ObjectRole.COMPONENT, ObjectRole.HOLDER)
+
+
+Canonical = Callable[[str], str]
+
+
+class Files:
+    """What identifies an object: its file, by one path, and its name in it."""
+
+    def __init__(self, canonical: Canonical | None = None) -> None:
+        self._canonical = canonical
+        self._paths: dict[str, str] = {}
+
+    def key(self, obj: Any) -> Key:
+        return (self.path(obj), object_name(obj))
+
+    def path(self, obj: Any) -> str:
+        return self.canonical(getattr(getattr(obj, "Document", None), "FileName", "") or "")
+
+    def canonical(self, path: str) -> str:
+        if not path or self._canonical is None:
+            return path
+        if path not in self._paths:
+            self._paths[path] = self._canonical(path)
+        return self._paths[path]
+
+
+class Reader:
+    """Reads assemblies, each once, and keeps what it learnt of the objects that it met on the way.
+
+    beside
+        finds what counts with an assembly though it lies beside it.
+    hardware
+        False leaves standard parts out.
+    """
+
+    def __init__(
+        self,
+        inspect: Inspect | None,
+        files: Files,
+        *,
+        beside: Callable[[Any], Iterable[Any]] = lambda _container: (),
+        hardware: bool = True,
+    ) -> None:
+        self.notes = Notes(files.path)
+        self.key = files.key
+        self.beside = beside
+        self.hardware = hardware
+        self._inspect = inspect
+        self._known: dict[Key, Contents] = {}
+        self._not_components: dict[Key, str] = {}
+        self._designations: dict[Key, tuple[str, bool]] = {}
+        self._eaten: dict[str, dict[Key, Any]] = {}
+
+    def contents(self, container: Any) -> Contents:
+        """What an assembly holds; read once however often it is used."""
+        key = self.key(container)
+        if key not in self._known:
+            self.notes.reading = key[0]
+            try:
+                self._known[key] = Reading(self, container).contents(container)
+            except DocumentError as error:
+                self.notes.unreadable(container, error)
+                self._known[key] = Contents(holds_components=True)
+        return self._known[key]
+
+    def brings(self, obj: Any) -> list[Any]:
+        """The components that one object shows, each once; no own parts."""
+        try:
+            return Reading(self, obj).brought_by(obj)
+        except DocumentError:
+            return []
+
+    def resolve(self, link: Any) -> Target:
+        """The end of a link."""
+        return resolve_target(link, self._inspect)
+
+    def eaten(self, document: Any, features: Iterable[Any]) -> dict[Key, Any]:
+        """What the features of a document consume: key → the feature.
+
+        features
+            of a document that does not say which objects it has.
+        """
+        path = getattr(document, "FileName", "") or f"{id(document):x}"
+        if path not in self._eaten:
+            listed = [obj for obj, _ in survey_of(document).of({Kind.LOCAL})]
+            self._eaten[path] = consumed(listed or features, self.key)
+        return self._eaten[path]
+
+    def no_component(self, key: Key, target: Any) -> str:
+        """What the target is instead of a component; "" where it may be one."""
+        if key not in self._not_components:
+            self._not_components[key] = no_component(target)
+        return self._not_components[key]
+
+    def standard(self, obj: Any, key: Key | None = None) -> tuple[str, bool]:
+        """The designation of a standard part, "" for anything else; and whether it is an item of its own.
+
+        It is where somebody registered that very object. What identifies the document it lies in is that of
+        the part beside it, except where there is none.
+        """
+        key = key or self.key(obj)
+        result = self._designations.get(key)
+        if result is None:
+            text = designation(obj)
+            result = self._designations[key] = (text, bool(text) and _is_registered(obj))
+        return result
+
+    def component(self, obj: Any) -> Key:
+        """What identifies a component: of standard parts their designation, of others the key."""
+        key = self.key(obj)
+        text, registered = self.standard(obj, key)
+        return (STANDARD_PARTS, text) if text and not registered else key
+
+
+def _is_registered(fastener: Any) -> bool:
+    if own_identity(fastener):
+        return True
+    document = getattr(fastener, "Document", None)
+    if not document_identity(document):
+        return False
+    others = (obj for obj in getattr(document, "Objects", ()) or () if obj is not fastener)
+    return all(kind_of(obj) in (Kind.NOTHING, Kind.FOLDER) for obj in others)
+
+
+class Reading:
+    """One assembly while it is being read."""
+
+    def __init__(self, reader: Reader, container: Any) -> None:
+        self._reader = reader
+        self._notes = reader.notes
+        self._key = reader.key
+        self._document = container.Document
+        self._path, _ = reader.key(container)
+        # The assembly's own identity on something in it means the assembly itself.
+        self._identity = (identity_of(container) or "").lower()
+        self._is_root = getattr(container, "is_document_root", False)
+        self._nodes: dict[Key, Contribution] = {}
+        self._mine: dict[int, tuple[Any, bool]] = {}
+        self._trees: dict[Key, Tree] = {}
+        self._ones: dict[Key, CountedObjects] = {}
+        self._links: set[Key] = set()
+        self._wholes: set[Key] = set()
+        self._inside: set[Key] = set()
+        self._shown: set[Key] = set()
+        self._covered: set[Key] = set()
+        self._gone: set[Key] = set()
+        self._roles: dict[Key, ObjectRole] = {}
+        self._holds_components = False
+        self._main: Tree | None = None
+        self._hidden: list[Any] = []
+        # What was entered and not yet left, the assembly first; and the ways that led back into themselves.
+        self._open: dict[Key, Any] = {}
+        self._rings: list[dict[Key, Any]] = []
+
+    def contents(self, container: Any) -> Contents:
+        """The contents of an assembly."""
+        top, kind = self._key(container), kind_of(container)
+        if kind in REPEATERS:
+            node = self._node(top, container, kind)
+            leaves = [(node, 1)] if node is not None and node.worth else []
+            counts, mine = self._split(leaves)
+            mine = [count for count in mine if count.target is not container]
+            return Contents(counts, mine, {top: ObjectRole.COMPONENT}, self._holds_components or bool(counts))
+        self._open[top] = container
+        tree = self._tree(top, container)
+        self._main = tree
+        self._shown = self.shown_by([count for count in tree.members.values() if count[1] in SHOWING])
+        leaves = self._leaves(tree)
+        counts, mine = self._split(leaves)
+        beside = list(self._reader.beside(container)) if tree.members else []
+        for obj in beside:
+            if self._key(obj) in tree.members:
+                self._notes.add(FindingCode.TWO_ROLES, obj)
+        nodes = [
+            node for obj in beside if (node := self._node(self._key(obj), obj, kind_of(obj))) is not None
+        ]
+        self._roles.update({node.key: ObjectRole.COMPONENT for node in nodes})
+        about = str(self._notes.place(container))
+        for obj in beside:
+            self._notes.add(FindingCode.COUNTED_BESIDE, obj, about, target=container)
+        counts += self._split([(node, 1) for node in nodes], beside=True)[0]
+        is_part = self._is_root and not self._holds_components and self._is_one_part(counts or mine)
+        if is_part:
+            counts, mine = [], [*counts, *mine]
+        self._report_rings()
+        for key in self._shown:
+            self._roles.setdefault(key, ObjectRole.SOURCE)
+        for count in (*counts, *mine):
+            if self._roles.get(count.shown.key) is not ObjectRole.COMPONENT:
+                self._notes.add(FindingCode.TWO_ROLES, count.shown.obj)
+        holds = self._holds_components or bool(counts)
+        return Contents(counts, mine, self._roles, holds, is_part, self._hidden, tree)
+
+    def _is_one_part(self, counts: list[Count]) -> bool:
+        """True for a file whose one component is its own only part: it is that part, no assembly of it."""
+        only = counts[0] if len(counts) == 1 else None
+        return (
+            only is not None
+            and only.quantity == 1
+            and only.target is only.shown.obj
+            and not only.key[0].startswith(STANDARD_PARTS)
+        )
+
+    def brought_by(self, obj: Any) -> list[Any]:
+        """The components that one object of the document shows."""
+        node = self._node(self._key(obj), obj, kind_of(obj))
+        return [count.target for count in self._split([(node, 1)])[0]] if node is not None else []
+
+    # --- which objects count -------------------------------------------------------------------------------
+
+    def _tree(self, key: Key, container: Any) -> Tree:
+        if (tree := self._trees.get(key)) is None:
+            tree = self._trees[key] = Tree(container, self._key, self._is_closed)
+            self._find_wholes(tree, container)
+            self._find_repeated(tree)
+        return tree
+
+    def _is_closed(self, obj: Any, kind: Kind) -> bool:
+        """True for an inline container that a person declared a component of its own."""
+        return kind in DECLARABLE and self._is_declared(obj)
+
+    def _is_declared(self, obj: Any) -> bool:
+        """True for an object with an identity of its own."""
+        identity = own_identity(obj)
+        return bool(identity) and identity is not None and identity.lower() != self._identity
+
+    def _is_mine(self, target: Any) -> bool:
+        """True for an object of this file; FreeCAD makes two documents of one that it opened by two paths."""
+        if isinstance(target, Lost):
+            return False
+        document = target.Document
+        is_mine = self._mine.get(id(document))
+        if is_mine is None or is_mine[0] is not document:
+            is_here = bool(self._path) and self._key(target)[0] == self._path
+            is_mine = self._mine[id(document)] = (
+                document,
+                is_here or same_document(document, self._document),
+            )
+        return is_mine[1]
+
+    def _is_own(self, target: Any) -> bool:
+        """True for geometry of this file that nobody declared."""
+        if not self._is_mine(target) or self._is_declared(target):
+            return False
+        return not self._reader.standard(target)[0]
+
+    def _find_wholes(self, tree: Tree, container: Any) -> None:
+        """Parts that hold nothing but geometry: each is one own part, not piece by piece."""
+        mixed, full = set[Key](), set[Key]()
+        for name, (obj, kind) in tree.members.items():
+            if kind in _GEOMETRY and not self._is_declared(obj) and self._is_geometry(obj, kind):
+                full.update(tree.above(name))
+            elif (
+                kind in COMPONENTS or kind in _COUNTABLE or kind is Kind.FOREIGN or self._is_closed(obj, kind)
+            ):
+                mixed.update(tree.above(name))
+            elif kind is Kind.CONTAINER and is_named_assembly(obj):
+                mixed.update((name, *tree.above(name)))
+        wholes = full - mixed
+        if tree.top in wholes and kind_of(container) is Kind.CONTAINER and not is_named_assembly(container):
+            self._wholes.add(tree.top)
+        if not wholes.difference((tree.top,)):
+            return
+        for name, (_, kind) in tree.members.items():
+            if not self._wholes.isdisjoint(tree.around(name)):
+                self._inside.add(name)
+            elif kind is Kind.CONTAINER and name in wholes:
+                self._wholes.add(name)
+
+    def _is_geometry(self, obj: Any, kind: Kind, depth: int = 0) -> bool:
+        """True if an object shows geometry only."""
+        if kind not in REPEATERS:
+            return kind is Kind.LOCAL
+        return depth < _MAX_NESTING and all(
+            self._is_geometry(source, kind_of(source), depth + 1) for source in sources(obj)
+        )
+
+    def _find_repeated(self, tree: Tree) -> None:
+        """What arrays and compounds show never counts where it lies; nor do elements of link arrays."""
+        has_elements = any(kind is Kind.ELEMENT for _, kind in tree.members.values())
+        for name, (obj, kind) in tree.members.items():
+            if kind is Kind.LINK and has_elements:
+                self._inside.update(map(self._key, elements(obj)))
+            elif kind is Kind.COMPOUND or (kind is Kind.DRAFT_ARRAY and tree.times(name)):
+                # The first instance of an array stands where its original lies.
+                covered = self._covered if tree.times(name) else self._gone
+                covered.update(map(self._key, sources(obj)))
+
+    def shown_by(self, objects: list[tuple[Any, Kind]]) -> set[Key]:
+        """The objects of the document that these show, directly or not."""
+        keys: set[Key] = set()
+        while objects:
+            for show in self._shows(*objects.pop()):
+                if show is None or not self._is_mine(show) or (key := self._key(show)) in keys:
+                    continue
+                keys.add(key)
+                kind = kind_of(show)
+                objects.append((show, kind))
+                if kind in INLINE and key not in self._trees:
+                    objects += self._tree(key, show).members.values()
+        return keys
+
+    def _shows(self, obj: Any, kind: Kind) -> list[Any]:
+        if kind in REPEATERS:
+            return sources(obj)
+        if kind not in SHOWING or kind is Kind.ASSEMBLY_LINK:
+            return []
+        try:
+            linked = getattr(obj, "LinkedObject", None)
+        except DocumentError:  # the caller that counts it reports that
+            return []
+        if isinstance(linked, tuple):
+            is_near = linked[0] is not None and self._is_mine(linked[0])
+            linked = self._reader.resolve(obj).obj if is_near else None
+        return [linked, first_of(own(obj, "LinkCopyOnChangeSource"))]
+
+    def _leaves(self, tree: Tree) -> list[tuple[Contribution, int]]:
+        """What counts in a container, and how often; and the role of each object that lies in it."""
+        leaves: list[tuple[Contribution, int]] = []
+        for name, (obj, kind) in tree.members.items():
+            try:
+                role, node = self._judged(tree, name, obj, kind)
+            except DocumentError as error:
+                self._unreadable(obj, error)
+                role, node = ObjectRole.COMPONENT, None
+            if tree is self._main:
+                self._roles[name] = role
+            else:  # shown only through what led here
+                self._roles.setdefault(name, ObjectRole.SOURCE if role in _COUNTS else role)
+            if node is not None:
+                leaves.append((node, tree.times(name)))
+        return self._without_hidden_geometry(tree, leaves)
+
+    def _judged(self, tree: Tree, name: Key, obj: Any, kind: Kind) -> tuple[ObjectRole, Contribution | None]:
+        if kind is Kind.NOTHING:
+            return ObjectRole.CONSTRUCTION, None
+        if name in self._inside:
+            return ObjectRole.INSIDE, None
+        # Few assemblies have anything covered or shown twice; to climb for each takes long in deep ones.
+        around = (name, *tree.around(name)) if self._covered or self._shown else ()
+        if not self._covered.isdisjoint(around):
+            return ObjectRole.SOURCE, None
+        if name in self._gone:
+            return ObjectRole.LEFT_OUT, None
+        if not tree.times(name):
+            if left_out_by(obj) and any(tree.times(holder) for holder in tree.holders[name]):
+                self._report_left_out(obj, kind)
+            return ObjectRole.LEFT_OUT, None
+        if kind in INLINE and name not in self._wholes and not self._is_closed(obj, kind):
+            return ObjectRole.HOLDER, None
+        if any(each_name in self._shown and not tree.visible(each_name) for each_name in around):
+            return ObjectRole.SOURCE, None
+        node = self._node(name, obj, kind)
+        if node is None or not node.worth:
+            return ObjectRole.CONSTRUCTION, None
+        return self._unconsumed(tree, name, node)
+
+    def _report_left_out(self, obj: Any, kind: Kind) -> None:
+        """What goes with its container needs no word of its own, nor does what is nothing to buy."""
+        if kind in _COUNTABLE or kind in INLINE or kind in DECLARABLE:
+            self._is_left_out(obj)
+            self._holds_components |= kind is Kind.DRAFT_ARRAY or kind in COMPONENTS
+
+    def _unconsumed(
+        self, tree: Tree, name: Key, node: Contribution
+    ) -> tuple[ObjectRole, Contribution | None]:
+        """Without standard parts and geometry that a feature consumes; a part of another file stays."""
+        if all(key[0] != STANDARD_PARTS and key[0] != self._path for key in node.worth):
+            return ObjectRole.COMPONENT, node
+        if len(tree.members) < 2 and not self._is_hardware(node):  # to ask every feature takes long
+            return ObjectRole.COMPONENT, node
+        features = (obj for obj, kind in tree.members.values() if kind is Kind.LOCAL)
+        eaten = self._reader.eaten(self._document, features)
+        feature = next((eaten[owner] for owner in (name, *tree.above(name)) if owner in eaten), None)
+        if feature is None:
+            return ObjectRole.COMPONENT, node
+        if self._is_hardware(node):
+            self._notes.add(FindingCode.CONSUMED, node.obj, target=feature)
+        left = {
+            key: owner
+            for key, owner in node.worth.items()
+            if key[0] != STANDARD_PARTS and not (key[0] == self._path and self._is_own(owner[0]))
+        }
+        if not left:
+            return ObjectRole.OPERAND, None
+        return ObjectRole.COMPONENT, Contribution(name, node.obj, node.kind, left, node.below, node.tree)
+
+    @staticmethod
+    def _is_hardware(node: Contribution) -> bool:
+        return any(key[0] == STANDARD_PARTS for key in node.worth)
+
+    def _without_hidden_geometry(
+        self, tree: Tree, leaves: list[tuple[Contribution, int]]
+    ) -> list[tuple[Contribution, int]]:
+        """Of geometry modelled in the file only what is visible is shown, except where nothing else is."""
+
+        hidden = set()
+        for node, _ in leaves:
+            if node.kind not in DECLARABLE or tree.visible(node.key):
+                continue
+            if all(key[0] == self._path and self._is_own(target) for key, (target, _) in node.worth.items()):
+                hidden.add(node.key)
+        if not hidden or len(hidden) == len(leaves):
+            return leaves
+        self._roles.update(dict.fromkeys(hidden, ObjectRole.CONSTRUCTION))
+        self._hidden += [tree.members[name][0] for name in hidden]
+        return [leaf for leaf in leaves if leaf[0].key not in hidden]
+
+    def _split(
+        self, leaves: Iterable[tuple[Contribution, int]], *, beside: bool = False
+    ) -> tuple[list[Count], list[Count]]:
+        """The components, and the parts of this file that are no items yet."""
+        counts: list[Count] = []
+        mine: list[Count] = []
+        for node, times in leaves:
+            link = node.key in self._links
+            for key, (target, quantity) in node.worth.items():
+                count = Count(node, key, quantity * times, link, link and is_array(node.obj), beside)
+                is_mine = key[0] == self._path and self._is_own(target)
+                (mine if is_mine else counts).append(count)
+        return counts, mine
+
+    def _report_rings(self) -> None:
+        """Links that lead back to what holds them block, except where they bring nothing anyway."""
+        for ring in self._rings:
+            links = [obj for obj in ring.values() if is_link(obj)]
+            if not links or any(key in self._nodes and self._nodes[key].worth for key in ring):
+                for obj in ring.values():
+                    self._notes.loop(obj)
+                continue
+            for link in links:
+                self._notes.in_document(link, self._reader.resolve(link).obj, leads_back=True)
+
+    # --- what each of them brings ---
+
+    def _node(self, key: Key, obj: Any, kind: Kind) -> Contribution | None:
+        """What one object brings; each is looked at once, so groups of groups cost no more than they hold.
+
+        None for a ring, for what is nested too deep, and for what is damaged.
+        """
+        if (contribution := self._nodes.get(key)) is not None:
+            return contribution
+        if key in self._open:
+            ring = list(self._open)[list(self._open).index(key) :]
+            self._rings.append({name: self._open[name] for name in ring})
+            return None
+        if len(self._open) > _MAX_NESTING:
+            self._notes.add(FindingCode.TOO_DEEP, obj, str(_MAX_NESTING), levels=_MAX_NESTING)
+            return None
+        self._open[key] = obj
+        try:
+            node = self._made(key, obj, kind)
+        except DocumentError as error:
+            # One damaged object must not hide the others; the finding blocks the BOM anyway.
+            self._unreadable(obj, error)
+            return None
+        finally:
+            del self._open[key]
+        self._nodes[key] = node
+        return node
+
+    def _unreadable(self, obj: Any, error: DocumentError) -> None:
+        self._holds_components = True
+        self._notes.unreadable(obj, error)
+
+    def _made(self, key: Key, obj: Any, kind: Kind) -> Contribution:
+        if kind in COMPONENTS or kind is Kind.ELEMENT:
+            return self._link(key, obj, kind)
+        if kind is Kind.STANDARD:
+            return Contribution(key, obj, kind, self._standard(obj))
+        if kind is Kind.LOCAL or self._is_closed(obj, kind) or key in self._wholes:
+            return Contribution(key, obj, kind, {key: (obj, 1)})
+        if kind is Kind.FOREIGN:
+            return Contribution(key, obj, kind, self._imported(key, obj))
+        if kind in REPEATERS:
+            return self._repeater(key, obj, kind)
+        if kind not in INLINE:
+            return Contribution(key, obj, kind, {})
+        tree = self._tree(key, obj)
+        if key in self._wholes:
+            return Contribution(key, obj, kind, {key: (obj, 1)})
+        leaves = self._leaves(tree)
+        return Contribution(key, obj, kind, self._sum(leaves), tuple(leaves), tree=tree)
+
+    @staticmethod
+    def _sum(leaves: Iterable[tuple[Contribution, int]]) -> CountedObjects:
+        worth: CountedObjects = {}
+        for node, times in leaves:
+            add(worth, node.worth, times)
+        return worth
+
+    def _standard(self, fastener: Any) -> CountedObjects:
+        if not self._reader.hardware:
+            self._notes.add(FindingCode.NO_HARDWARE, fastener, "")
+            return {}
+        return {self._reader.component(fastener): (fastener, 1)}
+
+    def _imported(self, key: Key, obj: Any) -> CountedObjects:
+        """What A2plus imported is the part in the file that it came from."""
+        file = own(obj, "sourceFile")
+        is_file = isinstance(file, str) and file.lower().endswith(".fcstd")
+        ask = getattr(obj.Document, "imported", None) if is_file else None
+        if ask is None:
+            self._notes.add(FindingCode.FOREIGN_COMPONENT, obj, self._notes.place(obj).doc_path)
+            return {key: (obj, 1)}
+        target = ask(file.replace("\\", "/"))
+        if not isinstance(target, LinkProblem):
+            if getattr(target, "is_document_root", False):
+                inner = self._reader.contents(target)
+                target = inner.own[0].target if inner.is_part else target
+            return {self._key(target): (target, 1)}
+        self._holds_components = True
+        problem = replace(target, file=located(target.file, obj.Document.FileName))
+        self._notes.broken(obj, problem)
+        lost = Lost(problem.file, "", label_of(obj))
+        return {lost.key: (lost, 1)}
+
+    def _repeater(self, key: Key, obj: Any, kind: Kind) -> Contribution:
+        listed = sources(obj)
+        shown = [member for member in listed if not self._is_left_out(member)]
+        nodes = [self._node(self._key(member), member, kind_of(member)) for member in shown]
+        below = [(node, 1) for node in nodes if node is not None and node.worth]
+        worth = self._sum(below)
+        one_piece = kind is Kind.COMPOUND and bool(worth) and self._is_geometry(obj, kind)
+        if not listed or (one_piece and all(self._is_own(target) for target, _ in worth.values())):
+            return Contribution(key, obj, kind, {key: (obj, 1)})
+        if not worth or kind is not Kind.DRAFT_ARRAY:
+            return Contribution(key, obj, kind, worth, tuple(below))
+        count = draft_count(obj)
+        if count is None:
+            self._notes.add(FindingCode.ARRAY_SIZE, obj, target=shown[0])
+        elif not all(self._is_own(target) for target, _ in worth.values()):
+            self._notes.add(FindingCode.DRAFT_ARRAY, obj, target=shown[0], count=count)
+        below = [(node, count or 1) for node, _ in below]
+        return Contribution(key, obj, kind, self._sum(below), tuple(below))
+
+    def _is_left_out(self, obj: Any) -> bool:
+        """True for an object that is left out; says so."""
+        mark = left_out_by(obj)
+        if mark == "Suppressed":
+            self._notes.add(FindingCode.SUPPRESSED, obj)
+        elif mark:
+            self._notes.add(FindingCode.EXCLUDED, obj, by="itself")
+        return bool(mark)
+
+    def _link(self, key: Key, link: Any, kind: Kind) -> Contribution:
+        nothing = Contribution(key, link, kind, {})
+        if self._is_left_out(link):
+            self._holds_components = True
+            return nothing
+        for element in elements(link):
+            self._is_left_out(element)
+        target = self._reader.resolve(link)
+        if target.obj is None:
+            self._holds_components = True
+            self._notes.broken(link, target.problem)
+            return Contribution(key, link, kind, self._lost_by(link, target))
+        if target.element:
+            self._notes.add(FindingCode.SUB_ELEMENT_LINK, link, element=target.element)
+        elif target.excluded:
+            self._holds_components = True
+            self._notes.add(FindingCode.EXCLUDED, link, by=f"its part {label_of(target.obj)}")
+        elif not target.instances:  # every element is left out
+            self._holds_components = True
+        else:
+            return self._whole_object(key, link, kind, target)
+        return nothing
+
+    @staticmethod
+    def _lost_by(link: Any, target: Target) -> CountedObjects:
+        """A broken link counts like any other where it says what it stood for; else its finding must do."""
+        problem = target.problem
+        if problem is None or not problem.file or problem.code in _NO_COMPONENT_LOST or not target.instances:
+            return {}
+        lost = Lost(problem.file, problem.obj, label_of(link))
+        return {lost.key: (lost, target.instances)}
+
+    def _whole_object(self, key: Key, link: Any, kind: Kind, target: Target) -> Contribution:
+        if self._is_mine(target.obj):
+            return self._in_document(key, link, kind, target)
+        name = self._key(target.obj)
+        if words := self._reader.no_component(name, target.obj):
+            self._notes.add(FindingCode.NO_COMPONENT, link, target=target.obj, words=words)
+            return Contribution(key, link, kind, {})
+        # An object of another file is a component, whatever it is.
+        text, _ = self._reader.standard(target.obj, name)
+        if text:
+            worth = self._standard(target.obj)
+        else:
+            worth = self._ones.setdefault(name, {name: (target.obj, 1)})
+        if not worth:
+            return Contribution(key, link, kind, worth)
+        if is_link(link):
+            self._links.add(key)
+            self._notes.link_type(link)
+        self._remarks(link, target)
+        if target.instances != 1:
+            worth = {brought: (obj, count * target.instances) for brought, (obj, count) in worth.items()}
+        if not is_assembly_link(link):
+            return Contribution(key, link, kind, worth)
+        parts = own_parts(link, target.obj, self._key)
+        nodes = [self._node(self._key(part), part, kind_of(part)) for part in parts]
+        below = [(node, 1) for node in nodes if node is not None]
+        worth = dict(worth)
+        add(worth, self._sum(below))
+        return Contribution(key, link, kind, worth, tuple(below))
+
+    def _in_document(self, key: Key, link: Any, kind: Kind, target: Target) -> Contribution:
+        """A link within the file brings what its target brings, which may be nothing."""
+        obj = target.obj
+        node = self._node(self._key(obj), obj, kind_of(obj))
+        below = ((node, target.instances),) if node is not None and node.worth else ()
+        if not below:
+            if not any(key in ring for ring in self._rings):
+                self._notes.in_document(link, obj)
+        elif target.mirrored:
+            self._notes.add(FindingCode.MIRRORED, link, target=obj)
+        if below and target.variant is not None:
+            self._notes.add(FindingCode.VARIANT, link, target=obj)
+        return Contribution(key, link, kind, self._sum(below), below)
+
+    def _remarks(self, link: Any, target: Target) -> None:
+        if target.mirrored:
+            self._notes.add(FindingCode.MIRRORED, link, target=target.obj)
+        if target.variant is not None:
+            self._notes.add(FindingCode.VARIANT, link, target=target.obj)
+        if is_assembly_link(link):
+            gone, new = stale_copies(link, target.obj, self._key)
+            if gone or new:
+                self._notes.stale(link, target.obj, gone, new)

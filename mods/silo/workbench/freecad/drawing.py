@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What is drawn with FreeCAD: models of committed files, and what lies over the model in its window.
+
+Over the model there are nodes of our own in the view's scene graph; a property of a view would mark the
+document as modified. They need pivy, which some packages of FreeCAD lack: then objects are selected only.
+
+Models are made in the background by a FreeCAD without a window. It is the child that
+:func:`silo.drawing.models.send_models` starts. It meshes with ``MeshPart`` and simplifies with
+``Mesh.decimate``, which takes the triangles first that cost least, but bounds no distance (0.20 to 1.1: a
+tolerance of 1e-5 keeps nearly all, 1e-4 removes a tenth of the volume). So fewer and fewer are taken, until
+box and volume stay. Imports what it needs late: the window's FreeCAD only names the command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.errors import DocumentError
+from silo.freecads import start
+from silo.workbench.freecad import host
+from silo.workbench.gui import qt
+
+if TYPE_CHECKING:
+    from silo.drawing.models import Stored
+    from silo.inertia.geometry.measured import Measured
+    from silo.inertia.geometry.together import Box, Floats, Mesh
+    from silo.workbench.revisions.flow import Differences, Ghost
+
+# Parts of the triangles that may go; and what the box's volume may lose by it.
+REDUCTIONS = (0.95, 0.85, 0.7, 0.5)
+KEPT_VOLUME = 0.02
+# Fewer are not worth it.
+MANY = 200
+MM = 1e-3
+
+# As on the server's pages.
+LIT, ADDED, REMOVED, MOVED = "#1a73e8", "#1a9850", "#d73027", "#7b5cd6"
+# Of a shape's diagonal; it is a highlight.
+COARSE = 0.01
+# Two places are one to this [mm], and to this in each number of the rotation.
+SAME_PLACE = 1e-3
+
+
+def command() -> list[str]:
+    """Return what starts the child. Raises ConfigError if this FreeCAD does not say which program it is."""
+    # FreeCAD 1.1 takes a long text for the name of a file, and ends; so the paths come by the environment.
+    code = (
+        "import os, sys; sys.path[:0] = os.environ['PYTHONPATH'].split(os.pathsep); "
+        "from silo.workbench.freecad.drawing import main; main()"
+    )
+    return [*start(host.program()), "-c", code]
+
+
+def main() -> None:
+    """Run as the child."""
+    from silo.drawing.models import work_with
+
+    work_with(FreeCadDrawer)
+
+
+class FreeCadDrawer:
+    """Draws stored shapes with FreeCAD's kernel."""
+
+    def faces(self, path: Path, named: str, place: Floats) -> Sequence[Mesh | None]:
+        """Return the triangles of each face."""
+        import MeshPart
+        import numpy as np
+
+        from silo.drawing.models import ANGULAR, LINEAR
+        from silo.inertia.geometry.together import Mesh
+
+        shape = _stored(path, named, place)
+        try:
+            made = MeshPart.meshFromShape(
+                Shape=shape,
+                LinearDeflection=max(LINEAR * shape.BoundBox.DiagonalLength, 1e-7),
+                AngularDeflection=ANGULAR,
+                Relative=False,
+                Segments=True,
+            )
+        except Exception as error:
+            raise DocumentError(named, f"holds no shape that FreeCAD can draw: {error}") from error
+        if made.countSegments() != len(shape.Faces):
+            raise DocumentError(named, "FreeCAD drew other faces than it has")
+        points, rows = made.Topology
+        vertices = MM * np.array([tuple(point) for point in points]).reshape(-1, 3)
+        faces = np.array(rows, dtype=np.int64).reshape(-1, 3)
+        meshes: list[Mesh | None] = []
+        for number in range(made.countSegments()):
+            used, index = np.unique(faces[made.getSegment(number)], return_inverse=True)
+            meshes.append(Mesh(vertices[used], index) if len(index) else None)
+        return meshes
+
+    def simplified(self, mesh: Mesh, error: float, keep_border: bool) -> Mesh:
+        """Return fewer triangles, if box and volume stay; a border always does."""
+        import Mesh as FreeCadMesh
+        import numpy as np
+
+        from silo.inertia.geometry.together import Mesh, about_enclosed
+
+        if len(mesh) < MANY:
+            return mesh
+        whole = FreeCadMesh.Mesh((mesh.vertices[mesh.faces].reshape(-1, 3) / MM).tolist())
+        volume = about_enclosed(mesh)
+        for reduction in REDUCTIONS:
+            copy: Any = whole.copy()
+            copy.decimate(1e9, reduction)
+            points, rows = copy.Topology
+            few = Mesh(MM * np.array([tuple(point) for point in points]), np.array(rows))
+            lost = abs(few.extents - mesh.extents).max() if len(few) else np.inf
+            if lost <= error and abs(about_enclosed(few) - volume) <= KEPT_VOLUME * volume:
+                return few
+        return mesh
+
+    def measured(self, shapes: Sequence[Stored], weigh: bool) -> tuple[Box, Measured | None]:
+        """Return the box as the surfaces have it, and the solids as a mass has them."""
+        from silo.drawing.models import EPS
+        from silo.inertia.geometry.freecad import Leaf, ShapeRef
+        from silo.inertia.geometry.together import exact_box
+        from silo.workbench.mass.shapes import measure
+
+        leaf = Leaf(tuple(ShapeRef(_stored(*shape), shape[2]) for shape in shapes))
+        parts = [part for shape in leaf.shapes for part in shape.handle.Faces or [shape.handle]]
+        about = [_corners(part.BoundBox) for part in parts]
+        exact = exact_box(about, lambda n: _corners(parts[n].optimalBoundingBox(False, False)))
+        return exact, measure(leaf, EPS, lambda *_: None) if weigh else None
+
+
+def _corners(box: Any) -> tuple[list[float], list[float]]:
+    return [box.XMin, box.YMin, box.ZMin], [box.XMax, box.YMax, box.ZMax]
+
+
+def _stored(path: Path, named: str, place: Floats) -> Any:
+    """Read a shape with its place in its product. Raises DocumentError."""
+    import Part
+
+    from silo.inertia.geometry.graph import is_binary_brep
+    from silo.inertia.model import is_rigid
+
+    if not is_rigid(place):
+        raise DocumentError(named, "its placement scales it inside of its part, which is not supported")
+    shape = Part.Shape()
+    read = shape.importBinary if is_binary_brep(path) else shape.importBrep
+    try:
+        read(str(path))
+        placement = type(shape.Placement)
+        shape.Placement = placement(type(shape.Placement.toMatrix())(*place.ravel().tolist()))
+    except Exception as error:
+        raise DocumentError(named, f"holds no shape that FreeCAD can draw: {error}") from error
+    return shape
+
+
+class Overlay:
+    """What lies over the model: parts that are lit, until something else is selected, and a ghost."""
+
+    def __init__(self) -> None:
+        self._lit: list[tuple[Any, Any]] = []
+        self._ghost: list[tuple[Any, Any]] = []
+        self.ghost_of: tuple[str, int] | None = None
+        self._is_ours = False
+        host.add_selection_observer(self)
+
+    # FreeCAD calls these.
+
+    def addSelection(self, *_what: Any) -> None:
+        """Something else is selected."""
+        if not self._is_ours and self._lit:
+            qt.later(0, lambda: _remove(self._lit))  # the scene graph is in use now
+
+    setSelection = removeSelection = clearSelection = addSelection
+
+    def light(self, doc: Any, names: Sequence[str]) -> int:
+        """Select objects and draw them through what covers them; return how many there are."""
+        _remove(self._lit)
+        self._is_ours = True
+        try:
+            result = host.select(doc, names)
+        finally:
+            self._is_ours = False
+        self._lit = _add(doc, ((mesh, LIT, 0.4, True) for mesh in _meshes(doc, names)))
+        return result
+
+    def clear(self) -> None:
+        """Remove the ghost and what is lit."""
+        _remove(self._lit)
+        _remove(self._ghost)
+        self.ghost_of = None
+
+    def compare(self, doc: Any, top: str, mine: Iterable[str], theirs: Sequence[Ghost]) -> Differences:
+        """Draw what stands elsewhere in another revision, or only there, as a ghost; light what is only here.
+
+        top, mine
+            the assembly in the document, and the objects that it shows.
+        """
+        from silo.workbench.revisions.flow import Differences
+
+        self.clear()
+        whole = doc.getObject(top)
+        nodes: list[_Drawn] = []
+        removed = moved = unknown = 0
+        names = {their.path[0].partition(".")[0] for their in theirs if their.path}
+        for ghost in theirs:
+            place = _place(whole, ghost.path)
+            if place is None and ghost.path and doc.getObject(ghost.path[0].partition(".")[0]) is not None:
+                unknown += 1  # FreeCAD has no path to it: a group, an array without links
+            elif place is None or not _same(place, ghost.matrix):
+                removed, moved = removed + (place is None), moved + (place is not None)
+                colour = REMOVED if place is None else MOVED
+                mesh = replace(ghost.mesh, vertices=ghost.mesh.vertices / MM).moved(_matrix(whole.Placement))
+                nodes.append(((mesh.vertices.tolist(), mesh.faces.tolist()), colour, 0.6, False))
+        extra = [name for name in mine if name not in names]
+        nodes += [(mesh, ADDED, 0.4, True) for mesh in _meshes(doc, extra)]
+        self._ghost = _add(doc, nodes)
+        return Differences(removed, moved, len(extra), unknown)
+
+
+def _matrix(placement: Any) -> Any:
+    import numpy as np
+
+    return np.array(placement.toMatrix().A).reshape(4, 4)
+
+
+def _place(whole: Any, path: Sequence[str]) -> Any | None:
+    """Return (4, 4) [mm] of what stands at a path below an assembly; None if there is nothing."""
+    import Part
+
+    try:
+        shape = Part.getShape(whole, "".join(f"{each_path}." for each_path in path), transform=False)
+    except Exception:  # noqa: BLE001 - FreeCAD says "no such object" with several types
+        return None
+    return None if shape.isNull() else _matrix(shape.Placement)
+
+
+def _same(place: Any, matrix: Floats) -> bool:
+    """Report whether two places are one; ``matrix`` in m. A scale is no difference: FreeCAD's has none."""
+    import numpy as np
+
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    turned = np.abs(place[:3, :3] - matrix[:3, :3] / np.where(scale > 0, scale, 1)).max()
+    return bool(max(turned, np.abs(place[:3, 3] - matrix[:3, 3] / MM).max()) <= SAME_PLACE)
+
+
+_Triangles = tuple[Sequence[Any], Sequence[Any]]
+_Drawn = tuple[_Triangles, str, float, bool]
+
+
+def _meshes(doc: Any, names: Iterable[str]) -> Iterable[_Triangles]:
+    """Yield the triangles of objects where the document shows them [mm]."""
+    import Part
+
+    for name in list(names)[: host.MOST_SELECTED]:
+        obj = doc.getObject(name)
+        for root, sub in (obj.Parents or [(obj, "")]) if obj is not None else ():
+            if root.Document.Name != doc.Name:
+                continue
+            shape = Part.getShape(root, sub)
+            if not shape.isNull():
+                yield shape.tessellate(max(COARSE * shape.BoundBox.DiagonalLength, 1e-3))
+
+
+def _node(mesh: _Triangles, colour: str, clear: float, through: bool) -> Any:
+    """Return a node that shows triangles [mm], ``through`` whatever covers them; nobody can pick it."""
+    from pivy import coin
+
+    node, points, faces = coin.SoSeparator(), coin.SoCoordinate3(), coin.SoIndexedFaceSet()
+    style, material, hints = coin.SoPickStyle(), coin.SoMaterial(), coin.SoShapeHints()
+    style.style = coin.SoPickStyle.UNPICKABLE
+    material.diffuseColor = tuple(each_node / 255 for each_node in bytes.fromhex(colour[1:]))
+    material.transparency = clear
+    hints.vertexOrdering = coin.SoShapeHints.COUNTERCLOCKWISE
+    corners, rows = mesh
+    points.point.setValues(0, len(corners), [tuple(corner) for corner in corners])
+    index = [each_node for row in rows for each_node in (*row, -1)]
+    faces.coordIndex.setValues(0, len(index), index)
+    if through:
+        depth = coin.SoDepthBuffer()
+        depth.test = False
+        node.addChild(depth)
+    for each_node in (style, material, hints, points, faces):
+        node.addChild(each_node)
+    return node
+
+
+def _add(doc: Any, drawn: Iterable[_Drawn]) -> list[tuple[Any, Any]]:
+    """Put nodes into the view of a document; return each with its parent. Nothing without pivy."""
+    view: Any = getattr(host.view_of(doc), "ActiveView", None)
+    if not hasattr(view, "getSceneGraph"):
+        return []
+    try:
+        made = [_node(*each_node) for each_node in drawn]
+        import pivy.coin  # noqa: F401 - FreeCAD wraps its scene graph with it
+    except ImportError:
+        return []
+    graph = view.getSceneGraph()
+    for node in made:
+        graph.addChild(node)
+    return [(graph, node) for node in made]
+
+
+def _remove(shown: list[tuple[Any, Any]]) -> None:
+    for graph, node in shown:
+        graph.removeChild(node)
+    shown.clear()

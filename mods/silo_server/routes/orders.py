@@ -1,0 +1,338 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Supplier parts, order lists, what was ordered, and the site's currency rates over HTTP."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from functools import partial
+from typing import Annotated, Any
+
+import anyio.to_thread
+from fastapi import APIRouter, Depends, Path, Query
+from pydantic import BeforeValidator, Field, WithJsonSchema
+from starlette.responses import Response
+
+from silo.bom.errors import RejectedError
+from silo.bom.numbers import as_decimal, read_number
+from silo_server.routes import context
+from silo_server.routes.bom import IMPORT_BODY, XLSX, content_of, file_of, uploaded
+from silo_server.routes.context import (
+    READ_ERRORS,
+    WRITE_ERRORS,
+    Admin,
+    Call,
+    Editor,
+    ExpectedVersion,
+    Viewer,
+    etag_of,
+    json_answer,
+)
+from silo_server.routes.models import Body, Brief, Short, Text
+from silo_server.services import orders, suppliers
+from silo_server.services.bom import imports, transfer
+from silo_server.services.items import get_item
+from silo_server.services.orders import NewOrder, OrderRequest, OrderRow, Recorded
+from silo_server.services.suppliers import decimal_text
+from silo_server.values import to_wire
+
+router = APIRouter(prefix="/api", tags=["orders"])
+
+
+def _exact(value: object) -> object:
+    if isinstance(value, str):
+        reading = read_number(value, points_are_decimal=True)
+        if reading.value is None:
+            raise ValueError(reading.problem)
+        return reading.value
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError("wanted a number, or one as text")
+    return as_decimal(value)
+
+
+_AMOUNT = {"type": "number", "minimum": 0.001, "maximum": 1_000_000}
+_TYPED = {"type": "string", "pattern": "^[1-9][0-9]{0,5}([.][0-9]{1,2})?$"}
+Exact = Annotated[Decimal, BeforeValidator(_exact), WithJsonSchema({"anyOf": [_AMOUNT, _TYPED]})]
+Quantity = Annotated[Exact, Field(gt=0, le=10**9)]
+Code = Annotated[str, Field(pattern="^[A-Z]{3}$")]
+
+
+class PriceBody(Body):
+    """A price of one piece from a quantity on."""
+
+    quantity: Exact = Decimal(1)
+    price: Exact
+
+
+class SupplierPartBody(Body):
+    """A supplier part; see ``SupplierPart``."""
+
+    supplier: Annotated[Short, Field(min_length=1)]
+    number: Short = ""
+    link: Annotated[Short, WithJsonSchema({"type": "string", "pattern": "^(https?://[a-z]{1,60})?$"})] = ""
+    pack_size: Quantity = Decimal(1)
+    minimum: Exact = Decimal(0)
+    prices: list[PriceBody] = Field(default_factory=list, max_length=suppliers.MOST_PRICES)
+    currency: Code = "EUR"
+    lead_time_days: Annotated[int, Field(strict=True, ge=0, le=suppliers.LONGEST_LEAD_TIME)] | None = None
+    preferred: bool = False
+
+
+class SuppliersBody(Body):
+    """``PUT …/suppliers``: the whole list, in the place of the one before."""
+
+    supplier_parts: list[SupplierPartBody] = Field(max_length=suppliers.MOST_PARTS)
+
+
+class OrderedBody(Body):
+    """What was ordered of an item; ``number``: the supplier's."""
+
+    part_number: Short
+    quantity: Quantity
+    unit: Brief | None = None
+    supplier: Short = ""
+    number: Short = ""
+    price: Exact | None = None
+    currency: Code | None = None
+
+
+class OrdersBody(Body):
+    """``POST …/orders``: what was ordered for a product."""
+
+    parts: list[OrderedBody] = Field(min_length=1, max_length=1000)
+    note: Text = ""
+
+
+class RatesBody(Body):
+    """``PUT /api/rates``: the site's currency, and what one of each other currency is in it."""
+
+    currency: Code
+    rates: dict[Code, Exact] = Field(
+        default_factory=dict, max_length=200, json_schema_extra={"additionalProperties": False}
+    )
+
+
+@router.get("/items/{part_number}/suppliers", responses=READ_ERRORS)
+def get_suppliers(call: Viewer, part_number: str) -> Response:
+    """An item's supplier parts; ``ETag`` is the version of the list, for ``If-Match``."""
+    with call.read() as tx:
+        item = get_item(tx, part_number, include_archived=True)
+        version = suppliers.list_version(tx, item)
+    return _suppliers(suppliers.supplier_parts_of(item), version)
+
+
+@router.put(
+    "/items/{part_number}/suppliers",
+    responses=WRITE_ERRORS,
+    openapi_extra=context.refused(
+        "two supplier parts of one number, two preferred ones, and unusable values"
+    ),
+)
+def put_suppliers(call: Editor, part_number: str, body: SuppliersBody, expected: ExpectedVersion) -> Response:
+    """Put a list of supplier parts in the place of the present one; 412 if somebody was quicker."""
+    with call.write() as tx:
+        parts = suppliers.read_parts(tx, [_texts(part) for part in body.supplier_parts], dot=True)
+        item, _ = suppliers.set_supplier_parts(tx, part_number, parts, expected)
+        return _suppliers(suppliers.supplier_parts_of(item), suppliers.list_version(tx, item))
+
+
+def _texts(body: SupplierPartBody) -> dict[str, str]:
+    made = body.model_dump(exclude={"prices"}, exclude_none=True)
+    prices = "; ".join(f"{amount.quantity:f}: {amount.price:f}" for amount in body.prices)
+    texts = {
+        name: f"{amount:f}" if isinstance(amount, Decimal) else str(amount) for name, amount in made.items()
+    }
+    return texts | {"prices": prices, "preferred": "yes" if body.preferred else ""}
+
+
+def _suppliers(parts: list[suppliers.SupplierPart], version: int) -> Response:
+    content = {"version": version, "supplier_parts": [suppliers.to_json(part) for part in parts]}
+    return json_answer(content, headers={"ETag": etag_of(version)})
+
+
+@router.post("/suppliers/import", responses=WRITE_ERRORS, openapi_extra=IMPORT_BODY)
+async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = False) -> Response:
+    """Import supplier parts of many items from a CSV or a workbook; a wrong row refuses the whole file."""
+    data, _ = await uploaded(call.request)
+
+    def work() -> Response:
+        table = imports.as_csv(data, suppliers.TABLE)
+        records = imports.read_csv(table, call.server.settings.max_merge_entries, of=suppliers.TABLE)
+        layout = imports.guess_of(table, suppliers.TABLE)
+        assert layout is not None  # the rows were read with it
+        with call.read() if dry_run else call.write() as tx:
+            plan = (suppliers.plan_suppliers if dry_run else suppliers.apply_suppliers)(tx, records, layout)
+            rows = [
+                {
+                    "part_number": item.part_number,
+                    "rows": list(item.rows),
+                    "status": item.status,
+                    "problems": list(item.problems),
+                    "changes": list(item.words),
+                }
+                for item in plan
+            ]
+            return json_answer({"dry_run": dry_run, "items": rows})
+
+    return await anyio.to_thread.run_sync(work)
+
+
+def asked_of(
+    pieces: Annotated[int, Query(ge=1, le=orders.MOST_PIECES)] = 1,
+    spares: Annotated[
+        str,
+        Query(max_length=20),
+        WithJsonSchema({"type": "string", "pattern": "^([0-9]{1,2}([.][0-9]+)?)?$"}),
+    ] = "",
+    release: Annotated[str, Query(max_length=16)] = "",
+    rest: bool = False,
+) -> OrderRequest:
+    """What an order list is for; ``spares`` in percent, ``rest``: without what was ordered already."""
+    reading = read_number(spares or "0")
+    if reading.value is None or not 0 <= reading.value <= orders.MOST_SPARES:
+        problem = reading.problem or f"wanted 0 to {orders.MOST_SPARES} percent, got {spares}"
+        raise RejectedError(f"spares: {problem}", [f"spares: {problem}"])
+    return OrderRequest(pieces, reading.value, release, rest)
+
+
+AskedFor = Annotated[OrderRequest, Depends(asked_of)]
+Supplier = Annotated[str | None, Query(max_length=200)]
+Kind = Annotated[str, Query(pattern="^(bought|made|unsaid)$")]
+
+
+@router.get("/items/{part_number}/order", responses=READ_ERRORS)
+def get_order(call: Viewer, part_number: str, asked: AskedFor) -> dict[str, Any]:
+    """What to order for so many pieces: bought parts with prices, made parts, what nobody called either.
+
+    Amounts and money are decimal numbers as text.
+    """
+    with call.server.large_reads.enter(), call.read() as tx:
+        order_list = orders.order_list(tx, part_number, asked)
+    return {
+        "part_number": order_list.product.part_number,
+        "pieces": asked.pieces,
+        "spares": decimal_text(asked.spares),
+        "release": asked.release or None,
+        "state": order_list.state,
+        "warnings": list(order_list.warnings),
+        "costs": {currency: decimal_text(cost) for currency, cost in order_list.costs.items()},
+        "total_cost": decimal_text(order_list.total),
+        "currency": order_list.currency,
+        "unpriced": order_list.unpriced,
+        "lead_time_days": order_list.lead_time,
+        "without_lead_time": order_list.no_lead_time,
+        "parts": [_row_to_wire(row) for row in order_list.rows],
+    }
+
+
+def _row_to_wire(row: OrderRow) -> dict[str, Any]:
+    offer = row.offer
+    result = {
+        "part_number": row.item.part_number,
+        "name": row.item.name,
+        "kind": row.kind,
+        "unit": row.unit,
+        "total": decimal_text(row.total),
+        "needed": decimal_text(row.needed),
+        "ordered": decimal_text(row.ordered),
+        "remarks": row.remarks,
+        "files": [amount._asdict() for amount in row.files],
+        "supplier_part": suppliers.to_json(offer.of) if offer else None,
+    }
+    if offer is not None:
+        money = {"price": offer.price, "cost": offer.cost}
+        result["quantity"] = decimal_text(offer.amount)
+        result |= {name: None if amount is None else decimal_text(amount) for name, amount in money.items()}
+    return result
+
+
+@router.get("/items/{part_number}/order.csv", response_class=Response, responses=content_of("text/csv"))
+def order_csv(
+    call: Viewer,
+    part_number: str,
+    asked: AskedFor,
+    kind: Kind = orders.BOUGHT,
+    supplier: Supplier = None,
+    semicolons: bool = False,
+) -> Response:
+    """The list as CSV, or what is ordered from one supplier."""
+    write = partial(transfer.to_csv, semicolons=semicolons)
+    return _exported(
+        call, part_number, asked, kind, supplier, write, "text/csv; charset=utf-8; header=present"
+    )
+
+
+@router.get("/items/{part_number}/order.xlsx", response_class=Response, responses=content_of(XLSX))
+def order_xlsx(
+    call: Viewer, part_number: str, asked: AskedFor, kind: Kind = orders.BOUGHT, supplier: Supplier = None
+) -> Response:
+    """The list as a workbook, or what is ordered from one supplier."""
+    return _exported(call, part_number, asked, kind, supplier, transfer.to_xlsx, XLSX)
+
+
+def _exported(
+    call: Call, part_number: str, asked: OrderRequest, kind: str, supplier: str | None, write: Any, media: str
+) -> Response:
+    def make(tx: Any) -> transfer.Export:
+        return orders.export_orders(orders.order_list(tx, part_number, asked), kind, supplier)
+
+    end = "xlsx" if media == XLSX else "csv"
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in supplier or kind)
+    return file_of(call, make, write, media, f"order-{name}.{end}")
+
+
+@router.get("/items/{part_number}/orders", responses=READ_ERRORS)
+def get_orders(call: Viewer, part_number: str) -> dict[str, Any]:
+    """What was ordered for a product, newest first."""
+    with call.read() as tx:
+        product = get_item(tx, part_number, include_archived=True)
+        recorded = orders.list_recorded(tx, product=product)
+    return {"orders": [_recorded_to_wire(order, number) for order, number in recorded]}
+
+
+@router.post("/items/{part_number}/orders", status_code=201, responses=WRITE_ERRORS)
+def post_orders(call: Editor, part_number: str, body: OrdersBody) -> Response:
+    """Note what was ordered for a product."""
+    with call.write() as tx:
+        made = {
+            recorded.id
+            for recorded in orders.record(
+                tx, part_number, [NewOrder(**part.model_dump()) for part in body.parts], body.note
+            )
+        }
+        orders_json = [
+            _recorded_to_wire(recorded, number) for recorded, number in orders.list_recorded(tx, made)
+        ]
+        return json_answer({"orders": orders_json}, 201)
+
+
+@router.post("/items/{part_number}/orders/{order_id}/take-back", responses=WRITE_ERRORS)
+def take_back(call: Editor, part_number: str, order_id: Annotated[int, Path(ge=1, le=2**53 - 1)]) -> Response:
+    """Say that something was not ordered after all."""
+    with call.write() as tx:
+        done = orders.take_back(tx, part_number, order_id)
+        return json_answer(_recorded_to_wire(done, orders.list_recorded(tx, [order_id])[0][1]))
+
+
+def _recorded_to_wire(recorded: Recorded, part_number: str) -> dict[str, Any]:
+    return {"part_number": part_number, **to_wire(recorded, "product_id", "item_id")}
+
+
+@router.get("/rates", responses=READ_ERRORS)
+def get_rates(call: Viewer) -> dict[str, Any]:
+    """The site's currency, and what one of each other currency is in it."""
+    with call.read() as tx:
+        return _rates(suppliers.rates_of(tx))
+
+
+@router.put("/rates", responses=WRITE_ERRORS)
+def put_rates(call: Admin, body: RatesBody) -> dict[str, Any]:
+    """Set the site's currency and the rates; those that are not named go."""
+    with call.write() as tx:
+        return _rates(
+            suppliers.set_rates(tx, body.currency, [(code, f"{rate:f}") for code, rate in body.rates.items()])
+        )
+
+
+def _rates(rates: dict[str, Decimal]) -> dict[str, Any]:
+    own, *others = rates
+    return {"currency": own, "rates": {rate: decimal_text(rates[rate]) for rate in others}}

@@ -1,0 +1,488 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What to order for N pieces of a product, draft or released, and what was ordered already.
+
+The parts are those of the one flat roll-up (:func:`silo_server.services.bom.tree.flatten`), where a bought
+assembly counts as a part. What is open comes from the kept summary, or from the release. Bought parts
+have a supplier and a price (:mod:`silo_server.services.suppliers`), made parts a material, a mass and
+their files. Nothing is left out: what nobody called made or bought is listed as such.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, Decimal
+from typing import NamedTuple
+
+from sqlalchemy import insert, or_, select, update
+
+from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted, listed
+from silo.bom.numbers import LONGEST, as_decimal, counts_pieces, exact_product, exact_sum, plain
+from silo_server.db.engine import Tx, one_of
+from silo_server.db.tables import document_items, documents, items, orders, revisions
+from silo_server.services import access
+from silo_server.services.bom.frozen import frozen_product
+from silo_server.services.bom.summary import Summary, own_worth, summary_of
+from silo_server.services.bom.transfer import Export, Row, View
+from silo_server.services.bom.tree import FlatRow, Graph, flatten, load_graph
+from silo_server.services.items import by_ids, get_item
+from silo_server.services.releases import Release, get_release, newest_release
+from silo_server.services.suppliers import (
+    LARGEST_PRICE,
+    Offer,
+    choose,
+    decimal_text,
+    rates_of,
+    supplier_parts_of,
+)
+from silo_server.settings import wire
+from silo_server.values import Item, from_row
+
+MOST_PIECES = 1_000_000
+MOST_SPARES = 1000
+BOUGHT, MADE, UNSAID = "bought", "made", "unsaid"
+
+
+class OrderRequest(NamedTuple):
+    """What an order list is for.
+
+    spares
+        percent more of each part, in whole pieces.
+    release
+        the label of a revision; "" for the product as it is now.
+    rest
+        without what was ordered already.
+    """
+
+    pieces: int = 1
+    spares: Decimal = Decimal(0)
+    release: str = ""
+    rest: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What was ordered of an item for a product, by whom and when; ``ended_at``: it was taken back."""
+
+    id: int
+    product_id: int
+    item_id: int
+    at: str
+    username: str
+    quantity: str
+    unit: str | None
+    supplier: str
+    number: str
+    price: str | None
+    currency: str | None
+    note: str
+    ended_at: str | None
+    ended_by: str | None
+
+
+class PartFile(NamedTuple):
+    """A file of a part: the newest of its kind (by the end of its name)."""
+
+    name: str
+    path: str
+
+
+class OrderRow(NamedTuple):
+    """A part of the list.
+
+    total, needed
+        what N pieces hold of it, and with spares, in whole pieces, without what was ordered if that is asked.
+    ordered
+        what was ordered of it for this product.
+    """
+
+    item: Item
+    unit: str | None
+    total: Decimal
+    needed: Decimal
+    ordered: Decimal
+    doubts: Sequence[str]
+    offer: Offer | None = None
+    files: Sequence[PartFile] = ()
+
+    @property
+    def kind(self) -> str:
+        """``bought``, ``made`` or ``unsaid``."""
+        made = self.item.texts.get("sourcing_type") == "manufactured"
+        return BOUGHT if self.item.is_bought else MADE if made else UNSAID
+
+    @property
+    def supplier(self) -> str:
+        """Who sells it; "" if nobody is known."""
+        return self.offer.of.supplier if self.offer else ""
+
+    @property
+    def mass(self) -> Decimal | None:
+        """Of one piece [kg]."""
+        return own_worth(self.item.properties).mass
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a purchaser must know about it, in words."""
+        said = list(self.doubts)
+        if self.item.archived_at:
+            said.append("archived")
+        if self.kind == BOUGHT and self.offer is None:
+            said.append("no supplier")
+        elif self.offer is not None and self.needed:
+            of = self.offer.of
+            if self.offer.price is None:
+                least = of.prices[0][0] if of.prices else None
+                said.append("no price" if least is None else f"no price below {decimal_text(least)}")
+            elif self.offer.in_base is None:
+                said.append(f"no rate for {of.currency}")
+            if self.offer.cheaper is not None:
+                more, cost = self.offer.cheaper
+                said.append(f"{decimal_text(more)} would cost less: {decimal_text(cost)} {of.currency}")
+        return said
+
+
+@dataclass(frozen=True, slots=True)
+class OrderList:
+    """What to order for N pieces of a product. ``warnings`` stand on top.
+
+    costs
+        of the bought parts with a price, per currency; ``total``: in the site's own, of those with a rate.
+    unpriced
+        bought parts that the cost does not hold: without supplier, price or rate.
+    lead_time
+        the longest of the chosen supplier parts [days]; ``no_lead_time`` how many state none.
+    """
+
+    product: Item
+    asked: OrderRequest
+    state: str
+    warnings: Sequence[str]
+    rows: Sequence[OrderRow]
+    costs: Mapping[str, Decimal]
+    total: Decimal
+    currency: str
+    unpriced: int
+    lead_time: int | None
+    no_lead_time: int
+
+    def of_kind(self, kind: str) -> list[OrderRow]:
+        """Return the bought parts, the made ones, or those that nobody called either."""
+        return [row for row in self.rows if row.kind == kind]
+
+    @property
+    def by_supplier(self) -> dict[str, list[OrderRow]]:
+        """The bought parts by supplier, those without one last."""
+        rows: dict[str, list[OrderRow]] = {}
+        for row in self.of_kind(BOUGHT):
+            rows.setdefault(row.supplier, []).append(row)
+        return dict(sorted(rows.items(), key=lambda pair: (not pair[0], pair[0].casefold())))
+
+
+def order_list(tx: Tx, part_number: str, asked: OrderRequest) -> OrderList:
+    """Work the list out. Raises NotFoundError, CycleError, ConflictError, TooLargeError."""
+    product = get_item(tx, part_number, include_archived=bool(asked.release))
+    release = get_release(tx, product, asked.release) if asked.release else None
+    if release:
+        frozen = frozen_product(tx, product, release)
+        graph, items_by_id, summary = frozen.graph, frozen.items, None
+        ids = _ids_of(tx, items_by_id)
+    else:
+        graph, summary = load_graph(tx, product), summary_of(tx, product)
+        items_by_id = by_ids(tx, graph.names())
+        ids = {item_id: item_id for item_id in items_by_id}
+    flat = flatten(
+        graph,
+        {item_id for item_id, item in items_by_id.items() if item.is_bought and item_id != graph.root.id},
+    )
+    # A part that is used by the piece and by the metre is two rows.
+    done = _ordered(tx, product)
+    rates = rates_of(tx)
+    rows = [
+        _row(
+            item_id,
+            items_by_id,
+            asked,
+            done.get((ids.get(item_id.line.child_id), item_id.unit), Decimal(0)),
+            rates,
+        )
+        for item_id in flat
+    ]
+    files = _files(
+        tx, {ids[row.item.id] for row in rows if row.kind != BOUGHT and row.item.id in ids}, release
+    )
+    rows = [row._replace(files=files.get(ids.get(row.item.id, 0), ())) for row in rows]
+    rows.sort(key=lambda row: row.item.part_number.casefold())
+    return _summed(product, asked, rows, rates, *_state(tx, product, release, summary, graph))
+
+
+def _row(
+    flat_row: FlatRow,
+    items_by_id: Mapping[int, Item],
+    asked: OrderRequest,
+    done: Decimal,
+    rates: Mapping[str, Decimal],
+) -> OrderRow:
+    item = items_by_id[flat_row.line.child_id]
+    total = exact_product((as_decimal(flat_row.total), asked.pieces))
+    needed = exact_product((total, 1 + asked.spares / 100))
+    if asked.rest:
+        needed = max(Decimal(0), exact_sum((needed, -done)))
+    if counts_pieces(flat_row.unit):
+        needed = needed.to_integral_value(ROUND_CEILING)
+    row = OrderRow(item, flat_row.unit, total, needed, done, flat_row.doubts(asked.pieces))
+    return row._replace(offer=choose(supplier_parts_of(item), needed, rates)) if row.kind == BOUGHT else row
+
+
+def _state(
+    tx: Tx, product: Item, release: Release | None, summary: Summary | None, graph: Graph
+) -> tuple[str, list[str]]:
+    """What the list is of, and what a reader must know first."""
+    if release is not None:
+        state = f"Revision {release.label}, {release.status}, frozen at {wire(release.frozen_at)}"
+        warnings = (
+            []
+            if release.status == "released"
+            else [f"Revision {release.label} is {release.status}, not released"]
+        )
+        if release.status == "released" and release.override:
+            warnings.append(f"Released in spite of what was open: {release.override}")
+        return state, warnings + [f"Open when it was frozen: {block}" for block in release.blocks[:20]]
+    assert summary is not None  # a draft has one
+    newest = newest_release(tx, product)
+    instead = f"; revision {newest.label} is released" if newest else ""
+    warnings = [f"This is the draft, not a released revision{instead}"]
+    if summary.open:
+        lines = [f"{number}: {words}" for number, words in summary.told()]
+        what = counted(summary.questions, "question") + " open, " if summary.questions else ""
+        warnings.append(f"{what}{counted(len(lines), 'BOM')} with something open: {listed(lines, 20)}")
+    if not graph.lines:
+        warnings.append(f"{product.part_number} has no BOM, so there is nothing to order")
+    return "Draft", warnings
+
+
+def _summed(
+    product: Item,
+    asked: OrderRequest,
+    rows: Sequence[OrderRow],
+    rates: Mapping[str, Decimal],
+    state: str,
+    warnings: Sequence[str],
+) -> OrderList:
+    wanted = [row for row in rows if row.kind == BOUGHT and row.needed]
+    costs: dict[str, Decimal] = {}
+    for row in wanted:
+        if row.offer and row.offer.cost is not None:
+            currency = row.offer.of.currency
+            costs[currency] = exact_sum((costs.get(currency, Decimal(0)), row.offer.cost))
+    prices = [row.offer.in_base for row in wanted if row.offer and row.offer.in_base is not None]
+    days = [row.offer.of.lead_time_days for row in wanted if row.offer]
+    stated = [day for day in days if day is not None]
+    return OrderList(
+        product,
+        asked,
+        state,
+        warnings,
+        rows,
+        costs,
+        exact_sum(prices),
+        next(iter(rates)),
+        len(wanted) - len(prices),
+        max(stated, default=None),
+        len(wanted) - len(stated),
+    )
+
+
+def _ids_of(tx: Tx, items_by_id: Mapping[int, Item]) -> dict[int, int]:
+    """The internal ids of items that were frozen, by the number that they have in the frozen product."""
+    query = select(items.c.uuid, items.c.id).where(
+        one_of(tx, items.c.uuid, {each_item.uuid for each_item in items_by_id.values()})
+    )
+    there = dict(tx.conn.execute(query).all())
+    return {number: there[item.uuid] for number, item in items_by_id.items() if item.uuid in there}
+
+
+def _files(tx: Tx, item_ids: Collection[int], release: Release | None) -> dict[int, list[PartFile]]:
+    """The files that each item is in, the newest of each kind: its drawing, its STEP, its FreeCAD file.
+
+    Revisions are never changed, so those until a product was frozen are those of its release.
+    """
+    held = select(document_items.c.document_id, document_items.c.item_id)
+    pairs = tx.conn.execute(held.where(one_of(tx, document_items.c.item_id, item_ids))).all()
+    holders: dict[int, set[int]] = {}
+    for document_id, item_id in pairs:
+        holders.setdefault(document_id, set()).add(item_id)
+    row = revisions.c
+    query = (
+        select(
+            row.item_id,
+            row.document_id,
+            row.revision_number,
+            row.file_name,
+            documents.c.uuid,
+            items.c.part_number,
+        )
+        .join(documents, documents.c.id == row.document_id, isouter=True)
+        .join(items, items.c.id == row.item_id, isouter=True)
+        .where(
+            row.file_name.is_not(None),
+            or_(one_of(tx, row.item_id, item_ids), one_of(tx, row.document_id, holders)),
+        )
+        .order_by(row.revision_number)
+    )
+    if release is not None:
+        query = query.where(row.created_at <= release.frozen_at)
+    files: dict[int, dict[tuple[int, str], PartFile]] = {}
+    for of, document_id, number, name, uuid, part_number in tx.conn.execute(query):
+        kind = name.rpartition(".")[2].casefold()
+        at = f"items/{part_number}" if part_number else f"documents/{uuid}"
+        for item_id in holders.get(document_id, set()) | ({of} & set(item_ids)):
+            files.setdefault(item_id, {})[document_id or 0, kind] = PartFile(name, f"{at}/file/{number}")
+    return {item_id: sorted(kinds.values()) for item_id, kinds in files.items()}
+
+
+# --- What was ordered ---
+
+
+class NewOrder(NamedTuple):
+    """What somebody ordered of an item; ``number``: the supplier's."""
+
+    part_number: str
+    quantity: Decimal
+    unit: str | None = None
+    supplier: str = ""
+    number: str = ""
+    price: Decimal | None = None
+    currency: str | None = None
+
+
+def record(tx: Tx, part_number: str, ordered: Sequence[NewOrder], note: str = "") -> list[Recorded]:
+    """Note what was ordered for a product. RejectedError if there is nothing to note."""
+    if not ordered:
+        raise RejectedError(
+            "wanted at least one part with a quantity above 0, got none; nothing was recorded"
+        )
+    product = get_item(tx, part_number, include_archived=True)
+    made = []
+    for order in ordered:
+        _check_order(order)
+        row = {
+            **order._asdict(),
+            "product_id": product.id,
+            "item_id": get_item(tx, order.part_number, include_archived=True).id,
+            "at": tx.stamp,
+            "username": tx.actor.username,
+            "quantity": decimal_text(order.quantity),
+            "price": None if order.price is None else decimal_text(order.price),
+            "currency": None if order.price is None else order.currency,
+            "note": note,
+        }
+        del row["part_number"]
+        made.append(tx.conn.execute(insert(orders).values(row).returning(orders.c.id)).scalar_one())
+    access.note(tx, "order.recorded", product.part_number, f"{counted(len(made), 'part')}: {note}"[:500])
+    return [recorded for recorded, _ in list_recorded(tx, made)]
+
+
+def _check_order(order: NewOrder) -> None:
+    amounts = [order.quantity, *(() if order.price is None else (order.price,))]
+    if any(not 0 <= value <= LARGEST_PRICE or len(decimal_text(value)) > LONGEST for value in amounts):
+        raise RejectedError(f"{order.part_number}: wanted a quantity and a price of at most {LONGEST} digits")
+    if order.currency and not re.fullmatch("[A-Z]{3}", order.currency):
+        raise RejectedError(
+            f"{order.part_number}: wanted a currency such as EUR, got {order.currency[:20]!r}"
+        )
+    if len(order.unit or "") > 32:
+        raise RejectedError(f"{order.part_number}: wanted a unit of at most 32 characters")
+
+
+def take_back(tx: Tx, part_number: str, order_id: int) -> Recorded:
+    """Say that something was not ordered after all; it stays in the list. NotFoundError, ConflictError."""
+    recorded = list_recorded(tx, [order_id], get_item(tx, part_number, include_archived=True))
+    if not recorded:
+        raise NotFoundError(f"there is no order {order_id} for {part_number}")
+    if recorded[0][0].ended_at:
+        raise ConflictError(f"order {order_id} was taken back at {recorded[0][0].ended_at[:16]} already")
+    ended = {"ended_at": tx.stamp, "ended_by": tx.actor.username}
+    tx.conn.execute(update(orders).where(orders.c.id == order_id).values(ended))
+    access.note(tx, "order.taken_back", recorded[0][1], f"order {order_id}")
+    return list_recorded(tx, [order_id])[0][0]
+
+
+def list_recorded(
+    tx: Tx, ids: Collection[int] | None = None, product: Item | None = None, limit: int = 1000
+) -> list[tuple[Recorded, str]]:
+    """Return what was ordered, newest first, each with its part number: these, or those for a product."""
+    query = select(orders, items.c.part_number).join(items, items.c.id == orders.c.item_id)
+    if ids is not None:
+        query = query.where(one_of(tx, orders.c.id, ids))
+    if product is not None:
+        query = query.where(orders.c.product_id == product.id)
+    rows = tx.conn.execute(query.order_by(orders.c.id.desc()).limit(limit))
+    return [(from_row(Recorded, row), row.part_number) for row in rows]
+
+
+def _ordered(tx: Tx, product: Item) -> dict[tuple[int | None, str | None], Decimal]:
+    row = orders.c
+    query = select(row.item_id, row.unit, row.quantity).where(
+        row.product_id == product.id, row.ended_at.is_(None)
+    )
+    result: dict[tuple[int | None, str | None], Decimal] = {}
+    for item_id, unit, quantity in tx.conn.execute(query):
+        result[item_id, unit] = exact_sum((result.get((item_id, unit), Decimal(0)), Decimal(quantity)))
+    return result
+
+
+# --- As a table ---
+
+_BOUGHT = (
+    *("Supplier", "Supplier's part number", "Part number", "Name", "For the product", "Ordered already"),
+    *("Needed", "Quantity", "Unit", "Pack size", "Packs", "Price", "Cost", "Currency"),
+    *("Lead time [days]", "Link", "Remarks"),
+)
+_MADE = (
+    *("Part number", "Name", "Material", "Unit mass [kg]", "For the product", "Ordered already", "Needed"),
+    *("Unit", "Files", "Remarks"),
+)
+
+
+def export_orders(order: OrderList, kind: str, supplier: str | None = None) -> Export:
+    """Return the list, or what is ordered from one supplier, to be written as a table."""
+    rows = [row for row in order.of_kind(kind) if supplier is None or row.supplier == supplier]
+    asked = order.asked
+    what = f"For {asked.pieces} of {order.product.part_number} {order.product.name}".strip()
+    spares = f", {decimal_text(asked.spares)} % spares" if asked.spares else ""
+    rest = ", without what was ordered already" if asked.rest else ""
+    notes = [f"{what}{spares}{rest}. {order.state}", *order.warnings]
+    columns = _BOUGHT if kind == BOUGHT else _MADE
+    return Export(order.product, View.FLAT, map(_cells, rows), notes, asked.pieces, columns)
+
+
+def _cells(row: OrderRow) -> Row:
+    item, offer = row.item, row.offer
+    cells: Row = {
+        "Part number": item.part_number,
+        "Name": item.name,
+        "Material": str(item.properties.get("material") or "") or None,
+        "Unit mass [kg]": plain(row.mass),
+        "For the product": plain(row.total),
+        "Ordered already": plain(row.ordered) if row.ordered else None,
+        "Needed": plain(row.needed),
+        "Unit": row.unit,
+        "Files": ", ".join(file.name for file in row.files) or "none",
+        "Remarks": "; ".join(row.remarks) or None,
+    }
+    if offer is None:
+        return cells
+    return cells | {
+        "Supplier": offer.of.supplier,
+        "Supplier's part number": offer.of.number or None,
+        "Quantity": plain(offer.amount),
+        "Pack size": plain(offer.of.pack_size),
+        "Packs": plain(offer.amount / offer.of.pack_size),
+        "Price": plain(offer.price),
+        "Cost": plain(offer.cost),
+        "Currency": offer.of.currency,
+        "Lead time [days]": offer.of.lead_time_days,
+        "Link": offer.of.link or None,
+    }

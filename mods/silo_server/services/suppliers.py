@@ -1,0 +1,569 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Supplier parts: an item as its suppliers sell it, with packs, minimum, price breaks and lead time.
+
+An item has a list of them, which changes as a whole: what a person saves is one change, which can be undone.
+An item without a list has the supplier part that its properties state (``supplier``, ``standard_cost``, …).
+
+Money and amounts are decimals, here and in what is stored; the one parser of the project reads them, so
+"1,000" is refused with both readings.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from fractions import Fraction
+from math import ceil
+from typing import Any, NamedTuple
+
+from sqlalchemy import func, insert, select, update
+
+from silo.bom.errors import ConflictError, RejectedError, VersionConflictError
+from silo.bom.headers import Role
+from silo.bom.numbers import (
+    Mark,
+    common_mark,
+    exact_product,
+    parse_number,
+    read_number,
+    whole_number,
+    yes_or_no,
+)
+from silo.bom.resolve import character_problem
+from silo_server import events
+from silo_server.db.engine import Tx, get_state, one_of, put_state
+from silo_server.db.tables import items, supplier_changes
+from silo_server.services import access
+from silo_server.services.bom.imports import Layout, Record, Table
+from silo_server.services.items import get_by_numbers, get_item
+from silo_server.services.search import index_item
+from silo_server.values import Item, dumps, from_row
+
+# The columns of the table in which people edit supplier parts, paste them and import them.
+COLUMNS: Mapping[str, str] = {
+    "supplier": "Supplier",
+    "number": "Supplier's part number",
+    "link": "Link",
+    "pack_size": "Pack size",
+    "minimum": "Minimum",
+    "prices": "Price of one, by quantity",
+    "currency": "Currency",
+    "lead_time_days": "Lead time [days]",
+    "preferred": "Preferred",
+}
+EXAMPLES = {"prices": "1: 0.50; 100: 0.40", "link": "https://…"}
+_RATES = "currency_rates"
+_CELLS = {"supplier_part_number": "number"}  # the column of a file → ours
+MOST_PARTS, MOST_PRICES = 50, 30
+_LONGEST = {"supplier": 200, "number": 200, "link": 2000}
+LARGEST_AMOUNT, LARGEST_PRICE = Decimal(10) ** 9, Decimal(10) ** 12
+LONGEST_LEAD_TIME = 3650
+# What an imported table has; several rows may have the prices of one supplier part.
+_ROLES = (
+    *(Role.PART_NUMBER, Role.SUPPLIER, Role.SUPPLIER_NUMBER, Role.LINK, Role.PACK_SIZE, Role.MINIMUM),
+    *(Role.PRICE, Role.FROM_QUANTITY, Role.CURRENCY, Role.LEAD_TIME, Role.PREFERRED),
+)
+TABLE = Table(_ROLES, (Role.PART_NUMBER, Role.SUPPLIER), {}, _ROLES)
+
+
+@dataclass(frozen=True, slots=True)
+class SupplierPart:
+    """An item as a supplier sells it.
+
+    prices
+        (quantity, price of one piece) pairs, by quantity: a price counts from its quantity on.
+    """
+
+    supplier: str
+    number: str = ""
+    link: str = ""
+    pack_size: Decimal = Decimal(1)
+    minimum: Decimal = Decimal(0)
+    prices: tuple[tuple[Decimal, Decimal], ...] = ()
+    currency: str = "EUR"
+    lead_time_days: int | None = None
+    preferred: bool = False
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What no two of an item may share."""
+        return self.supplier.casefold(), self.number.casefold()
+
+    def amount(self, needed: Decimal) -> Decimal:
+        """Return how much is ordered if so much is needed: at least the minimum, in whole packs; 0 for 0."""
+        if not needed:
+            return Decimal(0)
+        packs = ceil(Fraction(max(needed, self.minimum)) / Fraction(self.pack_size))
+        return exact_product((packs, self.pack_size))
+
+    def price_at(self, amount: Decimal) -> Decimal | None:
+        """Return the price of one piece if so many are ordered; None below the first price."""
+        return next((price for least, price in reversed(self.prices) if least <= amount), None)
+
+
+class Offer(NamedTuple):
+    """A supplier part for an order: how much, its price and cost, and that in the site's currency.
+
+    cheaper
+        (amount, cost) of a larger order that costs less, if there is one.
+    """
+
+    of: SupplierPart
+    amount: Decimal
+    price: Decimal | None
+    cost: Decimal | None
+    in_base: Decimal | None
+    cheaper: tuple[Decimal, Decimal] | None = None
+
+
+def choose(parts: Sequence[SupplierPart], needed: Decimal, rates: Mapping[str, Decimal]) -> Offer | None:
+    """Return the preferred supplier part, else the cheapest for what is needed; None without any.
+
+    rates
+        what one of a currency is in the site's own. What cannot be compared comes behind what can.
+    """
+    offers = [_offer(part, needed, rates) for part in parts]
+    offers = [offer for offer in offers if offer.of.preferred] or offers
+    compared = [(offer.in_base, place) for place, offer in enumerate(offers) if offer.in_base is not None]
+    if compared:
+        return offers[min(compared)[1]]
+    return next((offer for offer in offers if offer.cost is not None), offers[0] if offers else None)
+
+
+def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) -> Offer:
+    def cost_of(amount: Decimal) -> Decimal | None:
+        price = part.price_at(amount)
+        return None if price is None else exact_product((amount, price))
+
+    amount = part.amount(needed)
+    cost, rate = cost_of(amount), rates.get(part.currency)
+    in_base = None if cost is None or rate is None else exact_product((cost, rate))
+    larger = {part.amount(least) for least, _ in part.prices if least > amount}
+    cheaper = [
+        (more, each_rate)
+        for each_rate in larger
+        if (more := cost_of(each_rate)) is not None and more < (cost or 0)
+    ]
+    best = min(cheaper, default=None)
+    return Offer(part, amount, part.price_at(amount), cost, in_base, best and (best[1], best[0]))
+
+
+def supplier_parts_of(item: Item) -> list[SupplierPart]:
+    """Return the supplier parts of an item; without a list what its properties state."""
+    if item.supplier_parts:
+        return [from_json(part) for part in item.supplier_parts]
+    said = item.properties
+    supplier = said.get("supplier")
+    if not isinstance(supplier, str) or not supplier.strip():
+        return []
+    texts = {
+        "supplier": supplier.strip()[:200],
+        "number": str(said.get("supplier_part_number") or "")[:200],
+        "prices": _number_text(said.get("standard_cost")),
+        "currency": str(said.get("currency") or ""),
+        "lead_time_days": _number_text(said.get("lead_time_days")),
+    }
+    usable = {
+        name: text for name, text in texts.items() if text and not _Reader(dot=True).read({name: text})[1][1:]
+    }
+    return [_Reader(dot=True).read({"supplier": texts["supplier"], **usable})[0]]
+
+
+def _number_text(value: Any) -> str:
+    return "" if value is None or isinstance(value, bool) else str(value)
+
+
+def to_json(part: SupplierPart) -> dict[str, Any]:
+    """Return a supplier part as it is stored and sent (:class:`silo.api.wire.SupplierPart`)."""
+    return {
+        "supplier": part.supplier,
+        "number": part.number,
+        "link": part.link,
+        "pack_size": decimal_text(part.pack_size),
+        "minimum": decimal_text(part.minimum),
+        "prices": [{"quantity": decimal_text(q), "price": decimal_text(p)} for q, p in part.prices],
+        "currency": part.currency,
+        "lead_time_days": part.lead_time_days,
+        "preferred": part.preferred,
+    }
+
+
+def from_json(made: Mapping[str, Any]) -> SupplierPart:
+    """Return the supplier part that :func:`to_json` wrote."""
+    prices = tuple((Decimal(price["quantity"]), Decimal(price["price"])) for price in made["prices"])
+    sizes = {name: Decimal(made[name]) for name in ("pack_size", "minimum")}
+    return SupplierPart(**{**made, **sizes, "prices": prices})
+
+
+def decimal_text(value: Decimal) -> str:
+    """Return a decimal in its one written form: no exponent, no zeros at the end."""
+    text = f"{value:f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def typed_text(value: Decimal) -> str:
+    """Return a decimal as it is read in one way only: 1.2340, for 1.234 may be a thousand and more."""
+    text = decimal_text(value)
+    number = parse_number(text)
+    return f"{text}0" if number is not None and number.other is not None else text
+
+
+def texts_of(part: SupplierPart) -> dict[str, str]:
+    """Return a supplier part as the cells of its row, which :func:`read_parts` reads."""
+    days = part.lead_time_days
+    return {
+        "supplier": part.supplier,
+        "number": part.number,
+        "link": part.link,
+        "pack_size": typed_text(part.pack_size),
+        "minimum": typed_text(part.minimum) if part.minimum else "",
+        "prices": "; ".join(f"{typed_text(least)}: {typed_text(price)}" for least, price in part.prices),
+        "currency": part.currency,
+        "lead_time_days": "" if days is None else str(days),
+        "preferred": "yes" if part.preferred else "",
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Reader:
+    """Reads the cells of a row. ``dot``, ``mark``: as :func:`silo.bom.numbers.read_number`."""
+
+    mark: Mark | None = None
+    dot: bool = False
+    currency: str = "EUR"
+
+    def read(self, cells: Mapping[str, str]) -> tuple[SupplierPart, list[str]]:
+        """Return the part, and what is wrong with it; with a problem the part means nothing."""
+        problems: list[str] = []
+
+        def amount(name: str, text: str, least: Decimal, most: Decimal) -> Decimal:
+            reading = read_number(text, self.mark, points_are_decimal=self.dot)
+            if reading.value is not None and least <= reading.value <= most and _places(reading.value) >= -12:
+                return reading.value
+            wanted = f"wanted a number from {least:f} to {most:f} with at most 12 decimals, got {text[:40]!r}"
+            problems.append(f"{COLUMNS[name]}: {reading.problem or wanted}")
+            return Decimal(1)
+
+        said = {name: cells.get(name, "").strip() for name in COLUMNS}
+        tiny = Decimal("0.000001")
+        if not said["supplier"]:
+            problems.append("Supplier: wanted a name, got nothing")
+        for name, longest in _LONGEST.items():
+            problem = character_problem(said[name])
+            if not problem and len(said[name]) > longest:
+                problem = f"wanted at most {longest} characters, got {len(said[name])}"
+            if problem:
+                problems.append(f"{COLUMNS[name]}: {problem}")
+        if said["link"] and not re.fullmatch(r"https?://[^\s/]+\S*", said["link"]):
+            problems.append(f"Link: wanted a web address (https://…), got {said['link'][:40]!r}")
+        prices: dict[Decimal, Decimal] = {}
+        for written in filter(None, map(str.strip, re.split("[;\n]", said["prices"]))):
+            least, colon, price = written.rpartition(":")
+            at = amount("prices", least, tiny, LARGEST_AMOUNT) if colon else Decimal(1)
+            if at in prices:
+                problems.append(f"{COLUMNS['prices']}: there are two prices from {at:f} on")
+            prices[at] = amount("prices", price, Decimal(0), LARGEST_PRICE)
+        if len(prices) > MOST_PRICES:
+            problems.append(f"{COLUMNS['prices']}: wanted at most {MOST_PRICES} of them, got {len(prices)}")
+        currency = said["currency"].upper() or self.currency
+        if not re.fullmatch("[A-Z]{3}", currency):
+            problems.append(f"Currency: wanted three letters such as EUR, got {currency[:40]!r}")
+        days = whole_number(said["lead_time_days"], 4)
+        if said["lead_time_days"] and (days is None or days > LONGEST_LEAD_TIME):
+            wanted = f"wanted a whole number up to {LONGEST_LEAD_TIME}"
+            problems.append(f"{COLUMNS['lead_time_days']}: {wanted}, got {said['lead_time_days'][:40]!r}")
+        word = said["preferred"].casefold()
+        preferred = word in ("x", "✓", "✔", "y") or (yes_or_no(word) if word else False)
+        if preferred is None:
+            problems.append(f"Preferred: wanted yes or nothing, got {said['preferred'][:40]!r}")
+        size, minimum = said["pack_size"] or "1", said["minimum"] or "0"
+        part = SupplierPart(
+            said["supplier"],
+            said["number"],
+            said["link"],
+            amount("pack_size", size, tiny, LARGEST_AMOUNT),
+            amount("minimum", minimum, Decimal(0), LARGEST_AMOUNT),
+            tuple(sorted(prices.items())),
+            currency,
+            days,
+            bool(preferred),
+        )
+        return part, problems
+
+
+def _places(value: Decimal) -> int:
+    exponent = value.normalize().as_tuple().exponent
+    return exponent if isinstance(exponent, int) else -99
+
+
+def read_parts(tx: Tx, rows: Sequence[Mapping[str, str]], *, dot: bool = False) -> list[SupplierPart]:
+    """Read a table that a person filled in; empty rows say nothing. RejectedError with all that is wrong."""
+    reader = _Reader(None, dot, next(iter(rates_of(tx))))
+    read = [
+        (number, *reader.read(cells))
+        for number, cells in enumerate(rows, start=1)
+        if any(text.strip() for text in cells.values())
+    ]
+    problems = [f"row {number}: {problem}" for number, _, wrong in read for problem in wrong]
+    parts = [part for _, part, _ in read]
+    problems += list_problems(parts)
+    if problems:
+        raise RejectedError("; ".join(problems[:5]), problems)
+    return parts
+
+
+def list_problems(parts: Sequence[SupplierPart]) -> list[str]:
+    """Return what is wrong with the list of an item as a whole."""
+    if len(parts) > MOST_PARTS:
+        return [f"wanted at most {MOST_PARTS} supplier parts of an item, got {len(parts)}"]
+    counts = Counter(supplier_part.key for supplier_part in parts)
+    problems = [
+        f"{part.supplier} {part.number}".strip() + " stands here twice; put all its prices into one row"
+        for part in {supplier_part.key: supplier_part for supplier_part in parts}.values()
+        if counts[part.key] > 1
+    ]
+    if sum(part.preferred for part in parts) > 1:
+        problems.append("Preferred: wanted one supplier at most, got several")
+    return problems
+
+
+@dataclass(frozen=True, slots=True)
+class SupplierChange:
+    """A change of an item's list: the whole of it before and after, as JSON."""
+
+    id: int
+    at: str
+    username: str
+    before: str
+    after: str
+
+    @property
+    def words(self) -> list[str]:
+        """What it did, in words."""
+        old, new = (
+            {part.key: part for part in map(from_json, json.loads(t))} for t in (self.before, self.after)
+        )
+        said = []
+        for key in dict.fromkeys([*old, *new]):
+            part = new.get(key) or old[key]
+            who = f"{part.supplier} {part.number}".strip()
+            if key not in old or key not in new:
+                said.append(f"{who} {'added' if key in new else 'removed'}")
+                continue
+            before, after = texts_of(old[key]), texts_of(new[key])
+            changes = [
+                f"{COLUMNS[name].lower()} {before[name] or 'none'} → {after[name] or 'none'}"
+                for name in COLUMNS
+                if before[name] != after[name]
+            ]
+            said += [f"{who}: {', '.join(changes)}"] if changes else []
+        return said or ["the order of the list"]
+
+
+def supplier_changes_of(tx: Tx, item: Item, limit: int = 20) -> list[SupplierChange]:
+    """Return the newest changes of an item's list, newest first."""
+    row = supplier_changes.c
+    query = select(supplier_changes).where(row.item_id == item.id).order_by(row.id.desc()).limit(limit)
+    return [from_row(SupplierChange, each_row) for each_row in tx.conn.execute(query)]
+
+
+def list_version(tx: Tx, item: Item) -> int:
+    """Return the number of the newest change of an item's list; 0 before the first."""
+    row = supplier_changes.c
+    return tx.conn.scalar(select(func.max(row.id)).where(row.item_id == item.id)) or 0
+
+
+def set_supplier_parts(
+    tx: Tx, part_number: str, parts: Sequence[SupplierPart], expected: int | None = None
+) -> tuple[Item, int]:
+    """Put a list in the place of an item's; return the item and the number of the change (0: none).
+
+    Raises VersionConflictError unless the list has still the ``expected`` version.
+    """
+    item = get_item(tx, part_number, lock=True)
+    now = list_version(tx, item)
+    if expected is not None and expected != now:
+        raise VersionConflictError(
+            f"the suppliers of {item.part_number} have version {now}, the request was made from version "
+            f"{expected}; look at them again and repeat"
+        )
+    if list(parts) == supplier_parts_of(item):
+        return item, 0
+    return _write(tx, item, [to_json(part) for part in parts])
+
+
+def undo_supplier_change(tx: Tx, part_number: str, change: int) -> Item:
+    """Take the newest change of an item's list back. ConflictError if another one came since."""
+    item = get_item(tx, part_number, lock=True)
+    newest = next(iter(supplier_changes_of(tx, item, 1)), None)
+    if newest is None or newest.id != change:
+        raise ConflictError(
+            f"the suppliers of {item.part_number} were changed since; only the newest change can be undone"
+        )
+    return _write(tx, item, json.loads(newest.before))[0]
+
+
+def _write(tx: Tx, item: Item, made: Sequence[Mapping[str, Any]]) -> tuple[Item, int]:
+    before, after = dumps(list(item.supplier_parts)), dumps(list(made))
+    changed = {"supplier_parts": after if made else None, "version": items.c.version + 1}
+    stamped = {"updated_at": tx.stamp, "updated_by": tx.actor.username}
+    tx.conn.execute(update(items).where(items.c.id == item.id).values(**changed, **stamped))
+    row = {
+        "item_id": item.id,
+        "at": tx.stamp,
+        "username": tx.actor.username,
+        "before": before,
+        "after": after,
+    }
+    written = insert(supplier_changes).values(row).returning(supplier_changes.c.id)
+    number = tx.conn.execute(written).scalar_one()
+    index_item(tx, item.id)
+    events.item_updated(tx, item, "suppliers changed")
+    return get_item(tx, item.part_number), number
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedItem:
+    """What an import makes of an item's list. ``status``: change, same or error."""
+
+    part_number: str
+    rows: Sequence[int]
+    status: str
+    problems: Sequence[str] = ()
+    parts: Sequence[SupplierPart] = ()
+    words: Sequence[str] = field(default=())
+
+
+def plan_suppliers(tx: Tx, records: Sequence[Record], layout: Layout) -> list[ImportedItem]:
+    """Say what an import of rows would do, item by item; changes nothing.
+
+    A supplier part of the file takes the place of the same one of the item (by supplier and number), or is a
+    new one; those that the file does not name stay. Rows of one with another "from quantity" are its prices.
+    """
+    records = [
+        (row, {_CELLS.get(name, name): text for name, text in each_record.items()})
+        for row, each_record in records
+    ]
+    numbers = ("prices", "pack_size", "minimum", "from")
+    texts = [record.get(name, "") for _, record in records for name in numbers]
+    shown = (number.mark for text in texts if (number := parse_number(text)))
+    # In a file separated by commas, a point is a decimal point.
+    dot = layout.mark is None and layout.delimiter == ","
+    reader = _Reader(layout.mark or common_mark(shown), dot, next(iter(rates_of(tx))))
+    items_by_number = get_by_numbers(
+        tx, [record["part_number"] for _, record in records if record.get("part_number")]
+    )
+    grouped: dict[str, list[Record]] = {}
+    for row, record in records:
+        grouped.setdefault(record.get("part_number", "").casefold(), []).append((row, record))
+    return [_planned(rows, items_by_number, reader) for rows in grouped.values()]
+
+
+def _planned(rows: Sequence[Record], items_by_number: Mapping[str, Item], reader: _Reader) -> ImportedItem:
+    number = rows[0][1].get("part_number", "")
+    item = items_by_number.get(number)
+    problems: list[str] = []
+    if item is None:
+        what = f"{number!r} does not exist on this server, or is archived" if number else "is empty"
+        problems.append(f"row {rows[0][0]}: Part number: {what}")
+    named: dict[tuple[str, str], dict[str, str]] = {}
+    for row, record in rows:
+        key = record.get("supplier", "").casefold(), record.get("number", "").casefold()
+        prices = record.get("prices", "")
+        if record.get("from") and prices:
+            prices = f"{record['from']}: {prices}"
+        before = named.setdefault(key, {"row": str(row), "prices": ""})
+        for name, text in record.items():
+            said = before.setdefault(name, text) if name in COLUMNS and name != "prices" and text else text
+            if said != text:
+                sentence = f"says {text[:40]!r}, row {before['row']} says {said[:40]!r}"
+                problems.append(f"row {row}: {COLUMNS[name]}: {sentence}")
+        before["prices"] = "; ".join(filter(None, (before["prices"], prices)))
+    there = {} if item is None else {part.key: part for part in supplier_parts_of(item)}
+    was = list(there.values())
+    if len(named) > MOST_PARTS:  # whatever the item has already
+        sentence = (
+            f"row {rows[0][0]}: wanted at most {MOST_PARTS} supplier parts of an item, got {len(named)}"
+        )
+        return ImportedItem(number, [row for row, _ in rows], "error", [*problems, sentence])
+    for key, cells in named.items():
+        kept = texts_of(there[key]) if key in there else {}
+        given = {name: text for name, text in cells.items() if name in COLUMNS and text}
+        # What stands in the item was written by us, with points.
+        part, wrong = reader.read(given)
+        problems += [f"row {cells['row']}: {problem}" for problem in wrong]
+        if kept and not wrong:
+            old = there[key]
+            names = [name for name in COLUMNS if name in given]
+            part = replace(old, **{name: getattr(part, name) for name in names})
+        if part.preferred:
+            there = {k: replace(supplier_part, preferred=False) for k, supplier_part in there.items()}
+        there[key] = part
+    parts = list(there.values())
+    problems += [f"row {rows[0][0]}: {problem}" for problem in list_problems(parts)] if not problems else []
+    status = "error" if problems else "same" if parts == was else "change"
+    change = SupplierChange(
+        0, "", "", *(dumps([to_json(supplier_part) for supplier_part in some]) for some in (was, parts))
+    )
+    words = change.words if status == "change" else ()
+    return ImportedItem(
+        item.part_number if item else number, [row for row, _ in rows], status, problems, parts, words
+    )
+
+
+def apply_suppliers(tx: Tx, records: Sequence[Record], layout: Layout) -> list[ImportedItem]:
+    """Import rows, all or nothing. RejectedError lists every problem, and then nothing was changed."""
+    # Two imports of one item come one after the other, each on what the other wrote.
+    keys = {record.get("part_number", "").casefold() for _, record in records}
+    query = select(items.c.id).where(one_of(tx, items.c.part_number_key, keys)).order_by(items.c.id)
+    tx.conn.execute(query.with_for_update(key_share=True))
+    plan = plan_suppliers(tx, records, layout)
+    problems = [problem for item in plan for problem in item.problems]
+    if problems:
+        raise RejectedError(
+            f"{len(problems)} problems in the file, so nothing was imported: {problems[0]}", problems
+        )
+    for item in plan:
+        if item.status == "change":
+            set_supplier_parts(tx, item.part_number, item.parts)
+    return plan
+
+
+def rates_of(tx: Tx) -> dict[str, Decimal]:
+    """Return what one of each currency is in the site's own, which comes first; EUR if nobody said."""
+    typed: dict[str, str] = json.loads(get_state(tx, _RATES) or '{"EUR":"1"}')
+    return {currency: Decimal(rate) for currency, rate in typed.items()}
+
+
+def set_rates(tx: Tx, own: str, texts: Iterable[tuple[str, str]]) -> dict[str, Decimal]:
+    """Set the site's currency, and what one of each other is in it. RejectedError with all that is wrong."""
+    rates, problems = {own.strip().upper(): Decimal(1)}, []
+    for currency, text in ((code.strip().upper(), text.strip()) for code, text in texts):
+        if not currency and not text:
+            continue
+        reading = read_number(text)
+        if currency in rates:
+            problems.append(f"{currency}: stands here twice")
+        elif reading.value is None or not Decimal("1e-9") <= reading.value <= Decimal("1e9"):
+            problems.append(f"{currency}: {reading.problem or f'wanted a rate above 0, got {text!r}'}")
+        else:
+            rates[currency] = reading.value
+    wrong = [each_currency for each_currency in rates if not re.fullmatch("[A-Z]{3}", each_currency)]
+    problems += [
+        f"Currency: wanted three letters such as EUR, got {each_currency[:20]!r}" for each_currency in wrong
+    ]
+    if problems:
+        raise RejectedError("; ".join(problems), problems)
+    rate_texts = {currency: decimal_text(rate) for currency, rate in rates.items()}
+    access.note(
+        tx,
+        "rates.set",
+        next(iter(rate_texts)),
+        f"{get_state(tx, _RATES) or 'none'} → {dumps(rate_texts)}"[:1000],
+    )
+    put_state(tx, _RATES, dumps(rate_texts))
+    return rates

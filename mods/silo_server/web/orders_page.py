@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""For the purchaser: an item's suppliers in a table, what to order for a product, what was ordered, prices
+from a supplier's file, and the site's currencies."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends
+from starlette.datastructures import FormData
+from starlette.responses import Response
+
+from silo.bom.errors import RejectedError, SiloError, VersionConflictError
+from silo.bom.numbers import as_decimal, read_number
+from silo_server.routes.context import Call
+from silo_server.routes.orders import asked_of
+from silo_server.services import items as item_service
+from silo_server.services import orders, releases, suppliers
+from silo_server.services.bom import imports
+from silo_server.services.items import ItemChange, get_item
+from silo_server.services.orders import NewOrder, OrderRequest, OrderRow
+from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, TABLE, decimal_text, typed_text
+from silo_server.settings import TooLargeError
+from silo_server.web.accounts import Administrator, Reader, Writer
+from silo_server.web.forms import Form, amount, back, text, texts, whole
+from silo_server.web.import_page import Problem, Upload, carried, layout_of, reading, uploaded
+from silo_server.web.render import N_, Address, _, isolate, page, segment
+
+router = APIRouter(include_in_schema=False)
+
+EMPTY_ROWS = 3
+_NO_PROBLEM = Problem()
+AskedFor = Annotated[OrderRequest, Depends(asked_of)]
+
+
+@router.get("/items/{part_number}/suppliers")
+def suppliers_page(call: Reader, part_number: str) -> Response:
+    """The table of an item's supplier parts, and its last changes."""
+    return _suppliers(call, part_number)
+
+
+def _suppliers(
+    call: Call, part_number: str, error: SiloError | None = None, typed: Sequence[Mapping[str, str]] = ()
+) -> Response:
+    with call.read() as tx:
+        item = get_item(tx, part_number, include_archived=True)
+        changes = suppliers.supplier_changes_of(tx, item)
+    rows = typed or [suppliers.texts_of(part) for part in suppliers.supplier_parts_of(item)]
+    empty = [dict.fromkeys(COLUMNS, "")] * min(EMPTY_ROWS, MOST_PARTS - len(rows))
+    problems = (error.problems if isinstance(error, RejectedError) else ()) or ([str(error)] if error else [])
+    return page(
+        call,
+        "suppliers.html",
+        status=error.status_hint if error else 200,
+        item=item,
+        columns=COLUMNS,
+        examples=EXAMPLES,
+        rows=[*rows, *empty],
+        version=changes[0].id if changes else 0,
+        changes=changes,
+        problems=problems,
+        most=MOST_PARTS,
+    )
+
+
+@router.post("/items/{part_number}/suppliers")
+def save_suppliers(call: Writer, part_number: str, form: Form) -> Response:
+    """Save the table as one change."""
+    count = min(whole(form, "rows") or 0, 2 * MOST_PARTS)
+    rows = [{name: text(form, f"{name}.{row}", 5000) for name in COLUMNS} for row in range(count)]
+    typed = [row for row in rows if any(row.values())]
+    try:
+        with call.write() as tx:
+            parts = suppliers.read_parts(tx, typed)
+            item, change = suppliers.set_supplier_parts(tx, part_number, parts, whole(form, "version"))
+    except VersionConflictError:
+        problem = _(
+            "Somebody else changed this table meanwhile. Below is what you typed, and what changed; to put "
+            "yours in its place, save again"
+        )
+        return _suppliers(call, part_number, VersionConflictError(problem), typed)
+    except SiloError as error:
+        return _suppliers(call, part_number, error, typed)
+    said = (
+        _("Suppliers of %(number)s saved.", number=isolate(item.part_number))
+        if change
+        else _("Nothing was different.")
+    )
+    return back(f"/items/{segment(item.part_number)}/suppliers", said)
+
+
+@router.post("/items/{part_number}/suppliers/undo")
+def undo_suppliers(call: Writer, part_number: str, form: Form) -> Response:
+    """Take the newest change of the table back."""
+    with call.write() as tx:
+        item = suppliers.undo_supplier_change(tx, part_number, whole(form, "change") or 0)
+    return back(f"/items/{segment(item.part_number)}/suppliers", _("The last change is undone."))
+
+
+@router.get("/items/{part_number}/order")
+def order_page(call: Reader, part_number: str, asked: AskedFor) -> Response:
+    """What to order for so many pieces."""
+    with call.server.large_reads.enter(), call.read() as tx:
+        product = get_item(tx, part_number, include_archived=True)
+        labels = [
+            release.label
+            for release in releases.list_releases(tx, product)
+            if release.status in releases.NUMBERED
+        ]
+        recorded = orders.list_recorded(tx, product=product)
+        problem, order_list = "", None
+        try:
+            order_list = orders.order_list(tx, part_number, asked)
+        except SiloError as error:
+            problem = str(error)
+        now = tx.stamp
+    view = {"pieces": asked.pieces, "spares": decimal_text(asked.spares), "release": asked.release}
+    given = {name: str(value) for name, value in view.items() if value not in ("", "0", 1)}
+    at = Address(
+        f"/items/{segment(product.part_number)}/order", given | ({"rest": "true"} if asked.rest else {})
+    )
+    return page(
+        call,
+        "order.html",
+        item=product,
+        asked=asked,
+        spares=decimal_text(asked.spares),
+        found=order_list,
+        problem=problem,
+        labels=labels,
+        recorded=recorded,
+        at=at,
+        now=now,
+        decimal=typed_text,
+        fact_of=_fact_of,
+        some=_some(order_list.rows if order_list else ()),
+    )
+
+
+def _some(rows: Sequence[OrderRow]) -> dict[str, bool]:
+    """Return which columns say anything."""
+    return {
+        "ordered": any(row.ordered for row in rows),
+        "mass": any(row.mass for row in rows),
+        "material": any(row.item.properties.get("material") for row in rows),
+    }
+
+
+def _fact_of(row: OrderRow) -> str:
+    """What the box of a row records, beside how much."""
+    offer = row.offer
+    fact: dict[str, Any] = {"part_number": row.item.part_number, "unit": row.unit}
+    if offer is not None:
+        fact |= {"supplier": offer.of.supplier, "number": offer.of.number, "currency": offer.of.currency}
+        fact["price"] = None if offer.price is None else str(offer.price)
+    return json.dumps(fact, sort_keys=True)
+
+
+@router.post("/items/{part_number}/order")
+def record(call: Writer, part_number: str, form: Form) -> Response:
+    """Note the chosen parts as ordered, or say of them that they are made or bought."""
+    path = text(form, "at", 500)
+    chosen = [_read_fact(key) for key in texts(form, "chosen")]
+    kind = text(form, "kind")
+    with call.write() as tx:
+        if kind in ("manufactured", "purchased"):
+            for number in dict.fromkeys(key["part_number"] for key in chosen):
+                item_service.change_item(tx, number, ItemChange(texts={"sourcing_type": kind}))
+            made, bought = N_("%(count)s now made."), N_("%(count)s now bought.")
+            said = _(made if kind == "manufactured" else bought, count=len(chosen))
+            said = said if chosen else _("Nothing was chosen.")
+        else:
+            facts = [_order_of(form, key) for key in chosen]
+            done = orders.record(tx, part_number, facts, text(form, "note"))
+            said = _("%(count)s noted as ordered.", count=len(done))
+    home = f"/items/{segment(part_number)}/order"
+    return back(path if path.startswith(home) else home, said)
+
+
+def _read_fact(written: str) -> dict[str, Any]:
+    try:
+        fact = json.loads(written)
+        return {name: None if fact[name] is None else str(fact[name])[:200] for name in fact}
+    except (ValueError, TypeError):
+        raise RejectedError(_("chosen: wanted the boxes of this page; load it again")) from None
+
+
+def _order_of(form: FormData, fact: Mapping[str, Any]) -> NewOrder:
+    number, unit = str(fact.get("part_number")), fact.get("unit")
+    quantity = as_decimal(amount(text(form, f"quantity.{number}.{unit or ''}"), number))
+    price = fact.get("price")
+    reading = read_number(price, points_are_decimal=True).value if price else None
+    facts = {name: fact.get(name) or "" for name in ("supplier", "number")}
+    return NewOrder(number, quantity, unit, **facts, price=reading, currency=fact.get("currency"))
+
+
+@router.post("/items/{part_number}/order/{order_id}/take-back")
+def take_back(call: Writer, part_number: str, order_id: int, form: Form) -> Response:
+    """Say that something was not ordered after all."""
+    with call.write() as tx:
+        orders.take_back(tx, part_number, order_id)
+    return back(f"/items/{segment(part_number)}/order#recorded", _("Taken back; it stays in the list below."))
+
+
+@router.get("/suppliers")
+def prices_page(call: Reader) -> Response:
+    """Import prices of suppliers, and the site's currencies."""
+    return _prices(call)
+
+
+def _prices(
+    call: Call,
+    upload: Upload | None = None,
+    layout: imports.Layout | None = None,
+    problem: Problem = _NO_PROBLEM,
+    typed: Sequence[tuple[str, str]] | None = None,
+) -> Response:
+    file = upload or problem.upload
+    layout_read = layout or problem.layout
+    plan = None
+    if upload:
+        records, read_as = _records(call, upload, layout)
+        with call.read() as tx:
+            plan = suppliers.plan_suppliers(tx, records, read_as)
+        order = {"error": 0, "change": 1, "same": 2}
+        plan.sort(key=lambda item: order[item.status])
+    with call.read() as tx:
+        own, *rates = suppliers.rates_of(tx).items()
+    return page(
+        call,
+        "prices.html",
+        status=problem.status,
+        upload=upload,
+        plan=plan,
+        wrong=sum(item.status == "error" for item in plan or ()),
+        changed=sum(item.status == "change" for item in plan or ()),
+        problem=problem.words,
+        file=file,
+        reading=reading(file, layout_read, TABLE) if file else None,
+        action="/suppliers/check",
+        own=own[0],
+        rates=typed if typed is not None else [(code, typed_text(rate)) for code, rate in rates],
+    )
+
+
+def _records(
+    call: Call, upload: Upload, layout: imports.Layout | None
+) -> tuple[list[imports.Record], imports.Layout]:
+    records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout, TABLE)
+    read_as = layout or imports.guess_of(upload.data, TABLE)
+    assert read_as is not None  # the rows were read with it
+    return records, read_as
+
+
+@router.post("/suppliers/check")
+def check(call: Writer, form: Form) -> Response:
+    """Say what a table would change; nothing is written."""
+    upload, layout = None, None
+    try:
+        upload = carried(form) if "packed" in form else uploaded(form, TABLE)
+        layout = layout_of(form, TABLE)
+        return _prices(call, upload, layout)
+    except (RejectedError, TooLargeError) as error:
+        return _prices(call, problem=replace(Problem.of(error), upload=upload, layout=layout))
+
+
+@router.post("/suppliers/import")
+def apply(call: Writer, form: Form) -> Response:
+    """Import a table that was checked."""
+    upload, layout = carried(form), layout_of(form, TABLE)
+    try:
+        records, read_as = _records(call, upload, layout)
+        with call.write() as tx:
+            plan = suppliers.apply_suppliers(tx, records, read_as)
+    except SiloError as error:
+        return _prices(call, upload, layout, Problem.of(error))
+    changed = sum(item.status == "change" for item in plan)
+    return back(
+        "/suppliers",
+        _(
+            "Imported %(file)s: suppliers of %(changed)s items changed.",
+            file=isolate(upload.name),
+            changed=changed,
+        ),
+    )
+
+
+@router.post("/suppliers/rates")
+def set_rates(call: Administrator, form: Form) -> Response:
+    """Set the site's currency and the rates."""
+    typed = list(zip(texts(form, "code"), texts(form, "rate"), strict=False))
+    try:
+        with call.write() as tx:
+            suppliers.set_rates(tx, text(form, "own", 20), typed)
+    except RejectedError as error:
+        return _prices(call, problem=Problem.of(error), typed=typed)
+    return back("/suppliers#rates", _("The currencies are saved."))

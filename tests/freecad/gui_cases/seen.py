@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside FreeCAD's window: lit parts, and another revision as a ghost."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import (
+    App,
+    Gui,
+    addon,
+    ask,
+    assembly,
+    boxes,
+    link,
+    part,
+    picture,
+    register,
+    run,
+    settled,
+    tell,
+    unmark,
+    wait,
+)
+
+
+def commit() -> None:
+    seen = len(boxes("Committed")) + len(boxes("BOM Updated"))
+    Gui.runCommand("Origin_Commit")
+    wait(lambda: len(boxes("Committed")) + len(boxes("BOM Updated")) > seen and settled())
+    wait(lambda: addon().session._models.idle, 240)
+    tell(drawn=ask("drawn"))
+
+
+def nodes() -> int:
+    """Of our own in the view."""
+    graph = Gui.ActiveDocument.ActiveView.getSceneGraph()
+    names = [graph.getChild(n).getTypeId().getName().getString() for n in range(graph.getNumChildren())]
+    return names.count("Separator") - bare[0]
+
+
+bare = [0]
+
+
+def view(name: str) -> None:
+    if folder := os.environ.get("SILO_TEST_PICTURES"):
+        Gui.ActiveDocument.ActiveView.saveImage(os.path.join(folder, f"{name}.png"), 900, 600, "White")
+
+
+def story() -> None:
+    wait(lambda: addon().session.shown.connection == "online")
+    addon().preferences.set("AskComment", False)
+    plate, bolt, knob = part("Plate"), part("Bolt"), part("Knob")
+    plate.Length, plate.Width, plate.Height = 100, 60, 5
+    bolt.Height = 30
+    for doc in (plate.Document, bolt.Document):
+        # FreeCAD 0.20 asks about edited parts when the assembly is saved.
+        doc.recompute()
+        doc.save()
+        unmark(doc)
+    top = assembly("Top", ("Plate", plate, 0), ("Bolt", bolt, 0), ("Row", bolt, 3), ("Gone", knob, 0))
+    doc = top.Document
+    for name, x in (("Bolt", 10), ("Gone", 80)):
+        doc.getObject(name).Placement.Base = App.Vector(x, 20, -10)
+    doc.getObject("Row").PlacementList = [
+        App.Placement(App.Vector(30 + 12 * n, 40, -10), App.Rotation()) for n in range(3)
+    ]
+    doc.recompute()
+    numbers = register(plate.Document, bolt.Document, knob.Document, doc)
+    App.setActiveDocument(doc.Name)
+    Gui.ActiveDocument.ActiveView.viewIsometric()
+    Gui.SendMsgToActiveView("ViewFit")
+    commit()
+    doc.getObject("Bolt").Placement.Base = App.Vector(60, 10, -10)
+    doc.removeObject("Gone")
+    link(top, "New", knob).Placement.Base = App.Vector(85, 45, 5)
+    doc.recompute()
+    commit()
+    tell(numbers=numbers, modified_before=modified_now())
+    import pivy.coin  # noqa: F401 - wraps the scene graph
+
+    graph = Gui.ActiveDocument.ActiveView.getSceneGraph()
+    bare[0] = [
+        graph.getChild(n).getTypeId().getName().getString() for n in range(graph.getNumChildren())
+    ].count("Separator")
+    lights(doc)
+    compares()
+    tell(modified=modified_now())
+
+
+def modified_now() -> list[str]:
+    return [name for name in App.listDocuments() if Gui.getDocument(name).Modified]
+
+
+def lights(doc: Any) -> None:
+    """The preview's *Show*, and something else that is selected then."""
+    addon().buttons.show_objects(doc.FileName, ("Row",))
+    tell(lit=nodes(), selected=len(Gui.Selection.getSelection()))
+    view("lit")
+    Gui.Selection.clearSelection()
+    Gui.Selection.addSelection(doc.Name, "Plate")
+    tell(unlit=wait(lambda: not nodes()))
+    Gui.Selection.clearSelection()
+
+
+def compares() -> None:
+    """*Compare in 3D* in the history, twice."""
+    Gui.runCommand("Silo_History")
+    window = addon()._window
+    wait(lambda: window.revisions.topLevelItemCount() == 2)
+    window.revisions.setCurrentItem(window.revisions.topLevelItem(1))
+    window.compare_button.click()
+    wait(lambda: settled() and window.news.text())
+    tell(said=window.news.text(), ghost=nodes())
+    view("ghost")
+    picture(window, "history")
+    window.compare_button.click()
+    wait(lambda: "removed" in window.news.text())
+    tell(after=nodes())
+    window.close()
+
+
+run(story)
