@@ -138,7 +138,7 @@ def test_a_part_that_left_the_assembly_in_conflict(api: Api, visit: Visit) -> No
     api.merge(parent, {other: 1})
     page = visit("editor")
     page.goto(f"/items/{parent}/bom")
-    expect(page.locator(".banner.conflict li")).to_contain_text("CAD has it no more, Silo says 6")
+    expect(page.locator(".banner.conflict li")).to_contain_text("CAD no longer has it, Silo says 6")
     page.get_by_role("button", name=f"Remove it for {child}").click()
     expect(page.locator(".banner.calm")).to_be_visible()
     assert api.quantities(parent) == {other: 1}

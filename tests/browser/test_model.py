@@ -126,7 +126,7 @@ def test_a_decision_shows_each_kind_of_change(visit: Visit, top: str) -> None:
     legend.get_by_role("button", name="removed (1)").click()
     far = still(canvas, first)
     page.get_by_role("button", name="Next ›").click()
-    expect(said).to_have_text("1 of 2: M1-COVER Cover: CAD uses it no more")
+    expect(said).to_have_text("1 of 2: M1-COVER Cover: CAD no longer uses it")
     wait_until(lambda: amount(picture_of(canvas), RED) > 1.5 * amount(far, RED), "the camera near the cover")
     near = still(canvas)
     canvas.focus()

@@ -103,7 +103,7 @@ def test_read_only_and_back(machine: dict[str, str], visit: Visit) -> None:
     admin, editor = visit("admin"), visit("editor")
     editor.goto(f"/items/{machine['machine']}/bom?edit={machine['plate']}")
     admin.goto("/users")
-    admin.get_by_role("button", name="Take none for now").click()
+    admin.get_by_role("button", name="Stop taking changes").click()
     try:
         expect(admin.locator("#mode + form")).to_contain_text("takes no changes at the moment")
         expect(editor.locator("#live")).to_contain_text("takes no changes now")

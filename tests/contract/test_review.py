@@ -190,7 +190,7 @@ def test_keeping_silo_s_quantity_keeps_the_reason_of_the_line(api: Api) -> None:
 
 
 def test_an_override_that_cad_dropped_can_be_removed_by_taking_cad(api: Api) -> None:
-    """CAD has it no more: taking CAD's word removes the line."""
+    """CAD no longer has it: taking CAD's word removes the line."""
     parent, a = api.items(2)
     api.merge(parent, {a: 4})
     api.good("PUT", bom(parent, a), {"quantity": 6})

@@ -42,10 +42,10 @@ def test_what_is_modelled_in_the_file_is_declared_and_taken_back(said: dict[str,
 
 def test_what_is_no_part_is_one_press_and_another_takes_it_back(said: dict[str, Any]) -> None:
     """The file keeps the answer; the dialog lists it in a section of its own, without a question."""
-    assert (said["excluded"], said["remark"]) == (True, "no part: nothing asks for it again")
+    assert (said["excluded"], said["remark"]) == (True, "not a part: not listed again")
     assert said["third"] == [
         *("Modelled in this file, not counted", "Motor (2 copies)"),
-        *("Modelled in this file, and no part", "Jig"),
+        *("Modelled in this file, not a part", "Jig"),
     ]
     assert said["asked_again"]
 

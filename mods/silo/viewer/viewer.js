@@ -418,18 +418,18 @@ class Viewer {
       this.dress();
     });
     for (const made of [...this.steppers, this.sides]) made.hidden = true;
-    button(_("Fit"), _("All of it, or what is lit"), "f", () => this.fit(this.lit.size ? this.lit : undefined));
-    button(_("Hide"), _("Hide what is lit"), "h", () => {
+    button(_("Fit"), _("Show the whole model, or the highlighted bodies"), "f", () => this.fit(this.lit.size ? this.lit : undefined));
+    button(_("Hide"), _("Hide the highlighted bodies"), "h", () => {
       this.hide(this.lit);
       this.picked(null, false);
     });
-    button(_("Isolate"), _("Show only what is lit"), "i", () => {
+    button(_("Isolate"), _("Show only the highlighted bodies"), "i", () => {
       if (!this.lit.size) return;
       this.hidden = new Set(this.bodies.filter((body) => !this.lit.has(body)));
       this.fit(this.lit);
     });
-    button(_("Show all"), _("Show what was hidden"), "a", () => this.hide(this.bodies, false));
-    toggle(_("See through"), _("Bodies become glass"), "sheer", () => this.dress());
+    button(_("Show all"), _("Show the hidden bodies"), "a", () => this.hide(this.bodies, false));
+    toggle(_("See through"), _("Make the bodies transparent"), "sheer", () => this.dress());
     toggle(_("Distance"), _("Click on two points"), "measuring", () => {
       this.#points = [];
       this.#measure();
@@ -449,7 +449,7 @@ class Viewer {
     });
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute("role", "application");
-    this.canvas.setAttribute("aria-label", _("Model: arrow keys turn it, plus and minus change the distance, Escape lets go of what is lit"));
+    this.canvas.setAttribute("aria-label", _("Model: arrow keys turn it, plus and minus change the distance, Escape ends the highlighting"));
     this.canvas.addEventListener("keydown", (event) => {
       const act = keys[event.key];
       if (!act || event.ctrlKey || event.altKey || event.metaKey) return;

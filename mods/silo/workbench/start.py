@@ -145,7 +145,7 @@ def commands(addon: Any) -> dict[str, Command]:
         ),
         ACTIVITY: Command(
             text=QT_TRANSLATE_NOOP("Silo_Activity", "Database Activity"),
-            tip=QT_TRANSLATE_NOOP("Silo_Activity", "Show what happens in Silo, and what waits to be sent"),
+            tip=QT_TRANSLATE_NOOP("Silo_Activity", "Show events in Silo, and commits that wait to be sent"),
             icon="silo-activity",
             keys="Ctrl+Alt+A",
             run=addon.show_activity,

@@ -284,7 +284,7 @@ def create_user(call: Administrator, form: Form) -> Response:
             )
     except SiloError as error:
         return _show(call, problem=str(error), status=error.status_hint, typed=typed)
-    return back("/users", _("User %(username)s is made.", username=username))
+    return back("/users", _("User %(username)s was added.", username=username))
 
 
 @router.post("/users/{username}")
@@ -304,8 +304,8 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
             if edit.clashes:
                 raise ConflictError(
                     _(
-                        "%(username)s was changed by somebody else meanwhile, and stays as this page "
-                        "shows it now",
+                        "somebody else changed %(username)s meanwhile; nothing was saved, and this page "
+                        "shows the present state",
                         username=username,
                     )
                 )
@@ -321,7 +321,9 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
         return _show(call, problem=str(error), status=error.status_hint)
     return back(
         "/users",
-        _("User %(username)s is changed.", username=username) if edit.mine else _("Nothing was different."),
+        _("User %(username)s is changed.", username=username)
+        if edit.mine
+        else _("Nothing differs, so nothing was saved."),
     )
 
 
@@ -429,7 +431,7 @@ def create_token(call: Reader, form: Form) -> Response:
     if not 0 < len(name) <= 200:
         return _own_page(call, problem=_("A token needs a name of at most 200 characters."))
     if ends not in LIFETIMES or wanted not in list(Scope):
-        return _own_page(call, problem=_("Choose one of the lifetimes, and one of the scopes."))
+        return _own_page(call, problem=_("Choose a lifetime and a scope."))
     days, scope, secret = LIFETIMES[ends], Scope(wanted), None
     if key := text(form, "key"):
         secret = access.secret_of_form(call.actor, key, name, ends, wanted)

@@ -362,8 +362,8 @@ def restore(call: Writer, part_number: str, form: Form) -> Response:
         )
     except VersionConflictError:
         problem = _(
-            "Nothing was restored: somebody else changed this BOM meanwhile. Here is what differs now; "
-            "restore again if that, too, should be as it was."
+            "Nothing was restored: somebody else changed this BOM meanwhile. Below are the differences "
+            "now; restore again if all of them should go back."
         )
         points = (change_id, None)
         return _compare(call, part_number, points, problem=problem, reason=reason, status=412)

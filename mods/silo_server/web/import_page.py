@@ -223,7 +223,7 @@ def carried(form: FormData) -> Upload:
     try:
         data = unpacker.decompress(base64.b64decode(packed, validate=True), MOST_BYTES)
     except (binascii.Error, ValueError, zlib.error):
-        raise RejectedError(_("the file did not come back whole; choose it again")) from None
+        raise RejectedError(_("the file did not arrive completely; choose it again")) from None
     if not unpacker.eof:
         raise TooLargeError(
             _("The file is larger than %(size)s MiB; this cannot be a BOM.", size=MOST_BYTES // 2**20)

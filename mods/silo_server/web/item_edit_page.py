@@ -148,7 +148,7 @@ def change(call: Writer, part_number: str, form: Form) -> Response:
     said = (
         _("%(number)s changed.", number=isolate(after.part_number))
         if after.version != item.version
-        else _("Nothing was different.")
+        else _("Nothing differs, so nothing was saved.")
     )
     return back(f"/items/{segment(after.part_number)}", said)
 

@@ -235,7 +235,7 @@ def _cad_words(
         return (
             _("CAD says %(quantity)s", quantity=of_cad(said, line.state.unit))
             if said
-            else _("CAD has it no more")
+            else _("CAD no longer has it")
         )
     if merge is not None and by_hand is not None and merge.id > by_hand.id:
         return _("CAD says the same")

@@ -180,7 +180,7 @@ def add_line(call: Writer, part_number: str, form: Form) -> Response:
             line = component_of(lines_of(tx, parent), child, parent)
             # Fields that were left empty keep what the line has.
             typed = {**line_form.shown(line.state), **{k: v for k, v in sent.typed.items() if v}}
-            problem = f"{_sentence(error)} {_('Its line is open here with what you typed.')}"
+            problem = f"{_sentence(error)} {_('Its line is open here with your values.')}"
             raise Refused(replace(asked, problem=problem, edit=line.id, typed=typed)) from None
         return _("%(number)s added.", number=isolate(added.child_part_number)), added.change_id
 
@@ -208,7 +208,7 @@ def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
         edited = review.change_line(tx, part_number, LineId(line.id), line_form.values_of(edit.mine), why=why)
         also = _(" Meanwhile: %(told)s.", told="; ".join(news)) if edit.theirs and news else ""
         if not edited.change_id or edited.line is None:
-            return _("Nothing was different, so nothing was changed.") + also, 0
+            return _("Your values are the same as in Silo, so nothing was changed.") + also, 0
         said = _("%(number)s changed.", number=isolate(edited.child_part_number))
         return said + also, edited.change_id
 
@@ -257,7 +257,7 @@ def _do_line(
             line = line_of(lines_of(tx, parent), LineId(line_id), parent)
         except NotFoundError:
             problem = _(
-                "This line is no longer in the BOM. What you typed stands below, as a line to be added."
+                "This line is no longer in the BOM. Your values are below, ready to be added as a new line."
             )
             typed = {**sent.typed, "child": text(form, "child")}
             raise Refused(replace(asked, problem=problem, story=news, edit="", typed=typed), 404) from None

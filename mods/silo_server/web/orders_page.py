@@ -78,8 +78,8 @@ def save_suppliers(call: Writer, part_number: str, form: Form) -> Response:
             item, change = suppliers.set_supplier_parts(tx, part_number, parts, whole(form, "version"))
     except VersionConflictError:
         problem = _(
-            "Somebody else changed this table meanwhile. Below is what you typed, and what changed; to put "
-            "yours in its place, save again"
+            "Somebody else changed this table meanwhile. Below are your values and the changes; to "
+            "replace the changes with your values, save again"
         )
         return _suppliers(call, part_number, VersionConflictError(problem), typed)
     except SiloError as error:
@@ -87,7 +87,7 @@ def save_suppliers(call: Writer, part_number: str, form: Form) -> Response:
     said = (
         _("Suppliers of %(number)s saved.", number=isolate(item.part_number))
         if change
-        else _("Nothing was different.")
+        else _("Nothing differs, so nothing was saved.")
     )
     return back(f"/items/{segment(item.part_number)}/suppliers", said)
 

@@ -96,7 +96,7 @@ TITLES = {
     403: N_("Not allowed"),
     404: N_("Not found"),
     405: N_("Not found"),
-    409: N_("Something else is in the way"),
+    409: N_("Another change or entry is in the way"),
     412: N_("The BOM changed in between"),
     413: N_("Too large"),
     429: N_("Too many attempts"),

@@ -113,7 +113,7 @@ def end(call: Reader, part_number: str, label: str, form: Form) -> Response:
     """Reject, withdraw, or call obsolete."""
     status = text(form, "status")
     if status not in ENDS:
-        return _show(call, part_number, _("Load the page again: the form has another state."), 400)
+        return _show(call, part_number, _("Load the page again: the state has changed."), 400)
     try:
         with call.write() as tx:
             releases.end(tx, part_number, label, status, text(form, "note", 2000))

@@ -98,7 +98,7 @@ def decide(call: Writer, form: Form) -> Response:
             done=_(DONE[action]),
         )
     else:
-        said = _("Nothing of this kind was open in what was chosen, so nothing was changed.")
+        said = _("The chosen BOMs have nothing open of this kind, so nothing was changed.")
     if problems:
         return _show(call, view, said, problems, text(form, "reason"), 409, changes)
     return back(Address("/waiting", view).url(), said, undo=changes)
@@ -167,7 +167,7 @@ def follow(call: Reader, form: Form) -> Response:
     target = text(form, "target", 1024) or f"folder:{text(form, 'folder', 1000)}"
     with call.write(even_when_read_only=True) as tx:
         review.follow(tx, target, on=on)
-    said = _("You follow it now: the page For me says what changes.") if on else _("You follow it no more.")
+    said = _("You follow it now: the page For me says what changes.") if on else _("You no longer follow it.")
     return back(_back_to(form, "/mine"), said)
 
 
@@ -176,7 +176,7 @@ def seen(call: Reader, form: Form) -> Response:
     """All news are seen."""
     with call.write(even_when_read_only=True) as tx:
         review.have_seen(tx)
-    return back("/mine", _("All news are marked as seen."))
+    return back("/mine", _("All news is marked as seen."))
 
 
 _VIEW = ("q", "folder", "kind", "who", "sort")
@@ -207,7 +207,7 @@ def _each(
     for value in values:
         if not name(value):
             problems.append(
-                _("%(value)s: this is no BOM of the table; load the page again", value=isolate(value[:80]))
+                _("%(value)s: this BOM is not in the table; load the page again", value=isolate(value[:80]))
             )
             continue
         try:

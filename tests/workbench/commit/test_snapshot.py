@@ -79,7 +79,7 @@ def test_several_assemblies_and_no_hint_is_reported_not_guessed() -> None:
     assert "2 assemblies" in taken.problem
     # What to do is reported in the words of the window, not of the command line.
     assert "--assembly" not in taken.problem
-    assert taken.problem.endswith("Make the one that is meant active: double-click it in the tree.")
+    assert taken.problem.endswith("Make the right assembly active: double-click it in the tree.")
 
 
 def test_the_active_assembly_decides_between_several() -> None:

@@ -118,7 +118,7 @@ def test_no_part_is_a_section_of_its_own_and_can_be_taken_back(path: Path) -> No
         *("Motor (2 copies)", True),
         *(False, False, False),
     )
-    assert (row.number_text({}, 0), row.note()[0]) == ("", "no part: nothing asks for it again")
+    assert (row.number_text({}, 0), row.note()[0]) == ("", "not a part: not listed again")
     for name in ("Motor", "Motor001"):
         assert unstamp(path, name)
     (row,) = [row for row in offered(path, silo) if row.component() == "Motor (2 copies)"]

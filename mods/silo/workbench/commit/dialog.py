@@ -68,20 +68,20 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
     def _heading(self) -> str:
         edited = sum(row.state is not DocumentState.RECOMPUTED for row in self._plan.rows[:-1])
         recomputed = len(self._plan.rows) - 1 - edited
-        lines = [translate("Silo", "This file is committed:")]
+        lines = [translate("Silo", "This file will be committed:")]
         if edited:
             text = translate(
                 "Silo",
-                "This file is committed, and {n} file below it that has unsaved edits, that one first:",
+                "This file will be committed after {n} file below it with unsaved edits:",
             )
             many = translate(
                 "Silo",
-                "This file is committed, and {n} files below it that have unsaved edits, the lowest first:",
+                "This file will be committed after {n} files below it with unsaved edits, the lowest first:",
             )
             lines = [counted(edited, text, many)]
         if recomputed:
-            text = translate("Silo", "{n} more was only recomputed; check it to commit it anyway.")
-            many = translate("Silo", "{n} more were only recomputed; check them to commit them anyway.")
+            text = translate("Silo", "{n} more file was only recomputed; check it to commit it anyway.")
+            many = translate("Silo", "{n} more files were only recomputed; check them to commit them anyway.")
             lines.append(counted(recomputed, text, many))
         return "\n".join(lines)
 
@@ -172,7 +172,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         if self._theirs:
             self._tell_who()
             text = translate(
-                "Silo", "What somebody else has changed is left out, unless you choose otherwise:"
+                "Silo", "Files that somebody else has changed are left out, unless you choose otherwise:"
             )
             self._head.setText(text)
             self.files.setColumnHidden(_CHOICE, False)

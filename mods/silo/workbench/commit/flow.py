@@ -700,7 +700,8 @@ class CommitFlow:
                 commit = self.made_from(commit, doc)
                 if not commit.sha256:
                     text = translate(
-                        "Silo", "Its BOM was not synced: it is not as it was committed. Commit it."
+                        "Silo",
+                        "Its BOM was not synced: it changed after its commit. Commit it again.",
                     )
                     raise DocumentError(taken.path, text)
         except SiloError as error:

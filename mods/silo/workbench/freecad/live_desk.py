@@ -115,7 +115,7 @@ class SiloGroup:
             with saving.others_unmarked():
                 for obj, (number, state) in left:
                     _put(obj, SHOWN_NUMBER, number, translate("Silo", "Part number in Silo"))
-                    _put(obj, SHOWN_STATE, state, translate("Silo", "What Silo knows of this component"))
+                    _put(obj, SHOWN_STATE, state, translate("Silo", "Silo's data of this component"))
 
 
 def _is_shown(obj: Any, number: str, state: str) -> bool:
@@ -282,7 +282,9 @@ class LossGuard:
     def _opened(self, name: str) -> None:
         doc = next((document for document in host.documents() if document.Name == name), None)
         if doc is not None and (lost := saving.lost_objects(doc)):
-            text = translate("Silo", "This FreeCAD {here} does not know, and has not loaded: {lost}.")
+            text = translate(
+                "Silo", "This FreeCAD {here} does not know these objects, nor load them: {lost}."
+            )
             advice = translate("Silo", "Saving the file here would remove them from it: change it there.")
             self._tell(doc, _words(text, doc, lost), advice)
 

@@ -75,8 +75,8 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
         self._empty = widgets.label(
             translate(
                 "Silo",
-                "Nothing has happened yet. Commit an assembly with File → Commit to Silo, and what becomes "
-                "of it is shown here.",
+                "Nothing has happened yet. Commit an assembly with File → Commit to Silo, and follow "
+                "it here.",
             ),
             Tone.QUIET,
         )
@@ -331,7 +331,7 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
             text = translate("Silo", "Retry all") if again else translate("Silo", "Send now")
             send.append(Action(Do.RETRY, text))
         if len(away := meant_for_another(shown.waiting, shown.server.url)) > 1:
-            text = translate("Silo", "Send all {n} of another address to {host}").replace(
+            text = translate("Silo", "Send all {n} commits for another address to {host}").replace(
                 "{n}", str(len(away))
             )
             text = text.replace("{host}", host_of(shown.server.url))

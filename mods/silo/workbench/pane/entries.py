@@ -341,7 +341,7 @@ def commit_of_event(event: ServerEvent) -> tuple[str, Newer] | None:
 
 def of_gap(when: float) -> PaneEntry:
     """The box for what was not heard: the server lost its log, or counts again."""
-    text = translate("Silo", "The server no longer knows what happened since. See its own activity page.")
+    text = translate("Silo", "The server no longer has the events since then. See its own activity page.")
     return PaneEntry(
         key="gap",
         title=translate("Silo", "Some activity may be missing"),

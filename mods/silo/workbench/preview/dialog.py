@@ -122,7 +122,10 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             translate("Silo", "Compare with 3D view"),
             "verify",
             lambda: self._ask(self._flow.verify),
-            translate("Silo", "Does the BOM explain each solid that FreeCAD shows? Selects what it does not"),
+            translate(
+                "Silo",
+                "Check that the BOM explains each solid in 3D, and select any other solid",
+            ),
         )
         self.relink_button = button(
             translate("Silo", "Mend links"), "relink", lambda: self._ask(self._flow.relink)

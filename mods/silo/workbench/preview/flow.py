@@ -613,7 +613,8 @@ class PreviewFlow:
             return
         if not now.is_as(preview.snapshot):
             text = translate(
-                "Silo", "Nothing was synced: {name} was edited since the comparison. This is it now."
+                "Silo",
+                "Nothing was synced: {name} was edited since the comparison. Here it is now.",
             )
             self._ask(now, text.replace("{name}", plain(now.label, 80)))
             return

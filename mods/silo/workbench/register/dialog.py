@@ -205,7 +205,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             "undo",
             self._undo,
             translate(
-                "Silo", "Take back what was just registered: new items are archived, the files forget them"
+                "Silo", "Undo the last registration: archive the new items and remove them from the files"
             ),
         )
         self.undo_button.hide()
@@ -286,7 +286,8 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.setCellWidget(number, BUTTON, button)
         if row.candidate.article is not None:
             text = translate(
-                "Silo", "It is not listed again, here or by the command line; the file keeps that"
+                "Silo",
+                "Not listed again, here or on the command line; the file keeps this choice",
             )
             no_part = widgets.button(
                 translate("Silo", "Not a Part"),

@@ -48,7 +48,7 @@ def section_words() -> dict[str, str]:
         "standard": translate("Silo", "Standard parts"),
         "modelled": translate("Silo", "Modelled in this file, not counted"),
         "declared": translate("Silo", "Modelled in this file, and counted"),
-        "no part": translate("Silo", "Modelled in this file, and no part"),
+        "no part": translate("Silo", "Modelled in this file, not a part"),
     }
 
 
@@ -67,7 +67,7 @@ def source_words() -> dict[str, str]:
     return {
         "manufactured": translate("Silo", "made here"),
         "purchased": translate("Silo", "bought"),
-        "": translate("Silo", "not said"),
+        "": translate("Silo", "not stated"),
     }
 
 
@@ -301,7 +301,7 @@ class EditedRow:
         if article is None:
             return []
         if article.no_part:
-            return [translate("Silo", "no part: nothing asks for it again")]
+            return [translate("Silo", "not a part: not listed again")]
         if article.declared:
             text, many = translate("Silo", "counts once"), translate("Silo", "counts {n} times")
         else:

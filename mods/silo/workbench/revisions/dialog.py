@@ -158,7 +158,7 @@ class OpenDialog(_Window):
         self.open_button = widgets.button(translate("Silo", "Open"), "open", self._open)
         self._item = ""
         self._newest: Callable[[], None] = lambda: None
-        text = translate("Silo", "Fetch what is newer in Silo")
+        text = translate("Silo", "Fetch newer revisions from Silo")
         self.newest = widgets.link_button(text, lambda: self._newest())
         self.newest.hide()
         self._layout.addWidget(self.newest)
@@ -253,7 +253,7 @@ class OpenDialog(_Window):
     def _show(self, history: ItemHistory) -> None:
         self._item = history.item.id
         self.newest.hide()
-        _fill_in(self.revisions, history, newest=translate("Silo", "with the newest of all that it links to"))
+        _fill_in(self.revisions, history, newest=translate("Silo", "with the newest linked files"))
         picture = QtGui.QPixmap()
         if history.picture and picture.loadFromData(history.picture):
             self.picture.setPixmap(picture.scaledToHeight(PICTURE))
@@ -272,7 +272,7 @@ class OpenDialog(_Window):
         here = "" if row.data(0, _DATA) else file_in_project(folder, self._item)
         if here:
             self._flow.open(here)
-            text = translate("Silo", "It lies in the project already, and is open: {path}")
+            text = translate("Silo", "It is in the project already, and is open: {path}")
             self.say(text.replace("{path}", here))
             self._offer_newest(folder, here)
             return
@@ -406,7 +406,7 @@ class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no typ
         self.words.setPlaceholderText(translate("Silo", "Search"))
         self.words.setClearButtonEnabled(True)
         self.words.textChanged.connect(lambda _text: self._draw())
-        self.only_left = QtWidgets.QCheckBox(translate("Silo", "Not in Silo as here"))
+        self.only_left = QtWidgets.QCheckBox(translate("Silo", "Different from Silo"))
         self.only_left.toggled.connect(lambda _on: self._draw())
         layout.addLayout(widgets.line(self.words, self.only_left))
         self.news = widgets.label("", Tone.QUIET)
@@ -436,7 +436,10 @@ class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no typ
             self.news.setText(translate("Silo", "Looking at the files…"))
             self._flow.look(roots[0], lambda _view: self._draw(), self._fail)
         else:
-            text = translate("Silo", "Choose the project's folder: it is remembered, and marked for others.")
+            text = translate(
+                "Silo",
+                "Choose the project's folder: it is remembered, and marked as a project.",
+            )
             self.news.setText(text)
 
     def _fail(self, error: SiloError) -> None:

@@ -488,7 +488,7 @@ class ProjectView:
 
     def heading(self) -> str:
         """How many files there are, and how many of them Silo does not have as they are here."""
-        text = translate("Silo", "{n} files, {left} of them not in Silo as they are here")
+        text = translate("Silo", "{n} files, {left} of them different from Silo")
         left = sum(not row.is_fine for row in self.rows)
         return text.replace("{n}", str(len(self.rows))).replace("{left}", str(left))
 

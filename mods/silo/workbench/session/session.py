@@ -269,7 +269,7 @@ class Session:
             try:
                 content = self.outbox.finish(commit.key, commit.file, made_from)
             except (OutboxError, OSError) as error:
-                text = translate("Silo", "It is kept, and sent once the disk takes a copy of its file.")
+                text = translate("Silo", "The commit is kept. It is sent as soon as its file can be copied.")
                 outbox_error = OutboxError(
                     f"{commit.label or commit.path}: {text} {error}"
                 )  # its row is on disk

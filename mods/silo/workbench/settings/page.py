@@ -143,7 +143,7 @@ class PreferencePage:
         box = QtWidgets.QGroupBox(translate("Silo", "Window"))
         form = QtWidgets.QFormLayout(box)
         for name, text in (
-            ("LiveActivity", translate("Silo", "Show what happens in Silo as it happens")),
+            ("LiveActivity", translate("Silo", "Show events of Silo live")),
             ("ShowEverywhere", translate("Silo", "Commit in the File menu of every workbench")),
         ):
             self._flag(form, name, text)

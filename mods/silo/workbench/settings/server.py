@@ -231,7 +231,7 @@ def begin_login(wanted: ServerPreferences, preferences: ServerPreferences) -> Br
     with SiloClient(url, None, verify=wanted.verify) as client:
         login = client.begin_login("FreeCAD")
     if login is None:
-        text = translate("Silo", "This server has no page for that. Make a token on its account page.")
+        text = translate("Silo", "This server has no page for a login. Make a token on its account page.")
         raise ConfigError(text)
     return login
 

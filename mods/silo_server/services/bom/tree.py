@@ -66,7 +66,7 @@ class Graph:
         quantity = self.told(line)
         result = ["unreferenced"] if line.state.unreferenced_since else []
         if quantity is not None:
-            result.append(f"CAD says {plain(quantity)}" if quantity else "CAD has it no more")
+            result.append(f"CAD says {plain(quantity)}" if quantity else "CAD no longer has it")
         return result
 
     def names(self) -> dict[int, str]:

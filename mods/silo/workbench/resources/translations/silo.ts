@@ -96,27 +96,27 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>This file is committed:</source>
+            <source>This file will be committed:</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>This file is committed, and {n} file below it that has unsaved edits, that one first:</source>
+            <source>This file will be committed after {n} file below it with unsaved edits:</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>This file is committed, and {n} files below it that have unsaved edits, the lowest first:</source>
+            <source>This file will be committed after {n} files below it with unsaved edits, the lowest first:</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>{n} more was only recomputed; check it to commit it anyway.</source>
+            <source>{n} more file was only recomputed; check it to commit it anyway.</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>{n} more were only recomputed; check them to commit them anyway.</source>
+            <source>{n} more files were only recomputed; check them to commit them anyway.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -174,7 +174,7 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>What somebody else has changed is left out, unless you choose otherwise:</source>
+            <source>Files that somebody else has changed are left out, unless you choose otherwise:</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -293,7 +293,7 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
-            <source>Its BOM was not synced: it is not as it was committed. Commit it.</source>
+            <source>Its BOM was not synced: it changed after its commit. Commit it again.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -330,7 +330,7 @@
         </message>
         <message>
             <location filename="../../commit/plan.py" />
-            <source>Make the one that is meant active: double-click it in the tree.</source>
+            <source>Make the right assembly active: double-click it in the tree.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -401,12 +401,12 @@
         </message>
         <message>
             <location filename="../../freecad/live_desk.py" />
-            <source>What Silo knows of this component</source>
+            <source>Silo's data of this component</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../freecad/live_desk.py" />
-            <source>This FreeCAD {here} does not know, and has not loaded: {lost}.</source>
+            <source>This FreeCAD {here} does not know these objects, nor load them: {lost}.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -774,7 +774,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/boxes.py" />
-            <source>Nothing has happened yet. Commit an assembly with File → Commit to Silo, and what becomes of it is shown here.</source>
+            <source>Nothing has happened yet. Commit an assembly with File → Commit to Silo, and follow it here.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -799,7 +799,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/boxes.py" />
-            <source>Send all {n} of another address to {host}</source>
+            <source>Send all {n} commits for another address to {host}</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -910,7 +910,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
-            <source>The server no longer knows what happened since. See its own activity page.</source>
+            <source>The server no longer has the events since then. See its own activity page.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1017,7 +1017,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/dialog.py" />
-            <source>Does the BOM explain each solid that FreeCAD shows? Selects what it does not</source>
+            <source>Check that the BOM explains each solid in 3D, and select any other solid</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1208,7 +1208,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/flow.py" />
-            <source>Nothing was synced: {name} was edited since the comparison. This is it now.</source>
+            <source>Nothing was synced: {name} was edited since the comparison. Here it is now.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1329,7 +1329,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/dialog.py" />
-            <source>Take back what was just registered: new items are archived, the files forget them</source>
+            <source>Undo the last registration: archive the new items and remove them from the files</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1344,7 +1344,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/dialog.py" />
-            <source>It is not listed again, here or by the command line; the file keeps that</source>
+            <source>Not listed again, here or on the command line; the file keeps this choice</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1399,7 +1399,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/flow.py" />
-            <source>Modelled in this file, and no part</source>
+            <source>Modelled in this file, not a part</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1424,7 +1424,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/flow.py" />
-            <source>not said</source>
+            <source>not stated</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1564,7 +1564,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/flow.py" />
-            <source>no part: nothing asks for it again</source>
+            <source>not a part: not listed again</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1744,7 +1744,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>Fetch what is newer in Silo</source>
+            <source>Fetch newer revisions from Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1764,7 +1764,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>with the newest of all that it links to</source>
+            <source>with the newest linked files</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1779,7 +1779,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>It lies in the project already, and is open: {path}</source>
+            <source>It is in the project already, and is open: {path}</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1854,7 +1854,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>Not in Silo as here</source>
+            <source>Different from Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1874,7 +1874,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>Choose the project's folder: it is remembered, and marked for others.</source>
+            <source>Choose the project's folder: it is remembered, and marked as a project.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1999,7 +1999,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../revisions/flow.py" />
-            <source>{n} files, {left} of them not in Silo as they are here</source>
+            <source>{n} files, {left} of them different from Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2069,7 +2069,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../session/session.py" />
-            <source>It is kept, and sent once the disk takes a copy of its file.</source>
+            <source>The commit is kept. It is sent as soon as its file can be copied.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2184,7 +2184,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../settings/page.py" />
-            <source>Show what happens in Silo as it happens</source>
+            <source>Show events of Silo live</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2310,7 +2310,7 @@ They are installed in {folder}.</source>
         </message>
         <message>
             <location filename="../../settings/server.py" />
-            <source>This server has no page for that. Make a token on its account page.</source>
+            <source>This server has no page for a login. Make a token on its account page.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2593,7 +2593,7 @@ They are installed in {folder}.</source>
         </message>
         <message>
             <location filename="../../start.py" />
-            <source>Show what happens in Silo, and what waits to be sent</source>
+            <source>Show events in Silo, and commits that wait to be sent</source>
             <translation type="unfinished" />
         </message>
     </context>

@@ -96,27 +96,27 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>This file is committed:</source>
-            <translation>Diese Datei wird eingecheckt:</translation>
+            <source>This file will be committed:</source>
+            <translation>Diese Datei wird übertragen:</translation>
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>This file is committed, and {n} file below it that has unsaved edits, that one first:</source>
+            <source>This file will be committed after {n} file below it with unsaved edits:</source>
             <translation>Diese Datei wird eingecheckt, und zuvor {n} Datei darunter mit ungespeicherten Änderungen:</translation>
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>This file is committed, and {n} files below it that have unsaved edits, the lowest first:</source>
+            <source>This file will be committed after {n} files below it with unsaved edits, the lowest first:</source>
             <translation>Diese Datei wird eingecheckt, und zuvor {n} Dateien darunter mit ungespeicherten Änderungen, die unterste zuerst:</translation>
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>{n} more was only recomputed; check it to commit it anyway.</source>
+            <source>{n} more file was only recomputed; check it to commit it anyway.</source>
             <translation>{n} weitere wurde nur neu berechnet; anhaken, um sie trotzdem einzuchecken.</translation>
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>{n} more were only recomputed; check them to commit them anyway.</source>
+            <source>{n} more files were only recomputed; check them to commit them anyway.</source>
             <translation>{n} weitere wurden nur neu berechnet; anhaken, um sie trotzdem einzuchecken.</translation>
         </message>
         <message>
@@ -174,7 +174,7 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>What somebody else has changed is left out, unless you choose otherwise:</source>
+            <source>Files that somebody else has changed are left out, unless you choose otherwise:</source>
             <translation>Was jemand anders geändert hat, bleibt weg, wenn Sie nichts anderes wählen:</translation>
         </message>
         <message>
@@ -293,7 +293,7 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
-            <source>Its BOM was not synced: it is not as it was committed. Commit it.</source>
+            <source>Its BOM was not synced: it changed after its commit. Commit it again.</source>
             <translation>Die Stückliste wurde nicht abgeglichen: Sie ist nicht mehr so wie eingecheckt. Bitte einchecken.</translation>
         </message>
         <message>
@@ -330,7 +330,7 @@
         </message>
         <message>
             <location filename="../../commit/plan.py" />
-            <source>Make the one that is meant active: double-click it in the tree.</source>
+            <source>Make the right assembly active: double-click it in the tree.</source>
             <translation>Aktivieren Sie die gemeinte Baugruppe: Doppelklick im Baum.</translation>
         </message>
         <message>
@@ -401,12 +401,12 @@
         </message>
         <message>
             <location filename="../../freecad/live_desk.py" />
-            <source>What Silo knows of this component</source>
+            <source>Silo's data of this component</source>
             <translation>Was Silo über diese Komponente weiß</translation>
         </message>
         <message>
             <location filename="../../freecad/live_desk.py" />
-            <source>This FreeCAD {here} does not know, and has not loaded: {lost}.</source>
+            <source>This FreeCAD {here} does not know these objects, nor load them: {lost}.</source>
             <translation>Dieses FreeCAD {here} kennt nicht und hat nicht geladen: {lost}.</translation>
         </message>
         <message>
@@ -775,7 +775,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../pane/boxes.py" />
-            <source>Nothing has happened yet. Commit an assembly with File → Commit to Silo, and what becomes of it is shown here.</source>
+            <source>Nothing has happened yet. Commit an assembly with File → Commit to Silo, and follow it here.</source>
             <translation>Noch ist nichts geschehen. Checken Sie eine Baugruppe mit Datei → In Silo einchecken ein; was daraus wird, steht dann hier.</translation>
         </message>
         <message>
@@ -800,7 +800,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../pane/boxes.py" />
-            <source>Send all {n} of another address to {host}</source>
+            <source>Send all {n} commits for another address to {host}</source>
             <translation>Alle {n} einer anderen Adresse an {host} senden</translation>
         </message>
         <message>
@@ -911,7 +911,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../pane/entries.py" />
-            <source>The server no longer knows what happened since. See its own activity page.</source>
+            <source>The server no longer has the events since then. See its own activity page.</source>
             <translation>Der Server weiß nicht mehr, was seither geschah. Seine eigene Seite zeigt die Aktivität.</translation>
         </message>
         <message>
@@ -1018,7 +1018,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../preview/dialog.py" />
-            <source>Does the BOM explain each solid that FreeCAD shows? Selects what it does not</source>
+            <source>Check that the BOM explains each solid in 3D, and select any other solid</source>
             <translation>Erklärt die Stückliste jeden Körper, den FreeCAD zeigt? Wählt aus, was sie nicht erklärt</translation>
         </message>
         <message>
@@ -1209,7 +1209,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../preview/flow.py" />
-            <source>Nothing was synced: {name} was edited since the comparison. This is it now.</source>
+            <source>Nothing was synced: {name} was edited since the comparison. Here it is now.</source>
             <translation>Nichts wurde abgeglichen: {name} wurde seit dem Vergleich geändert. So ist der Stand jetzt.</translation>
         </message>
         <message>
@@ -1330,7 +1330,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../register/dialog.py" />
-            <source>Take back what was just registered: new items are archived, the files forget them</source>
+            <source>Undo the last registration: archive the new items and remove them from the files</source>
             <translation>Nimmt die letzte Registrierung zurück: Neue Artikel werden archiviert, die Dateien vergessen sie</translation>
         </message>
         <message>
@@ -1345,7 +1345,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../register/dialog.py" />
-            <source>It is not listed again, here or by the command line; the file keeps that</source>
+            <source>Not listed again, here or on the command line; the file keeps this choice</source>
             <translation>Es wird nicht mehr aufgeführt, weder hier noch auf der Befehlszeile; die Datei merkt sich das</translation>
         </message>
         <message>
@@ -1400,7 +1400,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../register/flow.py" />
-            <source>Modelled in this file, and no part</source>
+            <source>Modelled in this file, not a part</source>
             <translation>In dieser Datei modelliert und kein Teil</translation>
         </message>
         <message>
@@ -1425,7 +1425,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../register/flow.py" />
-            <source>not said</source>
+            <source>not stated</source>
             <translation>offen</translation>
         </message>
         <message>
@@ -1565,7 +1565,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../register/flow.py" />
-            <source>no part: nothing asks for it again</source>
+            <source>not a part: not listed again</source>
             <translation>kein Teil: nichts fragt mehr danach</translation>
         </message>
         <message>
@@ -1745,7 +1745,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>Fetch what is newer in Silo</source>
+            <source>Fetch newer revisions from Silo</source>
             <translation>Holen, was in Silo neuer ist</translation>
         </message>
         <message>
@@ -1765,7 +1765,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>with the newest of all that it links to</source>
+            <source>with the newest linked files</source>
             <translation>mit dem Neuesten von allem, was verknüpft ist</translation>
         </message>
         <message>
@@ -1780,7 +1780,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>It lies in the project already, and is open: {path}</source>
+            <source>It is in the project already, and is open: {path}</source>
             <translation>Die Datei liegt schon im Projekt und ist offen: {path}</translation>
         </message>
         <message>
@@ -1855,7 +1855,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>Not in Silo as here</source>
+            <source>Different from Silo</source>
             <translation>Nicht wie hier in Silo</translation>
         </message>
         <message>
@@ -1875,7 +1875,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/dialog.py" />
-            <source>Choose the project's folder: it is remembered, and marked for others.</source>
+            <source>Choose the project's folder: it is remembered, and marked as a project.</source>
             <translation>Wählen Sie den Projektordner: Er wird gemerkt und für andere markiert.</translation>
         </message>
         <message>
@@ -2000,7 +2000,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../revisions/flow.py" />
-            <source>{n} files, {left} of them not in Silo as they are here</source>
+            <source>{n} files, {left} of them different from Silo</source>
             <translation>{n} Dateien, {left} davon nicht wie hier in Silo</translation>
         </message>
         <message>
@@ -2070,7 +2070,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../session/session.py" />
-            <source>It is kept, and sent once the disk takes a copy of its file.</source>
+            <source>The commit is kept. It is sent as soon as its file can be copied.</source>
             <translation>Es bleibt erhalten und wird gesendet, sobald die Platte eine Kopie der Datei aufnimmt.</translation>
         </message>
         <message>
@@ -2185,7 +2185,7 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../settings/page.py" />
-            <source>Show what happens in Silo as it happens</source>
+            <source>Show events of Silo live</source>
             <translation>Live zeigen, was in Silo geschieht</translation>
         </message>
         <message>
@@ -2312,7 +2312,7 @@ Sie werden in {folder} installiert.</translation>
         </message>
         <message>
             <location filename="../../settings/server.py" />
-            <source>This server has no page for that. Make a token on its account page.</source>
+            <source>This server has no page for a login. Make a token on its account page.</source>
             <translation>Dieser Server hat keine Seite dafür. Erstellen Sie ein Token auf seiner Kontoseite.</translation>
         </message>
         <message>
@@ -2595,7 +2595,7 @@ Sie werden in {folder} installiert.</translation>
         </message>
         <message>
             <location filename="../../start.py" />
-            <source>Show what happens in Silo, and what waits to be sent</source>
+            <source>Show events in Silo, and commits that wait to be sent</source>
             <translation>Zeigt, was in Silo geschieht und was auf das Senden wartet</translation>
         </message>
     </context>
