@@ -63,7 +63,7 @@ def test_what_waits_is_found_and_decided_for_many(api: Api, visit: Visit, script
     count = int(page.locator(".dot").inner_text())
     page.get_by_role("link", name="Waiting").click()
     # Only a script can keep what is chosen, and the page says so.
-    expect(page.get_by_text("begins with nothing chosen")).to_be_visible(visible=not script)
+    expect(page.get_by_text("nothing is chosen any more")).to_be_visible(visible=not script)
     expect(page.locator("tbody tr")).to_have_count(count)
     expect(row(page, quiet[0])).to_have_count(0)
     expect(row(page, second).locator("td.number")).to_have_text(["2", "1", "1", "1", page_time(api, second)])

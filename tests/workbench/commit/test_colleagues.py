@@ -462,7 +462,7 @@ def test_a_bom_alone_is_that_of_the_file_in_silo(office: Office, flow: CommitFlo
     office.settle()
     assert bolts(office) == [2]
     box = next(e for e in office.session.shown.activity.entries if e.title == "Not committed: Top")
-    assert "not as it was committed. Commit it" in box.lines[0].text
+    assert "it changed after its commit. Commit it again" in box.lines[0].text
     top.changed = False
     Path(top.FileName).write_bytes(b"by somebody on the same share")
     flow.sync_only(top)

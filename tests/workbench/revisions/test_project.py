@@ -95,7 +95,7 @@ def test_commit_all_sends_every_file_that_silo_does_not_have(place: Place) -> No
     place.office.settle()
     assert place.states(flow) == {"Sheet.FCStd": "SAME", "parts/Plate.FCStd": "SAME"}
     assert flow.view.shown("", only_left=True) == []
-    assert flow.view.heading() == "2 files, 0 of them not in Silo as they are here"
+    assert flow.view.heading() == "2 files, 0 of them different from Silo"
     assert file_in_project(str(place.root), place.identity.upper()) == str(
         place.root / "parts" / "Plate.FCStd"
     )

@@ -200,7 +200,7 @@ def test_a_commit_that_a_full_disk_kept_is_not_reported_as_lost(office: Office, 
     office.session._waits(((), None))  # read before there was anything
     office.settle()
     assert base.origin == hashlib.sha256(b"content").hexdigest()  # the next commit is made from this one
-    assert any("Bolt: It is kept, and sent once the disk" in line for line in office.console)
+    assert any("Bolt: The commit is kept. It is sent as soon" in line for line in office.console)
     disk.room = True
     office.session.tick()
     office.settle()
