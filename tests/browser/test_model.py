@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from model_scenes import machine
+from model_scenes import library, machine
 from PIL import Image
 from playwright.sync_api import Locator, Page, expect
 from server_testing import Api, wait_until
@@ -196,6 +196,15 @@ def test_a_change_has_its_colour_where_its_occurrences_stand(visit: Visit, top: 
     assert [of for of, hue in WHERE.items() if share(of, hue) < 0.6] == []
     assert share("COVER Cover · removed · Cover", RED, most=170) > 0.6, "a ghost is pale"
     assert [of for of in PLAIN if max(share(of, hue) for hue in WHERE.values()) > 0.3] == []
+
+
+def test_a_part_in_a_file_of_several_shows_its_own_body(visit: Visit, api: Api) -> None:
+    """Without a revision of its own, on its page and where its BOM is decided."""
+    gear, cover = api.items(2)
+    library(api, b"of two", {"Gear": gear, "Cover": cover})
+    page = visit("viewer")
+    for path in (f"/items/{gear}", f"/items/{gear}/bom"):
+        assert opened(page, path).get_attribute("data-ready") == "1"
 
 
 def test_without_webgl_or_a_model_the_page_says_so(visit: Visit, api: Api, top: str) -> None:

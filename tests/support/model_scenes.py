@@ -8,6 +8,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any
+from uuid import NAMESPACE_URL, uuid5
 
 import numpy as np
 import trimesh
@@ -53,6 +54,20 @@ def commit(api: Api, item: str, content: bytes, bodies: Mapping[str, Body], uses
     """Upload a file with its model. ``uses``: product → what it shows; the first is the file as a whole."""
     form, headers = form_body({"file": ("machine.FCStd", content)})
     api.good("POST", f"/api/items/{item}/file", body=form, headers=headers)
+    send_model(api, content, bodies, uses)
+
+
+def library(api: Api, content: bytes, held: Mapping[str, str]) -> None:
+    """Upload a file of several items with its model. ``held``: a body of :data:`BODIES` → its item."""
+    items = [{"item": api.get(f"/api/items/{one}")["id"], "object": key} for key, one in held.items()]
+    form, headers = form_body({"file": ("library.FCStd", content), "items": json.dumps(items)})
+    document = uuid5(NAMESPACE_URL, "/".join(held.values()))
+    api.good("POST", f"/api/documents/{document}/file", body=form, headers=headers)
+    send_model(api, content, {key: BODIES[key] for key in held}, {"Library": []})
+
+
+def send_model(api: Api, content: bytes, bodies: Mapping[str, Body], uses: Mapping[str, Any]) -> None:
+    """Send the model of a content that is a revision's file."""
     products = {key: {"label": key, "shape": True} for key in bodies}
     products |= {key: {"label": key, "uses": shown} for key, shown in uses.items()}
     structure = json.dumps({"format": 1, "roots": list(uses)[:1], "products": products}).encode()

@@ -371,6 +371,11 @@ def with_file(tx: Tx, of: Item | Document) -> Item | Document:
     raise NotFoundError(f"{of.subject} has no file yet")
 
 
+def has_file(tx: Tx, item: Item) -> bool:
+    """Report whether a file shows an item: its own, or a file of several items."""
+    return bool(files_until(tx, item, tx.stamp))
+
+
 def newest_file(tx: Tx, of: Item | Document) -> Revision:
     """Return the newest revision with a file. Raises NotFoundError."""
     newest = _newest_file(tx, with_file(tx, of))

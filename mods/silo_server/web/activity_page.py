@@ -251,6 +251,7 @@ def changes_page(
         except (NotFoundError, RejectedError) as error:
             problem, status = str(error), 404 if isinstance(error, NotFoundError) else 400
         points, _count = revisions.list_revisions(tx, item)
+        has_file = revisions.has_file(tx, item)
         frozen = [change for change in list_releases(tx, item) if change.status in NUMBERED]
     return page(
         call,
@@ -270,6 +271,7 @@ def changes_page(
         frozen=frozen,
         by_whom=any(change.at for change in happenings),
         models=models,
+        has_file=has_file,
         counts=Counter(change.what for change in happenings),
         asked=Address("", {"from": since, "to": until}).url().removeprefix("?"),
     )
@@ -308,6 +310,7 @@ def _compare(
         rows = history.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
         at = {change.id: change.at for change in changes_listed}
         models = [revisions.files_until(tx, item, at.get(point, "")) for point in (first, second)]
+        has_file = revisions.has_file(tx, item)
     counts = {status: sum(row.status == status for row in rows) for status in STATUSES}
     shown = [
         (row, changes(row.before, row.after) if row.before and row.after else [])
@@ -326,6 +329,7 @@ def _compare(
         new=second,
         known=changes_listed,
         models=models,
+        has_file=has_file,
         show_all=show_all,
         latest=latest,
         problem=problem,

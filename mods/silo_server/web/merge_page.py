@@ -34,7 +34,7 @@ from silo_server.services.bom.merge import in_sentences, last_sync
 from silo_server.services.bom.review import Decision
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
-from silo_server.services.revisions import files_until
+from silo_server.services.revisions import files_until, has_file
 from silo_server.services.search import fits
 from silo_server.settings import DuplicateError, LinesChangedError
 from silo_server.values import Line, LineState
@@ -315,6 +315,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
         since += [conflict.since for conflict in review_of.conflicts]
         asked_at = min(filter(None, since), default=merge.at if merge else "")
         before = files_until(tx, item, asked_at, 2)[1:]
+        drawn = has_file(tx, item)
         assignee, people = review.assignee_of(tx, item), review.editors(tx)
     conflicts = {conflict.line.id: conflict for conflict in review_of.conflicts}
     editing = _editing(lines, asked, item)
@@ -353,6 +354,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
         of_cad=line_form.of_cad,
         by_sync=by_whom(merge) if merge else "",
         before=before,
+        has_file=drawn,
         last=last,
         gaps=in_sentences(last.gaps),
         unreferenced=review_of.unreferenced,
