@@ -207,6 +207,31 @@ def test_a_part_in_a_file_of_several_shows_its_own_body(visit: Visit, api: Api) 
         assert opened(page, path).get_attribute("data-ready") == "1"
 
 
+def test_items_without_a_picture_get_what_an_editor_sees(visit: Visit, api: Api) -> None:
+    """The product and each part in it, in its own colours on nothing; a viewer's browser sends nothing."""
+    top = machine(api, "M2")
+    parts = {one: f"M2-{one}" for one in ("PLATE", "BOLT", "GEARBOX", "GEAR", "SENSOR")}
+    names = {top, *parts.values()}
+    opened(visit("viewer"), f"/items/{top}")
+    assert not any(api.get(f"/api/items/{one}")["thumbnail_key"] for one in names)
+    page = visit("editor")
+    opened(page, f"/items/{top}")
+    assert {*api.get(f"/api/items/{top}/scene")["without_picture"]} <= names
+    wait_until(lambda: not api.get(f"/api/items/{top}/scene")["without_picture"], "all pictures")
+    pictures = {one: api.call("GET", f"/api/items/{one}/thumbnail").body for one in names}
+    assert {Image.open(io.BytesIO(one)).size for one in pictures.values()} == {(256, 256)}
+    assert has(pictures[parts["SENSOR"]], 130, least=80)
+    assert has(pictures[parts["GEAR"]], 30, least=80)
+    assert not has(pictures[parts["GEAR"]], 130, least=80)
+    assert has(pictures[top], 130, least=80)
+    for one in pictures.values():
+        clear = np.asarray(Image.open(io.BytesIO(one)))[:, :, 3]
+        assert clear[0, 0] == 0
+        assert 0.1 < (clear > 0).mean() < 0.9
+    page.goto("/items?q=M2-")
+    expect(page.locator("img.thumb")).to_have_count(6)
+
+
 def test_without_webgl_or_a_model_the_page_says_so(visit: Visit, api: Api, top: str) -> None:
     """A sentence in place of the model; nothing at all where there is none."""
     page = visit("viewer")

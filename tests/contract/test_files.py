@@ -119,6 +119,48 @@ def test_a_thumbnail_is_taken_from_an_fcstd_file(api: Api) -> None:
     assert api.call("GET", f"/api/items/{number}/thumbnail").body == PNG
 
 
+def png(width: int = 128, height: int = 128, more: bytes = b"") -> bytes:
+    """The frame of a PNG, with its size."""
+    head = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + width.to_bytes(4) + height.to_bytes(4) + b"\x08\x06\0\0\0"
+    return head + more + b"\0\0\0\0IEND\xaeB`\x82"
+
+
+def drawn(api: Api, number: str, picture: bytes) -> int:
+    """Send what a browser drew of an item."""
+    path = f"/api/items/{number}/thumbnail"
+    return api.call("PUT", path, body=picture, headers={"Content-Type": "image/png"}).status
+
+
+def test_an_item_without_a_picture_takes_what_a_browser_drew(api: Api) -> None:
+    """Only an item without a picture; bounded in bytes and pixels; no news, no new version, no revision."""
+    number = api.item()
+    before = api.get(f"/api/items/{number}")
+    for bad in (
+        b"", b"<svg/>", png()[:-1], png(15), png(128, 513), png(1 << 31), png(more=bytes(256 * 1024)),
+    ):  # fmt: skip
+        assert drawn(api, number, bad) == 400
+    assert drawn(api, "NO-SUCH", png()) == 404
+    assert api.get(f"/api/items/{number}") == before
+    assert drawn(api, number, png()) == 204
+    after = api.get(f"/api/items/{number}")
+    assert {name for name in before if before[name] != after[name]} == {"thumbnail_key"}
+    assert drawn(api, number, png(64)) == 409
+    assert api.call("GET", f"/api/items/{number}/thumbnail").body == png()
+
+
+def test_a_new_file_takes_a_drawn_picture_away(api: Api) -> None:
+    """That of its own file and those of the items that it holds; what came in a file stays."""
+    whole, a, b, other = api.items(4)
+    for number in (whole, a, b, other):
+        assert drawn(api, number, png()) == 204
+    upload(api, whole, b"new")
+    held = [{"item": api.get(f"/api/items/{one}")["id"], "object": one} for one in (a, b)]
+    body, form = form_body({"file": ("x.FCStd", b"two parts"), "items": json.dumps(held)})
+    api.good("POST", f"/api/documents/{uuid.uuid4()}/file", body=body, headers=form)
+    kept = [api.get(f"/api/items/{one}")["thumbnail_key"] is not None for one in (whole, a, b, other)]
+    assert kept == [False, False, False, True]
+
+
 def test_what_is_no_upload_is_refused(api: Api) -> None:
     """400 with what was wanted; nothing is stored."""
     number = api.item()

@@ -140,6 +140,7 @@ def test_a_scene_joins_the_newest_files_or_those_that_a_revision_recorded(api: A
     scene = api.get(f"/api/items/{top}/scene")
     assert (scene["part_number"], scene["revision"], scene["missing"]) == (top, 1, [])
     assert [len(scene[name]) for name in ("occurrences", "geometries")] == [4, 2]
+    assert sorted(scene["without_picture"]) == sorted([top, sub, leaf])
     bolt, plate = scene["occurrences"][:2]
     assert (bolt["path"], bolt["lines"]) == (["Link of Assembly", "Link of Body"], [sub, leaf])
     assert (bolt["part_number"], bolt["label"], bolt["key"]) == (leaf, "Bolt", "Body")

@@ -92,6 +92,7 @@ TABLE: dict[tuple[str, str], str] = {
     ("GET", "/api/items/{part_number}/file"): VIEWER,
     ("GET", "/api/items/{part_number}/file/{number}"): VIEWER,
     ("GET", "/api/items/{part_number}/thumbnail"): VIEWER,
+    ("PUT", "/api/items/{part_number}/thumbnail"): EDITOR,
     ("GET", "/api/items/{part_number}/bom"): VIEWER,
     ("POST", "/api/items/{part_number}/bom"): EDITOR,
     ("PUT", "/api/items/{part_number}/bom/{child}"): EDITOR,

@@ -656,12 +656,13 @@ class NotDrawn(Record):
 
 
 class Scene(Record):
-    """``GET /api/items/{partNumber}/scene``: where each part of a product stands."""
+    """``GET /api/items/{partNumber}/scene``: where each part of a product stands, and who has no picture."""
 
     part_number: str
     revision: int
     geometries: list[SceneGeometry] = Field(default_factory=list)
     occurrences: list[Occurrence] = Field(default_factory=list)
+    without_picture: list[str] = Field(default_factory=list)
     missing: list[NotDrawn] = Field(default_factory=list)
 
 

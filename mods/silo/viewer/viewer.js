@@ -62,13 +62,8 @@ class Viewer {
     this.scene = new THREE.Scene();
     this.scene.matrixWorldAutoUpdate = false; // bodies are placed once, not in each frame
     this.camera = new THREE.PerspectiveCamera(35, 1, 0.01, 100);
-    this.camera.up.set(0, 0, 1);
     this.camera.position.set(0.6, -1, 0.55);
-    const sun = new THREE.DirectionalLight(0xffffff, 1.9);
-    sun.position.set(-0.5, 0.9, 0);
-    sun.target.position.set(0, 0, -1);
-    this.camera.add(sun, sun.target);
-    this.scene.add(this.camera, new THREE.HemisphereLight(0xffffff, 0x878d96, 1.7));
+    Viewer.#shine(this.scene, this.camera);
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("start", () => (this.touched = true));
     this.controls.addEventListener("change", () => this.#turn());
@@ -81,6 +76,47 @@ class Viewer {
     this.canvas.addEventListener("pointerdown", (event) => (this.#pressed = event));
     this.canvas.addEventListener("click", (event) => this.#click(event));
     new ResizeObserver(() => this.draw()).observe(this.view);
+  }
+
+  static #shine(scene, camera) {
+    camera.up.set(0, 0, 1);
+    const sun = new THREE.DirectionalLight(0xffffff, 1.9);
+    sun.position.set(-0.5, 0.9, 0);
+    sun.target.position.set(0, 0, -1);
+    camera.add(sun, sun.target);
+    scene.add(camera, new THREE.HemisphereLight(0xffffff, 0x878d96, 1.7));
+  }
+
+  // A PNG of bodies alone, in their own colours, from where a model is first seen; drawn twice as fine.
+  picture(bodies, size) {
+    const { renderer } = this;
+    const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(35), box = new THREE.Box3();
+    Viewer.#shine(scene, camera);
+    for (const body of bodies) {
+      box.union(body.box);
+      for (const { geometry, userData } of body.meshes) {
+        const mesh = new THREE.Mesh(geometry, this.#material(userData.hex, userData.opacity, false));
+        mesh.matrixAutoUpdate = false;
+        mesh.matrix.copy(userData.home);
+        scene.add(mesh);
+      }
+    }
+    const { center, radius } = box.getBoundingSphere(new THREE.Sphere());
+    const distance = radius / Math.sin((camera.fov * Math.PI) / 360);
+    camera.position.set(0.6, -1, 0.55).setLength(distance).add(center);
+    camera.lookAt(center);
+    Object.assign(camera, { near: distance - radius, far: distance + radius });
+    camera.updateProjectionMatrix();
+    renderer.setPixelRatio(2);
+    renderer.setSize(size, size, false);
+    renderer.setScissorTest(false);
+    renderer.clippingPlanes = [];
+    renderer.render(scene, camera);
+    const made = Viewer.make("canvas", undefined, { width: size, height: size });
+    made.getContext("2d").drawImage(this.canvas, 0, 0, size, size);
+    this.#size = "";
+    this.#render(performance.now()); // before the page shows the canvas
+    return new Promise((done) => made.toBlob(done));
   }
 
   // pieces: { geometry, matrix, colour, opacity }; side -1: of the old state alone, 1: of the new one, 0: of both.

@@ -454,6 +454,27 @@ def thumbnail(call: Viewer, part_number: str, key: Annotated[str, Query(max_leng
     return FileResponse(path, media_type="image/png", headers={"Cache-Control": f"private, {kept}"})
 
 
+_PNG = {"image/png": {"schema": {"type": "string", "format": "binary"}}}
+_DRAWN = {
+    **context.refused("what is no PNG, too large a PNG"),
+    "requestBody": {"required": True, "content": _PNG},
+}
+
+
+@revisions_router.put("/thumbnail", status_code=204, responses=WRITE_ERRORS, openapi_extra=_DRAWN)
+async def put_thumbnail(call: Editor, part_number: str) -> Response:
+    """A picture of an item that has none: what a browser drew of its model. A new file takes it away."""
+    picture = await call.request.body()
+
+    def work() -> Response:
+        with call.write() as tx:
+            item = items.get_item(tx, part_number)
+            revisions.keep_picture(tx, call.server.files, item, picture)
+        return Response(status_code=204)
+
+    return await anyio.to_thread.run_sync(work)
+
+
 def store_file(
     call: Call,
     find: Find,

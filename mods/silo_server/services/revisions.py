@@ -12,6 +12,7 @@ Uploaded files are kept by their SHA-256: written once, never changed, never run
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import lzma
 import os
@@ -31,13 +32,13 @@ from sqlalchemy import ColumnElement, Row, delete, func, insert, select, update
 
 from silo.api.wire import FACTS, FactSource
 from silo.bom.compare import base_of, would_undo
-from silo.bom.errors import NewerRevisionError, NotFoundError
+from silo.bom.errors import NewerRevisionError, NotFoundError, RejectedError
 from silo.platform import no_device_name, remove_patiently, replace_patiently, sync_folder
 from silo_server import events
 from silo_server.db.engine import Tx, insert_rows, one_of
 from silo_server.db.tables import document_items, document_links, documents, items, revisions
 from silo_server.services.search import index_item
-from silo_server.settings import spec_time
+from silo_server.settings import DuplicateError, spec_time
 from silo_server.values import Document, Item, Revision, check_json, dumps, from_row, to_wire
 
 
@@ -128,6 +129,24 @@ def note_revision(
         for each_document, name in sorted(pairs)
     ]
     insert_rows(tx, document_items, rows)
+    # What a browser drew of an older file is out of date; the picture of an item's own file stays.
+    with_picture = (revisions.c.item_id == items.c.id) & (revisions.c.thumbnail_key == items.c.thumbnail_key)
+    own = select(revisions.c.id).where(with_picture).exists()
+    drawn = one_of(tx, items.c.id, {item for item, _ in pairs}) & items.c.thumbnail_key.is_not(None) & ~own
+    tx.conn.execute(update(items).where(drawn).values(thumbnail_key=None))
+
+
+def keep_picture(tx: Tx, store: FileStore, item: Item, picture: bytes) -> None:
+    """Give an item without a picture a PNG that a browser drew. Raises RejectedError, DuplicateError."""
+    if len(picture) > MAX_DRAWN or picture[:8] != PNG or picture[12:16] != b"IHDR" or picture[-12:] != PNG_END:
+        raise RejectedError(f"picture: wanted a whole PNG of at most {MAX_DRAWN // 1024} KiB, got another")
+    size = struct.unpack_from(">II", picture, 16)
+    if not 16 <= min(size) <= max(size) <= 512:
+        raise RejectedError(f"picture: wanted 16 to 512 pixels each way, got {size[0]} × {size[1]}")
+    kept = store.keep("picture.png", io.BytesIO(picture)).checksum
+    bare = (items.c.id == item.id) & items.c.thumbnail_key.is_(None)
+    if not tx.conn.execute(update(items).where(bare).values(thumbnail_key=kept)).rowcount:
+        raise DuplicateError(f"{item.subject} has a picture already; a new file takes it away")
 
 
 def documents_holding(tx: Tx, item: Item) -> list[Document]:
@@ -426,6 +445,8 @@ MAX_DIRECTORY = 4 * 1024 * 1024
 END_MARK = b"PK\x05\x06"
 END_SIZE = 22
 PNG = b"\x89PNG\r\n\x1a\n"
+PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
+MAX_DRAWN = 256 * 1024
 # Width and height in a PNG. Without a 3D view FreeCAD saves its icon, smaller than any picture that it takes.
 ICON = (64).to_bytes(4) * 2
 

@@ -313,6 +313,8 @@ def scene(tx: Tx, store: FileStore, item: Item, number: int | None) -> dict[str,
     for occurrence in joined.found:
         occurrence["lines"] = [numbers.get(uuid.lower(), "") for uuid in occurrence["lines"]]
         occurrence["part_number"] = occurrence["lines"][-1] if occurrence["lines"] else item.part_number
+    shown = {number for occurrence in joined.found for number in occurrence["lines"]} | {item.part_number}
+    bare = [each for each in (item, *items_by_uuid) if each.part_number in shown and not each.archived_at]
     for lost in joined.missing:
         lost["part_number"] = numbers.get(lost["part_number"].lower(), "")
     return {
@@ -327,6 +329,7 @@ def scene(tx: Tx, store: FileStore, item: Item, number: int | None) -> dict[str,
             for file in joined.drawn
         ],
         "occurrences": joined.found,
+        "without_picture": [each.part_number for each in bare if not each.thumbnail_key],
         "missing": list({tuple(occurrence.values()): occurrence for occurrence in joined.missing}.values()),
     }
 

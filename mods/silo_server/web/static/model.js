@@ -6,7 +6,7 @@ import { root } from "./root.js";
 import { _, words as translations } from "./words.js";
 
 const place = document.getElementById("model");
-const { item, now, before } = place.dataset;
+const { item, now, before, secret } = place.dataset;
 const address = `${root}/api/items/${encodeURIComponent(item)}`;
 const stage = place.querySelector(".stage");
 const legend = place.querySelector(".legend");
@@ -17,6 +17,8 @@ const KINDS = { added: "#1a9850", removed: "#d73027", "quantity changed": "#f5a6
 const SERIES = ["#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#76b7b2", "#edc948", "#9c755f"];
 const HEAVY = ["#fde0a0", "#fdae61", "#f46d43", "#d73027", "#7f0000"];
 const LOADED_AT_ONCE = 6;
+const PICTURES = 100; // of one look at a page
+const PIXELS = 256;
 
 let viewer = null;
 let shown = []; // the occurrences, of both states
@@ -249,6 +251,21 @@ function missing(list) {
   gone.lastElementChild.append(...list.map((one) => Viewer.make("li", `${title(one)}: ${one.why}`)));
 }
 
+// Items without a picture get what is drawn of them here, if whoever looks may change them.
+async function portray({ without_picture: numbers, missing }) {
+  for (const number of numbers.slice(0, PICTURES)) {
+    const each = shown.filter((one) => number === item || one.lines.includes(number));
+    const first = each.find((one) => !one.color) ?? each[0];
+    const branch = ({ path }) => key(path.slice(0, first.lines.indexOf(number) + 1)); // of the product itself: nothing
+    const list = each.filter((one) => branch(one) === branch(first));
+    if ((first.part_number !== number && missing.length) || list.some((one) => !one.body)) continue;
+    const body = await viewer.picture(bodies(list), PIXELS);
+    const headers = { "Content-Type": "image/png", "X-CSRF-Token": secret };
+    const answer = await fetch(`${root}/api/items/${encodeURIComponent(number)}/thumbnail`, { method: "PUT", headers, body });
+    if (!answer.ok && answer.status !== 409) return; // 409: somebody else was quicker
+  }
+}
+
 async function start() {
   const scenes = await Promise.all([before, now].map((revision) => (revision === undefined ? null : json(`${address}/scene${revision && `?revision=${revision}`}`))));
   const [old, fresh] = scenes.map((scene) => {
@@ -292,6 +309,7 @@ async function start() {
   const known = new Set(scenes[1]?.missing.map(title));
   missing([...(scenes[1]?.missing ?? []), ...[...undrawn].filter(([name]) => !known.has(name)).map(([, [one]]) => ({ ...one, why: _("its file has no geometry yet") }))]);
   place.dataset.ready = viewer.bodies.length;
+  if (secret) await portray(scenes[1]);
 }
 
 start();
