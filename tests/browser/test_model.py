@@ -156,6 +156,23 @@ def test_a_decision_shows_each_kind_of_change(visit: Visit, top: str) -> None:
     expect(legend.get_by_role("button", name="added (1)")).to_be_visible()
 
 
+def test_what_waits_leads_to_its_question_in_the_model(visit: Visit, api: Api, top: str) -> None:
+    """The model opens with the camera on the first question; a BOM without a model has no way to it."""
+    bare = api.items(2)
+    api.merge(bare[0], {bare[1]: 1})
+    api.merge(bare[0], {})
+    page = visit("viewer")
+    page.goto("/waiting")
+    expect(page.locator("tbody tr")).to_have_count(2)
+    expect(page.get_by_role("link", name="in the model")).to_have_count(1)
+    page.get_by_role("link", name=f"Show {top} in the model").click()
+    model = page.locator("#model[data-ready]")
+    model.wait_for()
+    expect(model.locator(".said")).to_have_text("1 of 2: M1-COVER Cover: CAD uses it no more")
+    assert amount(still(model.locator("canvas")), RED) > 3000
+    expect(model.locator("canvas")).to_be_in_viewport()
+
+
 WHERE = {
     "SENSOR Sensor · added · Sensor": GREEN,
     "COVER Cover · removed · Cover": RED,

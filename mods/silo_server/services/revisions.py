@@ -138,7 +138,8 @@ def note_revision(
 
 def keep_picture(tx: Tx, store: FileStore, item: Item, picture: bytes) -> None:
     """Give an item without a picture a PNG that a browser drew. Raises RejectedError, DuplicateError."""
-    if len(picture) > MAX_DRAWN or picture[:8] != PNG or picture[12:16] != b"IHDR" or picture[-12:] != PNG_END:
+    whole = picture.startswith(PNG + PNG_HEAD) and picture.endswith(PNG_END)
+    if len(picture) > MAX_DRAWN or not whole:
         raise RejectedError(f"picture: wanted a whole PNG of at most {MAX_DRAWN // 1024} KiB, got another")
     size = struct.unpack_from(">II", picture, 16)
     if not 16 <= min(size) <= max(size) <= 512:
@@ -445,7 +446,7 @@ MAX_DIRECTORY = 4 * 1024 * 1024
 END_MARK = b"PK\x05\x06"
 END_SIZE = 22
 PNG = b"\x89PNG\r\n\x1a\n"
-PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
+PNG_HEAD, PNG_END = b"\0\0\0\rIHDR", b"\0\0\0\0IEND\xaeB`\x82"
 MAX_DRAWN = 256 * 1024
 # Width and height in a PNG. Without a 3D view FreeCAD saves its icon, smaller than any picture that it takes.
 ICON = (64).to_bytes(4) * 2

@@ -83,16 +83,32 @@ def keep(tx: Tx, store: FileStore, checksum: str, part: Part, body: bytes) -> No
         fill_in(tx, store, checksum)
 
 
+# Items with the newest revisions of the documents that hold them.
+_held = (
+    item_rows.join(document_items, document_items.c.item_id == item_rows.c.id)
+    .join(documents, documents.c.id == document_items.c.document_id)
+    .join(
+        revisions,
+        (revisions.c.document_id == documents.c.id)
+        & (revisions.c.revision_number == documents.c.current_revision),
+    )
+)
+
+
+def with_model(tx: Tx, item_ids: Collection[int]) -> set[int]:
+    """Return which of these items have a model."""
+    of = _held.join(models, models.c.file_checksum == revisions.c.file_checksum)
+    query = select(item_rows.c.id).select_from(of).where(models.c.structure.is_not(None))
+    return set(tx.conn.scalars(query.where(one_of(tx, item_rows.c.id, item_ids))))
+
+
 def fill_in(tx: Tx, store: FileStore, checksum: str) -> None:
     """Give the items of which this is the newest file what it states of them."""
     kept = tx.conn.scalar(select(models.c.structure).where(models.c.file_checksum == checksum))
     structure = _structure(store, kept) if kept is not None else None
-    newest = revisions.c.revision_number == documents.c.current_revision
     held = (
         select(item_rows.c.part_number, document_items.c.object)
-        .join(document_items, document_items.c.item_id == item_rows.c.id)
-        .join(documents, documents.c.id == document_items.c.document_id)
-        .join(revisions, (revisions.c.document_id == documents.c.id) & newest)
+        .select_from(_held)
         .where(revisions.c.file_checksum == checksum, item_rows.c.archived_at.is_(None))
         .order_by(item_rows.c.id, document_items.c.object)
     )

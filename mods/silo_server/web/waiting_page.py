@@ -21,6 +21,7 @@ from silo_server.db.engine import Tx
 from silo_server.routes.context import Call
 from silo_server.services.bom import history, review
 from silo_server.services.bom.review import Action, Waiting, decide_all, lines_for, waiting
+from silo_server.services.scene import with_model
 from silo_server.services.search import fits
 from silo_server.values import Line
 from silo_server.web.accounts import Reader, Writer
@@ -247,12 +248,15 @@ def _show(
     ]
     order = arranged(waitings, view.get("sort", ""), _SORTS)
     table = page_of(order, len(rows), int(view.get("page", "1")), PAGE_SIZE)
+    with call.read() as tx:
+        drawn = with_model(tx, {row.item_id for row in table.rows})
     return page(
         call,
         "waiting.html",
         status=status,
         at=Address("/waiting", view),
         table=table,
+        drawn=drawn,
         waiting=len(rows),
         view=view,
         sort=view.get("sort", ""),

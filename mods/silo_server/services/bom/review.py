@@ -426,6 +426,7 @@ class Waiting(NamedTuple):
         what CAD says of its conflicts, by the child's internal id.
     """
 
+    item_id: int
     part_number: str
     name: str
     version: int
@@ -466,7 +467,7 @@ def waiting(tx: Tx) -> list[Waiting]:
     )
     waitings = [
         Waiting(
-            *(number, name, version, folder or "", file or "", at),
+            *(each_row, number, name, version, folder or "", file or "", at),
             *(
                 conflicts.get(each_row, nobody),
                 who or "",

@@ -308,6 +308,10 @@ async function start() {
   const undrawn = grouped(shown.filter((one) => !one.body), title);
   const known = new Set(scenes[1]?.missing.map(title));
   missing([...(scenes[1]?.missing ?? []), ...[...undrawn].filter(([name]) => !known.has(name)).map(([, [one]]) => ({ ...one, why: _("its file has no geometry yet") }))]);
+  if (location.hash === "#model") {
+    place.scrollIntoView();
+    viewer.go(1);
+  }
   place.dataset.ready = viewer.bodies.length;
   if (secret) await portray(scenes[1]);
 }
