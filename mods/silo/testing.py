@@ -41,7 +41,6 @@ from silo.api.wire import (
     Revision,
     ServerState,
     User,
-    WhereUsedLine,
 )
 from silo.bom.compare import apply_merge, base_of, plan_merge, summary, would_undo
 from silo.bom.errors import (
@@ -547,20 +546,6 @@ class FakeSilo(FakeStore):
     def get_summary(self, part_number: str, /) -> ProductSummary | None:
         """None: this Silo keeps no summaries."""
         return None
-
-    def where_used(self, part_number: str, /) -> list[WhereUsedLine]:
-        number = self.get_item(part_number).part_number
-        return [
-            WhereUsedLine(
-                parent_part_number=stored.item.part_number,
-                parent_description=stored.item.description,
-                quantity=line["quantity"],
-                source=line["source"],
-            )
-            for _, stored in sorted(self.items.items())
-            for line in stored.lines
-            if line["child_part_number"] == number
-        ]
 
     def add_bom_line(self, part_number: str, child: str, /, **values: Any) -> BomLine:
         line = body(LineBody, {"quantity": 1, **values, "child_part_number": child}, "a BOM line")

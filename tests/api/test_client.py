@@ -355,13 +355,12 @@ FOUND = {"id": "11111111-1111-4111-8111-111111111111", "part_number": "F01-0001"
 
 def test_an_empty_list_may_be_null(server: Any, client: SiloClient) -> None:
     """Go's nil."""
-    for path in ("bom", "bom/where-used", "revisions"):
+    for path in ("bom", "revisions"):
         server.on(f"GET /api/items/A01-0001/{path}", "null")
     server.on("GET /api/items/search", "null")
     number = "A01-0001"
     for empty in (
         client.get_bom(number),
-        client.where_used(number),
         client.revisions(number),
         client.search_items("x"),
     ):

@@ -318,15 +318,6 @@ def test_a_version_that_is_not_the_newest_is_refused(silo: Silo) -> None:
     assert lines(silo, top) == {part: (2, "assembly", False)}
 
 
-def test_an_item_is_used_where_it_is_on_a_bom(silo: Silo) -> None:
-    """Directly; what uses its parent is the parent's."""
-    top, sub = make(silo, "Top", "A01"), make(silo, "Gearbox", "A01")
-    gear = make(silo, "Gear")
-    merge(silo, sub, **{key(gear): 4})
-    merge(silo, top, **{key(sub): 2})
-    assert [(use.parent_part_number, use.quantity) for use in silo.where_used(gear)] == [(sub, 4)]
-
-
 def test_a_line_is_edited_and_removed_by_hand(silo: Silo) -> None:
     """A person's quantity makes the line the person's."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")

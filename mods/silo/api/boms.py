@@ -32,7 +32,6 @@ from silo.api.wire import (
     ProductSummary,
     Quantity,
     QuantityLine,
-    WhereUsedLine,
 )
 from silo.bom.compare import answer_of, conflict_warning, is_manual, plan_merge, same_quantity, says_the_same
 from silo.bom.errors import (
@@ -285,12 +284,6 @@ class BomCalls(Caller):
     def get_bom_version(self, part_number: str, /) -> str | None:
         """The version of the BOM as it is now, for ``if_match``; None where the server keeps none."""
         return self._get(f"the BOM of {part_number}", *_bom(part_number)).version()
-
-    def where_used(self, part_number: str, /) -> list[WhereUsedLine]:
-        """The parents that have this item on their BOM; all of them, from however many pages."""
-        where = (f"the uses of {part_number}", *_bom(part_number), "where-used")
-        pages = self._all(WhereUsedLine, *where, keys=("where_used", "parents"))
-        return [line for page, _ in pages for line in page]
 
     def merge_bom(
         self,

@@ -666,19 +666,6 @@ class Scene(Record):
     missing: list[NotDrawn] = Field(default_factory=list)
 
 
-class WhereUsedLine(Record):
-    """A parent that has the item on its BOM."""
-
-    parent_part_number: str = Field(validation_alias=AliasChoices("parent_part_number", "part_number"))
-    parent_description: str = Field(
-        default="", validation_alias=AliasChoices("parent_description", "description")
-    )
-    quantity: Number | None = None
-    unit: str | None = None
-    rel_type: str = "component"
-    source: Annotated[Source, BeforeValidator(_known_source)] = "assembly"
-
-
 class User(Record):
     """Who a token belongs to."""
 

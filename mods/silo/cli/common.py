@@ -287,13 +287,13 @@ def client_of(
         yield client
 
 
-def read_assembly(top: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
+def read_assembly(top: str) -> Extraction:
     """The BOM of a file, read without FreeCAD; missing files come with the ones that were probably meant."""
     from silo.fcstd import Library
 
     with Library() as library:
         document = library.open(top)
-        extraction = extract(choose_assembly(document, assembly), hardware=hardware)
+        extraction = extract(choose_assembly(document))
         findings = respelt_findings(library.notes, document.FileName)
     return _with_suggestions(replace(extraction, findings=(*extraction.findings, *findings)))
 

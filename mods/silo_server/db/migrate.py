@@ -2,9 +2,9 @@
 """Bring a database to the newest schema; run at every start, by one process at a time.
 
 A change of a table is a new step at the end of :data:`STEPS`; what a step does stays. A step makes a table as
-it is in :mod:`silo_server.db.tables`: a change that comes later writes the table out, as it was, in the step
-that makes it (``tests/server/test_migrations.py`` fails until then). The first step has the identifier of the
-last of the seven steps that led to it, so that a database made by them opens.
+it is in :mod:`silo_server.db.tables`: a change that comes later is taken out again in the step that makes the
+table, as ``_first_schema`` does it (``tests/server/test_migrations.py`` fails until then). The first step has
+the identifier of the last of the seven steps that led to it, so that a database made by them opens.
 ``alembic_version`` holds the newest step that a database has.
 """
 
@@ -34,7 +34,7 @@ from sqlalchemy import (
 
 from silo.bom.errors import ConfigError
 from silo_server.db.engine import MIGRATION_LOCK, Database
-from silo_server.db.tables import NAMES, Id, Key, Stamp, Uuid, metadata
+from silo_server.db.tables import NAMES, Id, Stamp, metadata
 
 if TYPE_CHECKING:
     from alembic.operations import Operations
@@ -98,38 +98,16 @@ def _add(*names: str) -> Callable[[Operations], None]:
 def _first_schema(op: Operations) -> None:
     """Make the tables of the first schema."""
     before = MetaData(naming_convention=NAMES)
-    Table(
-        "items",
-        before,
-        Column("id", Id, primary_key=True),
-        Column("uuid", Uuid, nullable=False, unique=True),
-        Column("part_number", String(64), nullable=False),
-        Column("part_number_key", Key, nullable=False, unique=True),
-        Column("schema_name", String(64)),
-        Column("category", String(32)),
-        Column("item_type", String(32), nullable=False),
-        Column("name", Text, nullable=False),
-        Column("description", Text, nullable=False),
-        Column("sourcing_type", String(64)),
-        Column("long_description", Text),
-        Column("thumbnail_key", String(64)),
-        Column("properties", Text, nullable=False),
-        Column("current_revision", Integer, nullable=False),
-        Column("bom_version", Integer, nullable=False),
-        Column("version", Integer, nullable=False, server_default="1"),
-        Column("created_as", String(64)),
-        Column("created_at", Stamp, nullable=False),
-        Column("created_by", String(64), nullable=False),
-        Column("updated_at", Stamp, nullable=False),
-        Column("updated_by", String(64), nullable=False),
-        Column("archived_at", Stamp),
-        Index(None, "archived_at", "part_number_key"),
-        Index(None, "archived_at", "name", "part_number_key"),
-        Index(None, "archived_at", "updated_at", "part_number_key"),
-        Index(None, "item_type", "archived_at", "part_number_key"),
-        Index(None, "category", "archived_at", "part_number_key"),
-        sqlite_autoincrement=True,
-    )
+    _add(
+        *("server_state", "items", "number_counters", "bom_lines", "bom_changes", "bom_change_lines"),
+        *("bom_conflicts", "bom_last_syncs", "events", "users", "api_tokens", "sessions", "login_links"),
+        "audit",
+    )(op)
+    for table, later in (("items", ("supplier_parts", "origins", "made_from")), ("users", ("approver",))):
+        for name in later:
+            op.drop_column(table, name)
+    op.add_column("items", Column("created_as", String(64)))
+    Table("items", before, Column("id", Id, primary_key=True))
     Table(
         "revisions",
         before,
@@ -167,19 +145,6 @@ def _first_schema(op: Operations) -> None:
         Index(None, "at"),
     )
     Table(
-        "users",
-        before,
-        Column("id", Id, primary_key=True),
-        Column("username", String(64), nullable=False),
-        Column("username_key", String(64), nullable=False, unique=True),
-        Column("display_name", Text, nullable=False),
-        Column("role", String(16), nullable=False),
-        Column("password_hash", Text),
-        Column("active", Boolean, nullable=False),
-        Column("created_at", Stamp, nullable=False),
-        sqlite_autoincrement=True,
-    )
-    Table(
         "login_failures",
         before,
         Column("id", Id, primary_key=True),
@@ -191,21 +156,6 @@ def _first_schema(op: Operations) -> None:
         sqlite_autoincrement=True,
     )
     before.create_all(op.get_bind())
-    same = (
-        "server_state",
-        "number_counters",
-        "bom_lines",
-        "bom_changes",
-        "bom_change_lines",
-        "bom_conflicts",
-        "bom_last_syncs",
-        "events",
-        "api_tokens",
-        "sessions",
-        "login_links",
-        "audit",
-    )
-    _add(*same)(op)
     # The server fills the index of the search at its next start (``silo_server.services.search``).
     if op.get_bind().dialect.name == "sqlite":
         op.execute(

@@ -151,10 +151,10 @@ def unpacked(packed: str) -> UnsentForm | None:
         return None
 
 
-def local_path(target: str, otherwise: str = "/") -> str:
+def local_path(target: str) -> str:
     """``target`` where it is a path of this server, else the start page: nobody is sent elsewhere."""
     plain = target.startswith("/") and not target.startswith(("//", "/\\"))
-    return target if plain and target.isprintable() else otherwise
+    return target if plain and target.isprintable() else "/"
 
 
 def own_site(request: Request) -> bool | None:
