@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Bring a database to the newest schema; run at every start, by one process at a time.
 
-A change of a table is a new step at the end of :data:`STEPS`; what a step does stays. A step makes a table as
-it is in :mod:`silo_server.db.tables`: a change that comes later is taken out again in the step that makes the
-table, as ``_first_schema`` does it (``tests/server/test_migrations.py`` fails until then). The first step has
-the identifier of the last of the seven steps that led to it, so that a database made by them opens.
+A change of a table is a new step at the end of :data:`STEPS`; a step that is there stays as it is. The first
+has the identifier of the last of the seven steps that led to it, so that a database made by them opens.
 ``alembic_version`` holds the newest step that a database has.
 """
 
@@ -12,12 +10,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import (
     BigInteger,
     Boolean,
     Column,
+    Float,
     ForeignKey,
     Index,
     Integer,
@@ -30,14 +29,20 @@ from sqlalchemy import (
     func,
     literal,
     select,
+    text,
 )
 
 from silo.bom.errors import ConfigError
 from silo_server.db.engine import MIGRATION_LOCK, Database
-from silo_server.db.tables import NAMES, Id, Stamp, metadata
+from silo_server.db.tables import NAMES
 
 if TYPE_CHECKING:
     from alembic.operations import Operations
+
+Id = BigInteger().with_variant(Integer, "sqlite")
+Stamp = String(32)
+Key = String(64).with_variant(String(64, collation="C"), "postgresql")
+Uuid = String(36)
 
 
 def upgrade(db: Database, revision: str = "") -> None:
@@ -89,28 +94,61 @@ def check_revision(revision: str, holder: str = "database") -> None:
     )
 
 
-def _add(*names: str) -> Callable[[Operations], None]:
-    """Return a step that makes these tables as they are today."""
-    made = [metadata.tables[name] for name in names]
-    return lambda op: metadata.create_all(op.get_bind(), tables=made)
+def _only(condition: str) -> dict[str, Any]:
+    return {"sqlite_where": text(condition), "postgresql_where": text(condition)}
 
 
 def _first_schema(op: Operations) -> None:
     """Make the tables of the first schema."""
-    before = MetaData(naming_convention=NAMES)
-    _add(
-        *("server_state", "items", "number_counters", "bom_lines", "bom_changes", "bom_change_lines"),
-        *("bom_conflicts", "bom_last_syncs", "events", "users", "api_tokens", "sessions", "login_links"),
-        "audit",
-    )(op)
-    for table, later in (("items", ("supplier_parts", "origins", "made_from")), ("users", ("approver",))):
-        for name in later:
-            op.drop_column(table, name)
-    op.add_column("items", Column("created_as", String(64)))
-    Table("items", before, Column("id", Id, primary_key=True))
+    metadata = MetaData(naming_convention=NAMES)
+    Table(
+        "server_state",
+        metadata,
+        Column("key", String(64), primary_key=True),
+        Column("value", Text, nullable=False),
+    )
+    Table(
+        "items",
+        metadata,
+        Column("id", Id, primary_key=True),
+        Column("uuid", Uuid, nullable=False, unique=True),
+        Column("part_number", String(64), nullable=False),
+        Column("part_number_key", Key, nullable=False, unique=True),
+        Column("schema_name", String(64)),
+        Column("category", String(32)),
+        Column("item_type", String(32), nullable=False),
+        Column("name", Text, nullable=False),
+        Column("description", Text, nullable=False),
+        Column("sourcing_type", String(64)),
+        Column("long_description", Text),
+        Column("thumbnail_key", String(64)),
+        Column("properties", Text, nullable=False),
+        Column("current_revision", Integer, nullable=False),
+        Column("bom_version", Integer, nullable=False),
+        Column("version", Integer, nullable=False, server_default="1"),
+        Column("created_as", String(64)),
+        Column("created_at", Stamp, nullable=False),
+        Column("created_by", String(64), nullable=False),
+        Column("updated_at", Stamp, nullable=False),
+        Column("updated_by", String(64), nullable=False),
+        Column("archived_at", Stamp),
+        Index(None, "archived_at", "part_number_key"),
+        Index(None, "archived_at", "name", "part_number_key"),
+        Index(None, "archived_at", "updated_at", "part_number_key"),
+        Index(None, "item_type", "archived_at", "part_number_key"),
+        Index(None, "category", "archived_at", "part_number_key"),
+        sqlite_autoincrement=True,
+    )
+    Table(
+        "number_counters",
+        metadata,
+        Column("schema_name", String(64), primary_key=True),
+        Column("category", String(32), primary_key=True),
+        Column("last_serial", Integer, nullable=False),
+    )
     Table(
         "revisions",
-        before,
+        metadata,
         Column("id", Id, primary_key=True),
         Column("item_id", Id, ForeignKey("items.id"), nullable=False),
         Column("revision_number", Integer, nullable=False),
@@ -133,8 +171,63 @@ def _first_schema(op: Operations) -> None:
         sqlite_autoincrement=True,
     )
     Table(
+        "bom_lines",
+        metadata,
+        Column("id", Uuid, primary_key=True),
+        Column("parent_id", Id, ForeignKey("items.id"), nullable=False),
+        Column("child_id", Id, ForeignKey("items.id"), nullable=False),
+        Column("position", Integer, nullable=False),
+        Column("rel_type", String(16), nullable=False),
+        Column("quantity", Float(53), nullable=False),
+        Column("unit", String(32)),
+        Column("reference_designators", Text, nullable=False),
+        Column("find_number", String(32)),
+        Column("notes", Text),
+        Column("child_revision", Integer),
+        Column("source", String(16), nullable=False),
+        Column("unreferenced_since", Stamp),
+        Column("override", Boolean, nullable=False),
+        Column("cad_quantity", Float(53)),
+        Column("reason", Text),
+        Column("metadata", Text, nullable=False),
+        UniqueConstraint("parent_id", "child_id", "rel_type"),
+        Index(None, "child_id"),
+        Index("ix_bom_lines_unreferenced", "parent_id", **_only("unreferenced_since IS NOT NULL")),
+    )
+    Table(
+        "bom_changes",
+        metadata,
+        Column("id", Id, primary_key=True),
+        Column("parent_id", Id, ForeignKey("items.id"), nullable=False),
+        Column("version", Integer, nullable=False),
+        Column("kind", String(16), nullable=False),
+        Column("at", Stamp, nullable=False),
+        Column("username", String(64), nullable=False),
+        Column("summary", Text, nullable=False),
+        Column("reason", Text),
+        Column("document_file", Text),
+        Column("document_sha256", String(64)),
+        Column("document_revision", Integer),
+        Column("sync_id", String(128)),
+        Column("refers_to", Id),
+        Column("decisions", Text),
+        Index(None, "parent_id", "id"),
+        sqlite_autoincrement=True,
+    )
+    Table(
+        "bom_change_lines",
+        metadata,
+        Column("change_id", Id, ForeignKey("bom_changes.id"), primary_key=True),
+        Column("line_id", Uuid, primary_key=True),
+        Column("child_id", Id, nullable=False),
+        Column("position", Integer, nullable=False),
+        Column("action", String(16), nullable=False),
+        Column("before", Text),
+        Column("after", Text),
+    )
+    Table(
         "bom_syncs",
-        before,
+        metadata,
         Column("parent_id", Id, ForeignKey("items.id"), primary_key=True),
         Column("sync_id", String(128), primary_key=True),
         Column("request_hash", String(64), nullable=False),
@@ -145,8 +238,90 @@ def _first_schema(op: Operations) -> None:
         Index(None, "at"),
     )
     Table(
+        "bom_conflicts",
+        metadata,
+        Column("parent_id", Id, ForeignKey("items.id"), primary_key=True),
+        Column("child_id", Id, ForeignKey("items.id"), primary_key=True),
+        Column("cad_quantity", Float(53), nullable=False),
+        Column("since", Stamp, nullable=False),
+        Column("accepted", Boolean, nullable=False),
+    )
+    Table(
+        "bom_last_syncs",
+        metadata,
+        Column("parent_id", Id, ForeignKey("items.id"), primary_key=True),
+        Column("at", Stamp),
+        Column("username", String(64), nullable=False),
+        Column("document_file", Text),
+        Column("left_out", Text, nullable=False),
+        Column("components", Text, nullable=False),
+        Column("refused_at", Stamp),
+        Column("refusal", Text),
+        Column("folder", Text),
+        Index("ix_bom_last_syncs_open", "parent_id", **_only("left_out <> '[]' OR refused_at IS NOT NULL")),
+    )
+    Table(
+        "events",
+        metadata,
+        Column("id", Id, primary_key=True),
+        Column("name", String(64), nullable=False),
+        Column("item_uuid", Uuid),
+        Column("part_number_key", String(64)),
+        Column("data", Text, nullable=False),
+        Column("at", Stamp, nullable=False),
+        Column("username", String(64)),
+        sqlite_autoincrement=True,
+    )
+    Table(
+        "users",
+        metadata,
+        Column("id", Id, primary_key=True),
+        Column("username", String(64), nullable=False),
+        Column("username_key", String(64), nullable=False, unique=True),
+        Column("display_name", Text, nullable=False),
+        Column("role", String(16), nullable=False),
+        Column("password_hash", Text),
+        Column("active", Boolean, nullable=False),
+        Column("created_at", Stamp, nullable=False),
+        sqlite_autoincrement=True,
+    )
+    Table(
+        "api_tokens",
+        metadata,
+        Column("id", Id, primary_key=True),
+        Column("user_id", Id, ForeignKey("users.id"), nullable=False),
+        Column("name", Text, nullable=False),
+        Column("token_hash", String(64), nullable=False, unique=True),
+        Column("prefix", String(16), nullable=False),
+        Column("scope", String(8), nullable=False, server_default="admin"),
+        Column("created_at", Stamp, nullable=False),
+        Column("expires_at", Stamp),
+        Column("last_used_at", Stamp),
+        Column("revoked_at", Stamp),
+        Index(None, "user_id"),
+        sqlite_autoincrement=True,
+    )
+    Table(
+        "sessions",
+        metadata,
+        Column("id_hash", String(64), primary_key=True),
+        Column("user_id", Id, ForeignKey("users.id"), nullable=False),
+        Column("csrf_token", String(64), nullable=False),
+        Column("by_link", Boolean, nullable=False, server_default=false()),
+        Column("created_at", Stamp, nullable=False),
+        Column("expires_at", Stamp, nullable=False),
+        Index(None, "user_id"),
+    )
+    Table(
+        "login_links",
+        metadata,
+        Column("token_hash", String(64), primary_key=True),
+        Column("user_id", Id, ForeignKey("users.id"), nullable=False),
+        Column("expires_at", Stamp, nullable=False),
+    )
+    Table(
         "login_failures",
-        before,
+        metadata,
         Column("id", Id, primary_key=True),
         Column("username_key", String(64), nullable=False),
         Column("address", String(64), nullable=False),
@@ -155,9 +330,21 @@ def _first_schema(op: Operations) -> None:
         Index(None, "address", "at"),
         sqlite_autoincrement=True,
     )
-    before.create_all(op.get_bind())
+    Table(
+        "audit",
+        metadata,
+        Column("id", Id, primary_key=True),
+        Column("at", Stamp, nullable=False),
+        Column("username", String(64), nullable=False),
+        Column("action", String(64), nullable=False),
+        Column("target", Text, nullable=False),
+        Column("detail", Text, nullable=False),
+        Column("address", String(64), nullable=False),
+        sqlite_autoincrement=True,
+    )
+    metadata.create_all(connection := op.get_bind())
     # The server fills the index of the search at its next start (``silo_server.services.search``).
-    if op.get_bind().dialect.name == "sqlite":
+    if connection.dialect.name == "sqlite":
         op.execute(
             "CREATE VIRTUAL TABLE item_search USING fts5(number, name, other, detail=column, columnsize=0, "
             "prefix='2 3 4', tokenize=\"unicode61 remove_diacritics 0 categories 'L* N* Co Cn'\")"
@@ -169,7 +356,17 @@ def _first_schema(op: Operations) -> None:
 
 def _answers(op: Operations) -> None:
     """Keep answers to repeated requests of all kinds, in place of those to two kinds."""
-    _add("answers")(op)
+    op.create_table(
+        "answers",
+        Column("subject", String(64), primary_key=True),
+        Column("key", String(128), primary_key=True),
+        Column("request_hash", String(64), nullable=False),
+        Column("answer", Text, nullable=False),
+        Column("version", Integer, nullable=False),
+        Column("at", Stamp, nullable=False),
+        Column("change_id", Id),
+        Index(None, "at"),
+    )
     op.drop_table("bom_syncs")
     op.drop_column("items", "created_as")
     with op.batch_alter_table("revisions", table_kwargs={"sqlite_autoincrement": True}) as batch:
@@ -180,7 +377,17 @@ def _answers(op: Operations) -> None:
 def _login_attempts(op: Operations) -> None:
     """Keep how each attempt to log in ended."""
     op.drop_table("login_failures")
-    _add("login_attempts")(op)
+    op.create_table(
+        "login_attempts",
+        Column("id", Id, primary_key=True),
+        Column("username_key", String(64), nullable=False),
+        Column("address", String(64), nullable=False),
+        Column("outcome", String(16), nullable=False),
+        Column("at", Stamp, nullable=False),
+        Index(None, "username_key", "at"),
+        Index(None, "address", "at"),
+        sqlite_autoincrement=True,
+    )
 
 
 def _documents(op: Operations) -> None:
@@ -188,7 +395,29 @@ def _documents(op: Operations) -> None:
 
     Each item that has a file gets a document with the item's UUID, whose revisions are the item's.
     """
-    _add("documents", "document_items", "document_links")(op)
+    op.create_table(
+        "documents",
+        Column("id", Id, primary_key=True),
+        Column("uuid", Uuid, nullable=False, unique=True),
+        Column("item_id", Id, ForeignKey("items.id"), unique=True),
+        Column("current_revision", Integer, nullable=False),
+        Column("created_at", Stamp, nullable=False),
+        Column("created_by", String(64), nullable=False),
+        sqlite_autoincrement=True,
+    )
+    op.create_table(
+        "document_items",
+        Column("document_id", Id, ForeignKey("documents.id"), primary_key=True),
+        Column("item_id", Id, ForeignKey("items.id"), primary_key=True),
+        Column("object", String(200), primary_key=True),
+        Index(None, "item_id"),
+    )
+    op.create_table(
+        "document_links",
+        Column("document_id", Id, ForeignKey("documents.id"), primary_key=True),
+        Column("target", Uuid, primary_key=True),
+        Index(None, "target"),
+    )
     with op.batch_alter_table("revisions", table_kwargs={"sqlite_autoincrement": True}) as batch:
         batch.alter_column("item_id", existing_type=Id, nullable=True)
         batch.add_column(Column("document_id", Id))
@@ -238,16 +467,114 @@ def _documents(op: Operations) -> None:
         )
 
 
+def _product_summaries(op: Operations) -> None:
+    """Keep the summary of each product over its whole graph."""
+    op.create_table(
+        "product_summaries",
+        Column("item_id", Id, autoincrement=False, primary_key=True),
+        Column("summary", Text, nullable=False),
+        Column("sets", Text, nullable=False),
+    )
+
+
+def _product_looks(op: Operations) -> None:
+    """Keep who looked at a product, and when."""
+    op.create_table(
+        "product_looks",
+        Column("user_id", Id, primary_key=True),
+        Column("item_id", Id, primary_key=True),
+        Column("at", Stamp, nullable=False),
+        Column("since", Stamp),
+    )
+
+
 def _releases(op: Operations) -> None:
     """Keep released revisions of products, who may approve them, and what is frozen of each item."""
     op.add_column("users", Column("approver", Boolean, nullable=False, server_default=false()))
-    _add("frozen_items", "releases", "release_approvals")(op)
+    op.create_table(
+        "frozen_items",
+        Column("hash", String(64), primary_key=True),
+        Column("record", Text, nullable=False),
+    )
+    op.create_table(
+        "releases",
+        Column("id", Id, primary_key=True),
+        Column("item_id", Id, ForeignKey("items.id"), nullable=False),
+        Column("label", String(16), nullable=False),
+        Column("status", String(16), nullable=False),
+        Column("record", String(64), ForeignKey("frozen_items.hash"), nullable=False),
+        Column("with_parts", Boolean, nullable=False),
+        Column("blocks", Text, nullable=False),
+        Column("comment", Text, nullable=False),
+        Column("frozen_at", Stamp, nullable=False),
+        Column("created_by", String(64), nullable=False),
+        Column("ended_at", Stamp),
+        Column("ended_by", String(64)),
+        Column("note", Text, nullable=False),
+        Column("override", Text),
+        Index(
+            "uq_releases_item_id_label",
+            *("item_id", "label"),
+            unique=True,
+            **_only("status IN ('review', 'released', 'obsolete')"),
+        ),
+        Index("uq_releases_in_review", "item_id", unique=True, **_only("status = 'review'")),
+        Index(None, "record"),
+        sqlite_autoincrement=True,
+    )
+    op.create_table(
+        "release_approvals",
+        Column("release_id", Id, ForeignKey("releases.id"), primary_key=True),
+        Column("username", String(64), primary_key=True),
+        Column("at", Stamp, nullable=False),
+        Column("comment", Text, nullable=False),
+    )
+
+
+def _models(op: Operations) -> None:
+    """Keep what is drawn of a file, by its content."""
+    op.create_table(
+        "models",
+        Column("file_checksum", String(64), primary_key=True),
+        Column("geometry", String(64)),
+        Column("geometry_size", BigInteger),
+        Column("structure", String(64)),
+    )
 
 
 def _supplier_parts_and_orders(op: Operations) -> None:
     """Keep supplier parts of items, their changes, and orders."""
     op.add_column("items", Column("supplier_parts", Text))
-    _add("supplier_changes", "orders")(op)
+    op.create_table(
+        "supplier_changes",
+        Column("id", Id, primary_key=True),
+        Column("item_id", Id, ForeignKey("items.id"), nullable=False),
+        Column("at", Stamp, nullable=False),
+        Column("username", String(64), nullable=False),
+        Column("before", Text, nullable=False),
+        Column("after", Text, nullable=False),
+        Index(None, "item_id", "id"),
+        sqlite_autoincrement=True,
+    )
+    op.create_table(
+        "orders",
+        Column("id", Id, primary_key=True),
+        Column("product_id", Id, ForeignKey("items.id"), nullable=False),
+        Column("item_id", Id, ForeignKey("items.id"), nullable=False),
+        Column("at", Stamp, nullable=False),
+        Column("username", String(64), nullable=False),
+        Column("quantity", String(64), nullable=False),
+        Column("unit", String(32)),
+        Column("supplier", Text, nullable=False),
+        Column("number", Text, nullable=False),
+        Column("price", String(64)),
+        Column("currency", String(3)),
+        Column("note", Text, nullable=False),
+        Column("ended_at", Stamp),
+        Column("ended_by", String(64)),
+        Index(None, "product_id"),
+        sqlite_autoincrement=True,
+    )
 
 
 def _origins_of_facts(op: Operations) -> None:
@@ -266,16 +593,34 @@ def _origins_of_facts(op: Operations) -> None:
             bind.execute(items.update().where(items.c.id == number).values(changed))
 
 
+def _follows_and_assignees(op: Operations) -> None:
+    """Keep what people follow, and who settles what is open in a BOM."""
+    op.create_table(
+        "follows",
+        Column("user_id", Id, primary_key=True),
+        Column("target", String(1024), primary_key=True),
+        Column("seen", Stamp, nullable=False),
+        Column("event", Id, nullable=False),
+    )
+    op.create_table(
+        "assignees",
+        Column("item_id", Id, autoincrement=False, primary_key=True),
+        Column("user_id", Id, nullable=False),
+        Column("at", Stamp, nullable=False),
+        Index(None, "user_id"),
+    )
+
+
 STEPS: dict[str, Callable[[Operations], None]] = {
     "0007": _first_schema,
     "0008": _answers,
     "0009": _login_attempts,
     "0011": _documents,
-    "0012": _add("product_summaries"),
-    "0013": _add("product_looks"),
+    "0012": _product_summaries,
+    "0013": _product_looks,
     "0014": _releases,
-    "0015": _add("models"),
+    "0015": _models,
     "0016": _supplier_parts_and_orders,
     "0017": _origins_of_facts,
-    "0018": _add("follows", "assignees"),
+    "0018": _follows_and_assignees,
 }
