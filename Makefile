@@ -6,8 +6,10 @@ VENV ?= .venv
 # than it has.
 WORKERS ?= $(shell n=$$(getconf _NPROCESSORS_ONLN || echo 2); n=$$((n + (n + 1) / 2)); echo $$((n < 8 ? n : 8)))
 # The queue and the databases write through to the disk, thousands of times: in memory that takes no time. Only where
-# /dev/shm has room for all tests, and programs may be started there.
+# /dev/shm has room for all tests, as much memory again is free for the tests themselves, and programs may be started
+# there.
 MEMORY := $(shell df -Pk /dev/shm 2>/dev/null | awk '$$6 == "/dev/shm" && $$4 > 6000000 {print "/dev/shm"}')
+MEMORY := $(shell awk '$$1 == "MemAvailable:" && $$2 > 12000000 {print "$(MEMORY)"}' /proc/meminfo 2>/dev/null)
 ifneq ($(MEMORY),)
 IN_MEMORY := $(shell probe=$$(mktemp $(MEMORY)/silo-XXXXXX) && echo exit >$$probe && chmod 700 $$probe && \
     $$probe && echo TMPDIR=$(MEMORY); rm -f $$probe)
