@@ -384,8 +384,10 @@ class AddOn:
         identity = self.desk.identity(doc)
         if not doc.FileName or not identity:
             name = plain(os.path.basename(doc.FileName) or doc.Label, 80)
-            text = translate("Silo", "{name} has no Silo part number yet. Register it first.")
-            self.desk.warn(translate("Silo", "History"), text.replace("{name}", name))
+            self.desk.warn(
+                translate("Silo", "History"),
+                translate("Silo", "{name} has no Silo part number yet. Register it first.", name=name),
+            )
             return
         self._window = HistoryDialog(self.revisions, host.main_window(), doc.FileName)
         self._window.show()
@@ -554,5 +556,8 @@ def _told(count: int) -> None:
     if not count:
         host.warning(translate("Silo", "[Silo] These objects are not in the document any more."))
     elif count > host.MOST_SELECTED:
-        text = translate("Silo", "[Silo] The first {n} of {all} objects are selected.")
-        host.message(text.replace("{n}", str(host.MOST_SELECTED)).replace("{all}", str(count)))
+        host.message(
+            translate(
+                "Silo", "[Silo] The first {n} of {all} objects are selected.", n=host.MOST_SELECTED, all=count
+            )
+        )

@@ -327,9 +327,12 @@ def _report_copies() -> None:
     places = Path(host.user_data_folder(), "Mod").glob("*/mods/silo/workbench/start.py")
     folders = ", ".join(sorted(str(place.parents[3]) for place in places))
     text = words.translate(
-        "Silo", "Silo is installed more than once: {folders}. Only {used} is used; remove the others."
+        "Silo",
+        "Silo is installed more than once: {folders}. Only {used} is used; remove the others.",
+        folders=folders,
+        used=Path(__file__).parents[3],
     )
-    host.error(text.replace("{folders}", folders).replace("{used}", str(Path(__file__).parents[3])))
+    host.error(text)
 
 
 class Names:
@@ -428,11 +431,12 @@ def packages_hint(packages: Sequence[str], folder: str, python: tuple[int, int])
     folder
         where this FreeCAD looks for additional packages; python: its version of Python.
     """
-    text = translate(
+    # FreeCAD's own Python has no pip in some systems; any other of the same version serves.
+    command = 'python{}.{} -m pip install --target "{}" {}'.format(*python, folder, " ".join(packages))
+    return translate(
         "Silo",
         "Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: "
         "{command} – then start FreeCAD again.",
+        names=", ".join(packages),
+        command=command,
     )
-    # FreeCAD's own Python has no pip in some systems; any other of the same version serves.
-    command = 'python{}.{} -m pip install --target "{}" {}'.format(*python, folder, " ".join(packages))
-    return text.replace("{names}", ", ".join(packages)).replace("{command}", command)

@@ -8,6 +8,7 @@ is that function, elsewhere the text stays as it is. What comes from files and s
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable
@@ -29,9 +30,17 @@ def use(function: Translate) -> None:
     _translate = function
 
 
-def translate(context: str, text: str) -> str:
-    """The text in the user's language. Write both arguments as literals, or Qt's tools do not see them."""
-    return _translate(context, text)
+def translate(context: str, text: str, **values: object) -> str:
+    """Return the text in the user's language, with values (:func:`filled`).
+
+    Write context and text as literals, or Qt's tools do not see them.
+    """
+    return filled(_translate(context, text), **values)
+
+
+def filled(text: str, **values: object) -> str:
+    """Put each value in place of its ``{name}``; a name without a value stays, also in a value."""
+    return re.sub(r"\{(\w+)\}", lambda name: str(values.get(name[1], name[0])), text)
 
 
 def QT_TRANSLATE_NOOP(_context: str, text: str) -> str:  # the name that Qt's tools look for
@@ -116,7 +125,7 @@ def tip(text: str) -> str:
 
 def counted(count: int, singular: str, many: str) -> str:
     """``one`` or ``many``, with ``{n}`` replaced by the count."""
-    return (singular if count == 1 else many).replace("{n}", str(count))
+    return filled(singular if count == 1 else many, n=count)
 
 
 def quantity(value: float | None) -> str:

@@ -59,7 +59,7 @@ from silo.workbench.commit.plan import (
 from silo.workbench.pane.activity import Action, Do, Line, PaneEntry, Tone, not_in_silo_key
 from silo.workbench.session.session import Session
 from silo.workbench.settings import ALLOW, Preferences
-from silo.workbench.words import counted, plain, quantity, translate
+from silo.workbench.words import counted, filled, plain, quantity, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -162,13 +162,18 @@ class Theirs:
         """Who committed which revision, and what mine was made from."""
         if not self.revision:
             return translate("Silo", "the file on disk was changed since you opened it")
-        text = translate("Silo", "{who} committed revision {n}; yours was made from {base}")
         if self.base is None:
             base = translate("Silo", "a file that is no revision in Silo")
         else:
-            base = translate("Silo", "revision {n}").replace("{n}", str(self.base))
+            base = translate("Silo", "revision {n}", n=self.base)
         who = plain(self.who, 60) or translate("Silo", "Somebody")
-        return text.replace("{base}", base).replace("{n}", str(self.revision)).replace("{who}", who)
+        return translate(
+            "Silo",
+            "{who} committed revision {n}; yours was made from {base}",
+            base=base,
+            n=self.revision,
+            who=who,
+        )
 
 
 def of_held(entry: QueueEntry) -> Theirs:
@@ -202,9 +207,7 @@ def line_words(line: ThreeLines, *, known: bool = True) -> str:
         text = translate("Silo", "{name}: {base} → {theirs} by them, as before in yours")
     else:
         text = translate("Silo", "{name}: {base} → {mine} by you, as before in theirs")
-    for key, value in (("{base}", base), ("{theirs}", theirs), ("{mine}", mine)):
-        text = text.replace(key, value)
-    return text.replace("{name}", name)
+    return filled(text, name=name, base=base, theirs=theirs, mine=mine)
 
 
 def line_texts(theirs: Theirs, most: int | None = None) -> list[str]:
@@ -788,7 +791,7 @@ class CommitFlow:
         self._session.add(
             PaneEntry(
                 key=f"commit-error:{label}:{time.time()}",
-                title=translate("Silo", "Not committed: {name}").replace("{name}", label),
+                title=translate("Silo", "Not committed: {name}", name=label),
                 when=time.time(),
                 tone=Tone.ERROR,
                 lines=(Line(text, Tone.ERROR),),
@@ -839,7 +842,7 @@ def not_in_silo(taken: Snapshot) -> PaneEntry:
     register = Action(Do.REGISTER, translate("Silo", "Register Parts…"), document=taken.path)
     return PaneEntry(
         key=not_in_silo_key(taken.path),
-        title=translate("Silo", "Saved, but not in Silo: {name}").replace("{name}", name),
+        title=translate("Silo", "Saved, but not in Silo: {name}", name=name),
         when=time.time(),
         tone=tone,
         lines=(Line(text, tone),),

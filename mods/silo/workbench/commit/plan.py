@@ -252,9 +252,7 @@ def refusal(plan: CommitPlan) -> str:
         return ""
     name = plain(os.path.basename(top.path) or top.label, 80)
     if top.state is DocumentState.UNNAMED:
-        return translate("Silo", "{name} has no file yet. Save it under a name first.").replace(
-            "{name}", name
-        )
+        return translate("Silo", "{name} has no file yet. Save it under a name first.", name=name)
     return f"{name}: {top.note}"
 
 

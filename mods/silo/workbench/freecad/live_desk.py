@@ -40,7 +40,7 @@ from silo.workbench.freecad import host, live, saving
 from silo.workbench.freecad.facts import SHOWN_NUMBER, SHOWN_STATE
 from silo.workbench.gui import qt
 from silo.workbench.pane.activity import Line, PaneEntry, Tone
-from silo.workbench.words import plain, translate
+from silo.workbench.words import filled, plain, translate
 
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry, Extraction
@@ -326,11 +326,12 @@ class LossGuard:
         qt.later(0, lambda: saving.mark_modified(name))  # FreeCAD takes the mark away after this
 
     def _tell(self, doc: Any, *lines: str) -> None:
-        title = translate("Silo", "Made by a newer FreeCAD: {name}")
         self._add(
             PaneEntry(
                 key=f"newer-freecad:{doc.FileName}",
-                title=title.replace("{name}", os.path.basename(doc.FileName)),
+                title=translate(
+                    "Silo", "Made by a newer FreeCAD: {name}", name=os.path.basename(doc.FileName)
+                ),
                 when=time.time(),
                 tone=Tone.WARNING,
                 lines=tuple(Line(text, Tone.WARNING) for text in lines),
@@ -343,13 +344,12 @@ class LossGuard:
 def _words(text: str, doc: Any, lost: list[str]) -> str:
     here = "{}.{}".format(*host.version())
     by = ".".join(map(str, saved_by(doc.getProgramVersion()))) or "?"
-    for key, value in (("{name}", os.path.basename(doc.FileName)), ("{here}", here), ("{there}", by)):
-        text = text.replace(key, value)
-    return text.replace("{lost}", plain(", ".join(lost), 300))
+    name = os.path.basename(doc.FileName)
+    return filled(text, name=name, here=here, there=by, lost=plain(", ".join(lost), 300))
 
 
 def _kept_words(text: str, path: Path) -> str:
-    return text.replace("{n}", str(KEPT_ASIDE_DAYS)).replace("{path}", str(path))
+    return filled(text, n=KEPT_ASIDE_DAYS, path=path)
 
 
 class LiveDocuments:

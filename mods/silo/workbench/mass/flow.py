@@ -85,7 +85,7 @@ class Waiting:
         self._last = 0.0
         self._window = QtWidgets.QProgressDialog(host.main_window())
         self._window.setObjectName("SiloMeasuring")
-        self._window.setWindowTitle(translate("Silo", "Measuring {name}").replace("{name}", name))
+        self._window.setWindowTitle(translate("Silo", "Measuring {name}", name=name))
         self._window.setWindowModality(QtCore.Qt.WindowModality.ApplicationModal)
         self._window.setMinimumDuration(PATIENCE_MS)
         self._window.setRange(0, 0)
@@ -102,8 +102,7 @@ class Waiting:
     def report(self, stage: str, done: int, total: int) -> None:
         """Called for each part and each face; lets the window live now and then."""
         if stage == "measuring":
-            text = translate("Silo", "Part {n} of {total}")
-            self._part = text.replace("{n}", str(done)).replace("{total}", str(total))
+            self._part = translate("Silo", "Part {n} of {total}", n=done, total=total)
             self._window.setRange(0, total)
             self._window.setValue(done - 1)
         now = time.monotonic()
@@ -111,8 +110,7 @@ class Waiting:
             return
         self._last = now
         if stage == "measuring faces" and total > 200:
-            faces = translate("Silo", "face {n} of {total}")
-            faces = faces.replace("{n}", str(done)).replace("{total}", str(total))
+            faces = translate("Silo", "face {n} of {total}", n=done, total=total)
             self._window.setLabelText(f"{self._part}, {faces}")
         elif self._part:
             self._window.setLabelText(self._part)
@@ -131,7 +129,7 @@ class MassDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
     def __init__(self, content: MassView, parent: Any) -> None:
         super().__init__(parent)
         self._content = content
-        title = translate("Silo", "Mass of {name}").replace("{name}", plain(content.title, 80))
+        title = translate("Silo", "Mass of {name}", name=plain(content.title, 80))
         layout = widgets.lay_out(self, "SiloMass", title, 900, 520)
         self.summary = widgets.label(content.summary, bold=True)
         layout.addWidget(self.summary)

@@ -75,11 +75,15 @@ def _summary(report: InertiaReport, parts: list[PartResult]) -> str:
         return translate("Silo", "No part of this assembly has a material with a density.")
     pieces = sum(part.quantity for part in parts)
     x, y, z = (f"{value * 1e3:.2f}" for value in report.total.com)
-    text = translate("Silo", "{mass} in {pieces}, centre of mass at {x}, {y}, {z} mm")
-    pieces_text = counted(pieces, translate("Silo", "1 piece"), translate("Silo", "{n} pieces"))
-    for name, value in {"mass": mass_text(report.total.mass), "pieces": pieces_text}.items():
-        text = text.replace(f"{{{name}}}", value)
-    return text.replace("{x}", x).replace("{y}", y).replace("{z}", z)
+    return translate(
+        "Silo",
+        "{mass} in {pieces}, centre of mass at {x}, {y}, {z} mm",
+        mass=mass_text(report.total.mass),
+        pieces=counted(pieces, translate("Silo", "1 piece"), translate("Silo", "{n} pieces")),
+        x=x,
+        y=y,
+        z=z,
+    )
 
 
 def _row(part: PartResult) -> MassRow:

@@ -275,14 +275,13 @@ class Banner:
 
 def presence_text(newer: Newer, label: str) -> str:
     """That a colleague committed a document since it was opened."""
-    text = translate("Silo", "{who} committed {name} (revision {n}) since you opened it.")
-    for key, value in (
-        ("{who}", newer.who or translate("Silo", "Somebody")),
-        ("{name}", plain(f"{newer.part_number} {label}", 60)),
-        ("{n}", str(newer.revision)),
-    ):
-        text = text.replace(key, value)
-    return text
+    return translate(
+        "Silo",
+        "{who} committed {name} (revision {n}) since you opened it.",
+        who=newer.who or translate("Silo", "Somebody"),
+        name=plain(f"{newer.part_number} {label}", 60),
+        n=newer.revision,
+    )
 
 
 def banner(shown: PaneState) -> Banner:
@@ -293,7 +292,7 @@ def banner(shown: PaneState) -> Banner:
     more = shown.presence[:_MOST_PRESENT]
     left = len(shown.presence) - len(more)
     if left:
-        more = (*more, translate("Silo", "… and {n} more").replace("{n}", str(left)))
+        more = (*more, translate("Silo", "… and {n} more", n=left))
     ground, ink = (made.ground, made.ink) if made.ground else _YELLOW
     return replace(made, text="\n".join((made.text, *more)), ground=ground, ink=ink)
 
@@ -311,26 +310,28 @@ def _connection(shown: PaneState) -> Banner:
     reason = plain(shown.reason, 300)
     kind = shown.connection
     if kind == "online":
-        return Banner("● " + translate("Silo", "Connected to {host}").replace("{host}", host), Tone.GOOD)
+        return Banner("● " + translate("Silo", "Connected to {host}", host=host), Tone.GOOD)
     if kind == "read-only":
-        text = translate("Silo", "{host} is read-only now. Commits wait here until it takes changes again.")
-        return Banner(text.replace("{host}", host), ground=_YELLOW[0], ink=_YELLOW[1])
+        text = translate(
+            "Silo", "{host} is read-only now. Commits wait here until it takes changes again.", host=host
+        )
+        return Banner(text, ground=_YELLOW[0], ink=_YELLOW[1])
     if kind == "degraded":
-        text = translate("Silo", "{host} works only in part. What cannot be sent waits here.")
-        return Banner(text.replace("{host}", host), ground=_ORANGE[0], ink=_ORANGE[1])
+        text = translate("Silo", "{host} works only in part. What cannot be sent waits here.", host=host)
+        return Banner(text, ground=_ORANGE[0], ink=_ORANGE[1])
     if kind == "offline":
-        text = translate("Silo", "No connection to {host}. Commits wait here and are sent later.")
-        sentence = "\n".join(filter(None, (text.replace("{host}", host), reason[:1].upper() + reason[1:])))
+        text = translate("Silo", "No connection to {host}. Commits wait here and are sent later.", host=host)
+        sentence = "\n".join(filter(None, (text, reason[:1].upper() + reason[1:])))
         return Banner(sentence, ground=_RED[0], ink=_RED[1], actions=(again,))
     if kind == "refused":
-        text = translate("Silo", "{host} does not accept the token.").replace("{host}", host)
+        text = translate("Silo", "{host} does not accept the token.", host=host)
         return Banner(text, ground=_RED[0], ink=_RED[1], actions=(settings, again))
     if kind == "connecting":
-        return Banner(translate("Silo", "Connecting to {host}…").replace("{host}", host), Tone.QUIET)
+        return Banner(translate("Silo", "Connecting to {host}…", host=host), Tone.QUIET)
     if kind == "unsupported":
-        text = translate("Silo", "{host} sends no live events; what you commit is shown anyway.")
-        return Banner(text.replace("{host}", host), Tone.QUIET)
-    return Banner(translate("Silo", "{host} (live events are off)").replace("{host}", host), Tone.QUIET)
+        text = translate("Silo", "{host} sends no live events; what you commit is shown anyway.", host=host)
+        return Banner(text, Tone.QUIET)
+    return Banner(translate("Silo", "{host} (live events are off)", host=host), Tone.QUIET)
 
 
 # Lines of a BOM difference; a button shows all of them.
@@ -400,7 +401,7 @@ def heading(entries: Sequence[QueueEntry], server_url: str) -> str:
         text = translate("Silo", "{n} thing waits for your choice")
         many = translate("Silo", "{n} things wait for your choice")
     elif urgent:
-        many += translate("Silo", ", {urgent} of them for your choice").replace("{urgent}", str(urgent))
+        many += translate("Silo", ", {urgent} of them for your choice", urgent=urgent)
     return counted(len(entries), text, many)
 
 
@@ -451,7 +452,7 @@ def _row(entry: QueueEntry, here: str, theirs: Theirs | None, pause: Pause | Non
 def _actions(entry: QueueEntry, here: str) -> Iterable[Action]:
     target = str(entry.id)
     if entry.is_away(here):
-        text = translate("Silo", "Send to {host}").replace("{host}", plain(host_of(here), 80))
+        text = translate("Silo", "Send to {host}", host=plain(host_of(here), 80))
         yield Action(Do.SEND_HERE, text, target=target)
     elif entry.state is State.HELD and not entry.superseded:
         asked = entry.renamed == ASKED
@@ -460,8 +461,8 @@ def _actions(entry: QueueEntry, here: str) -> Iterable[Action]:
             # The choices of the commit dialog.
             if entry.path:
                 yield Action(Do.OPEN_THEIRS, translate("Silo", "Open theirs beside mine"), target=target)
-                text = translate("Silo", "Compare with revision {n}")
-                text = text.replace("{n}", str(entry.newer.get("revision_number", "")))
+                number = entry.newer.get("revision_number", "")
+                text = translate("Silo", "Compare with revision {n}", n=number)
                 yield Action(Do.COMPARE, text, target=target)
                 yield Action(Do.TAKE_THEIRS, translate("Silo", "Take theirs"), target=target)
             text = translate("Silo", "Commit mine on top")

@@ -323,7 +323,7 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
         for row in first:
             self._row(row)
         if left := len(ordered) - len(first):
-            text = translate("Silo", "… and {n} more").replace("{n}", str(left))
+            text = translate("Silo", "… and {n} more", n=left)
             self._layout.addWidget(widgets.link_button(text, partial(self._show_all, shown)))
         send = []
         if can_send(shown.waiting, shown.server.url):
@@ -331,10 +331,10 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
             text = translate("Silo", "Retry all") if again else translate("Silo", "Send now")
             send.append(Action(Do.RETRY, text))
         if len(away := meant_for_another(shown.waiting, shown.server.url)) > 1:
-            text = translate("Silo", "Send all {n} commits for another address to {host}").replace(
-                "{n}", str(len(away))
+            host = host_of(shown.server.url)
+            text = translate(
+                "Silo", "Send all {n} commits for another address to {host}", n=len(away), host=host
             )
-            text = text.replace("{host}", host_of(shown.server.url))
             send.append(Action(Do.SEND_HERE, text, target=",".join(map(str, away))))
         if send:
             self._layout.addLayout(buttons(send, self._on_action))

@@ -32,7 +32,7 @@ from silo.bom_sync import (
 from silo.outbox.send import Sent
 from silo.workbench.pane.activity import Action, Batch, Do, Line, PaneEntry, Tone, not_in_silo_key, shortened
 from silo.workbench.session.session import Newer
-from silo.workbench.words import counted, plain, quantity, translate
+from silo.workbench.words import counted, filled, plain, quantity, translate
 
 # Makes an absolute address of a page such as `resolve_url`; raises SiloError for another server's.
 Page = Callable[[str], str]
@@ -72,7 +72,6 @@ def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> Pan
     team = saved_by(wanted)
     if not team or team == here:
         return None
-    title = translate("Silo", "Your team works with FreeCAD {team}; this is {here}")
     if here > team:
         text = translate(
             "Silo",
@@ -85,7 +84,9 @@ def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> Pan
             "Files of your colleagues may hold objects that this FreeCAD does not know. You are asked before "
             "a save removes such objects from a file.",
         )
-    shown = title.replace("{team}", wanted).replace("{here}", "{}.{}".format(*here))
+    shown = translate(
+        "Silo", "Your team works with FreeCAD {team}; this is {here}", team=wanted, here="{}.{}".format(*here)
+    )
     when = time.time() if now is None else now
     return PaneEntry(
         "team-freecad", shown, when, Tone.WARNING, lines=(Line(text, Tone.WARNING),), icon="silo-commit"
@@ -115,8 +116,8 @@ def _title(sent: Sent) -> str:
     if sent.status is Status.MERGED:
         return headline(item, translate)
     if sent.status is Status.BLOCKED:
-        return translate("Silo", "BOM not synced: {number}").replace("{number}", item)
-    return translate("Silo", "Committed: {number}").replace("{number}", item)
+        return translate("Silo", "BOM not synced: {number}", number=item)
+    return translate("Silo", "Committed: {number}", number=item)
 
 
 def _name(sent: Sent) -> str:
@@ -151,7 +152,7 @@ _TONES = {
 
 def _revision_lines(sent: Sent) -> tuple[Line, ...]:
     if sent.revision is not None:
-        text = translate("Silo", "Revision {n} uploaded").replace("{n}", str(sent.revision))
+        text = translate("Silo", "Revision {n} uploaded", n=sent.revision)
         comment = plain(sent.entry.comment, 120)
         return (Line(f"{text}: {comment}" if comment else text, Tone.PLAIN),)
     if sent.entry.has_file:
@@ -271,10 +272,12 @@ def _conflict_lines(sent: Sent, resolved: Resolved) -> list[Line]:
     entries = {entry.part_number: entry for entry in resolved.entries}
     lines = []
     for change in sent.plan.diff.conflicts:
-        conflict_text = text.replace("{number}", change.part_number).replace(
-            "{cad}", quantity(change.local_quantity)
+        conflict_text = filled(
+            text,
+            number=change.part_number,
+            cad=quantity(change.local_quantity),
+            silo=change.on_server(quantity(change.remote_quantity)),
         )
-        conflict_text = conflict_text.replace("{silo}", change.on_server(quantity(change.remote_quantity)))
         lines.append(Line(conflict_text, Tone.WARNING, _show(entries.get(change.part_number), resolved)))
     return lines
 
@@ -381,8 +384,8 @@ def _event_words(kind: str, number: str, data: dict[str, Any]) -> tuple[str, str
     if kind == "revision.created" and isinstance(revision, int):
         if revision == 1 and _text(data, "comment") in ("", "created"):
             return "", ""  # An item is born with it, and that is shown already.
-        text = translate("Silo", "Revision {n} of {number}").replace("{n}", str(revision))
-        return text.replace("{number}", number), _revision_key(number, revision)
+        text = translate("Silo", "Revision {n} of {number}", n=revision, number=number)
+        return text, _revision_key(number, revision)
     words = {
         "item.created": translate("Silo", "New item: {number}"),
         "item.deleted": translate("Silo", "Archived: {number}"),

@@ -55,7 +55,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self._path, self._flow = path, flow
         self.finished.connect(lambda _result: flow.closed(path))
         self._preview: Preview | None = None
-        text = translate("Silo", "BOM in Silo: {name}").replace("{name}", plain(title, 80))
+        text = translate("Silo", "BOM in Silo: {name}", name=plain(title, 80))
         layout = widgets.lay_out(self, "SiloPreview", text, 860, 560)
         self._title = widgets.label("", bold=True)
         self._summary = widgets.label(translate("Silo", "Comparing with Silo…"))
@@ -202,9 +202,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         left = [MOST_ROWS]
         self.table.addTopLevelItems(list(self._items(rows(self._preview), left)))
         if left[0] < 0:
-            more = QtWidgets.QTreeWidgetItem(
-                ["", translate("Silo", "… and {n} more rows").replace("{n}", str(-left[0]))]
-            )
+            more = QtWidgets.QTreeWidgetItem(["", translate("Silo", "… and {n} more rows", n=-left[0])])
             self.table.addTopLevelItem(more)
         for number in range(self.table.topLevelItemCount()):
             self._spread(self.table.topLevelItem(number))

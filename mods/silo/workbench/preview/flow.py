@@ -324,8 +324,7 @@ def _own_words(compared: Compared) -> str:
 
 
 def _missing_words(file: str, name: str) -> str:
-    text = translate("Silo", "missing: {file}")
-    return text.replace("{file}", f"{file}#{name}" if name else file)
+    return translate("Silo", "missing: {file}", file=f"{file}#{name}" if name else file)
 
 
 def _unregistered_row(entry: BomEntry, preview: Preview, children: tuple[PreviewRow, ...]) -> PreviewRow:
@@ -402,9 +401,7 @@ def summary(preview: Preview) -> str:
     elif below:
         own = counted(agreeing, translate("Silo", "{n} line agrees"), translate("Silo", "{n} lines agree"))
     else:
-        own = translate("Silo", "Nothing to sync: all {n} lines agree with Silo.").replace(
-            "{n}", str(agreeing)
-        )
+        own = translate("Silo", "Nothing to sync: all {n} lines agree with Silo.", n=agreeing)
     return "; ".join((own, *below))
 
 
@@ -514,8 +511,13 @@ class PreviewFlow:
     def _opened(self, path: str, window: str) -> Any:
         doc = self._desk.find(path)
         if doc is None:
-            text = translate("Silo", "{name} is not open any more. Open it, then compare again.")
-            error = SiloError(text.replace("{name}", plain(os.path.basename(path), 80)))
+            error = SiloError(
+                translate(
+                    "Silo",
+                    "{name} is not open any more. Open it, then compare again.",
+                    name=plain(os.path.basename(path), 80),
+                )
+            )
             self._with_dialog(window, lambda dialog: dialog.fail(error))
         return doc
 
@@ -588,7 +590,7 @@ class PreviewFlow:
         except SiloError as error:
             lines = [str(error)]
         if (more := len(lines) - _MOST_WAYS) > 0:
-            lines[_MOST_WAYS:] = [translate("Silo", "… and {n} more").replace("{n}", str(more))]
+            lines[_MOST_WAYS:] = [translate("Silo", "… and {n} more", n=more)]
         text = "\n".join(plain(line, MOST_CELL) for line in lines)
         self._with_dialog(window, lambda dialog: dialog.tell_view(text, agrees=None))
 
@@ -612,11 +614,14 @@ class PreviewFlow:
         if now is None:
             return
         if not now.is_as(preview.snapshot):
-            text = translate(
-                "Silo",
-                "Nothing was synced: {name} was edited since the comparison. Here it is now.",
+            self._ask(
+                now,
+                translate(
+                    "Silo",
+                    "Nothing was synced: {name} was edited since the comparison. Here it is now.",
+                    name=plain(now.label, 80),
+                ),
             )
-            self._ask(now, text.replace("{name}", plain(now.label, 80)))
             return
 
         def failed(error: SiloError) -> None:

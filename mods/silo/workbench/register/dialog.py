@@ -369,7 +369,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         note, tone = row.note()
         category = self._categories.get(row.category, row.category)
         if row.guesses:
-            category = translate("Silo", "guess: {category}").replace("{category}", category)
+            category = translate("Silo", "guess: {category}", category=category)
         kind = self._types.get(row.item_type, row.item_type)
         source = self._sources[row.sourcing]
         supply = (row.supplier, row.supplier_part_number) if row.sourcing == "purchased" else ("", "")

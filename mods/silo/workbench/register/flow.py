@@ -33,7 +33,7 @@ from silo.workbench.commit.plan import Snapshot
 from silo.workbench.pane.activity import Tone
 from silo.workbench.session.session import Session
 from silo.workbench.settings import Preferences
-from silo.workbench.words import counted, plain, translate
+from silo.workbench.words import counted, filled, plain, translate
 
 NEW = "new"
 SAME = "same"
@@ -232,11 +232,11 @@ class EditedRow:
     def _component(self) -> str:
         entry = self.candidate.entry
         if entry.standard:
-            return plain(translate("Silo", "Standard part: {name}").replace("{name}", entry.standard), 80)
+            return plain(translate("Silo", "Standard part: {name}", name=entry.standard), 80)
         if (article := self.candidate.article) is not None:
             text = plain(entry.label, 60)
-            copies = translate("Silo", "{name} ({n} copies)").replace("{n}", str(len(article.objects)))
-            return copies.replace("{name}", text) if len(article.objects) > 1 else text
+            copies = translate("Silo", "{name} ({n} copies)", n=len(article.objects), name=text)
+            return copies if len(article.objects) > 1 else text
         return plain(f"{self.file} · {entry.label}" if self.candidate.shares_file else self.file, 80)
 
     def number_text(self, numbers: Mapping[str, str], taken: int) -> str:
@@ -244,8 +244,7 @@ class EditedRow:
         if self.finished and self.result is not None:
             return self.result.part_number or ""
         if self.number == SAME:
-            text = translate("Silo", "{number} (kept)")
-            return text.replace("{number}", self.candidate.same_as)
+            return translate("Silo", "{number} (kept)", number=self.candidate.same_as)
         if self.number == ASK:
             return translate("Silo", "same or new part?")
         if self.number == APART:
@@ -266,8 +265,7 @@ class EditedRow:
         """What can be chosen as its number."""
         result = {}
         if self.candidate.same_as:
-            same = translate("Silo", "same part: keep {number}")
-            result[SAME] = same.replace("{number}", self.candidate.same_as)
+            result[SAME] = translate("Silo", "same part: keep {number}", number=self.candidate.same_as)
         if not self.candidate.state.usable:
             return result
         new = translate("Silo", "new part: a new number")
@@ -309,9 +307,7 @@ class EditedRow:
             many = translate("Silo", "would count {n} times; check it if it is a part")
         result = [counted(article.entry.quantity, text, many)]
         if article.source:
-            source = translate("Silo", "imported from {file}").replace(
-                "{file}", os.path.basename(article.source)
-            )
+            source = translate("Silo", "imported from {file}", file=os.path.basename(article.source))
             result.append(source)
         if article.alike == "label":
             result.append(translate("Silo", "equal by their labels only"))
@@ -320,14 +316,16 @@ class EditedRow:
     def _suspicions(self) -> list[str]:
         suspicions = []
         if self.candidate.same_as:
-            text = translate("Silo", "carries the identity of {number}, as another file does")
-            suspicions.append(text.replace("{number}", self.candidate.same_as))
+            number = self.candidate.same_as
+            suspicions.append(
+                translate("Silo", "carries the identity of {number}, as another file does", number=number)
+            )
         if self.candidate.foreign:
             suspicions.append(translate("Silo", "registered at another server: it keeps its identity"))
         suspicions += [_similar_words(similar) for similar in self.candidate.similar[:2]]
         if self.candidate.twin:
-            text = translate("Silo", "the same content as {name}")
-            suspicions.append(text.replace("{name}", plain(self.candidate.twin, 40)))
+            name = plain(self.candidate.twin, 40)
+            suspicions.append(translate("Silo", "the same content as {name}", name=name))
         return suspicions
 
 
@@ -367,7 +365,7 @@ def set_all(rows: Iterable[EditedRow], column: str, value: str, categories: Mapp
     for number, row in enumerate((row for row in rows if row.editable), start=1):
         if column == "name":
             if not row.candidate.entry.is_standard:
-                row.name = value.replace("{name}", row.name).replace("{n}", str(number))
+                row.name = filled(value, name=row.name, n=number)
         elif column == "item_type":
             retype(row, value, categories)
         else:
@@ -431,8 +429,13 @@ def notices(offer: Offer) -> str:
     """About the whole offer: mistakes in the site's rules, and that nobody looked for look-alikes."""
     value = [rules_text(getattr(offer.categories, "problem", ""), translate)]
     if offer.unsearched:
-        text = translate("Silo", "Silo was not searched for parts that look alike: {problem}")
-        value.append(text.replace("{problem}", plain(offer.unsearched, 300)))
+        value.append(
+            translate(
+                "Silo",
+                "Silo was not searched for parts that look alike: {problem}",
+                problem=plain(offer.unsearched, 300),
+            )
+        )
     return "\n".join(filter(None, value))
 
 
@@ -440,8 +443,9 @@ def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
     """What the dialog says above its rows; ``more`` of them do not fit in."""
     components = [row for row in rows if row.candidate.article is None]
     if not components:
-        text = translate("Silo", "All components of {name} have their Silo part number.")
-        return text.replace("{name}", plain(title, 80))
+        return translate(
+            "Silo", "All components of {name} have their Silo part number.", name=plain(title, 80)
+        )
     left = [row for row in components if not row.finished]
     if not left:
         return translate("Silo", "All of these have their part number now.")
@@ -456,7 +460,7 @@ def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
             )
         )
     if more > 0:
-        lines.append(translate("Silo", "({n} more after these)").replace("{n}", str(more)))
+        lines.append(translate("Silo", "({n} more after these)", n=more))
     return "\n".join(lines)
 
 

@@ -272,8 +272,7 @@ class OpenDialog(_Window):
         here = "" if row.data(0, _DATA) else file_in_project(folder, self._item)
         if here:
             self._flow.open(here)
-            text = translate("Silo", "It is in the project already, and is open: {path}")
-            self.say(text.replace("{path}", here))
+            self.say(translate("Silo", "It is in the project already, and is open: {path}", path=here))
             self._offer_newest(folder, here)
             return
         self.fetch(self._number(), row.data(0, _DATA) or None, Path(folder).expanduser())
@@ -283,7 +282,7 @@ class HistoryDialog(_Window):
     """The revisions of a document: who, when, comment, what changed in the BOM; any of them as a copy."""
 
     def __init__(self, flow: RevisionFlow, parent: Any, path: str) -> None:
-        title = translate("Silo", "History of {name}").replace("{name}", plain(os.path.basename(path), 80))
+        title = translate("Silo", "History of {name}", name=plain(os.path.basename(path), 80))
         super().__init__(flow, parent, "SiloHistory", title, (680, 460))
         self._path = path
         self._known: ItemHistory | None = None
@@ -328,7 +327,7 @@ class HistoryDialog(_Window):
         def done(lines: list[str]) -> None:
             if self._number() == number:
                 text = plain(", ".join(self._first(lines, MOST_CHANGES)), 1000)
-                sentence = translate("Silo", "BOM: {changes}").replace("{changes}", text)
+                sentence = translate("Silo", "BOM: {changes}", changes=text)
                 self.change.setText(sentence if text else translate("Silo", "No change of the BOM."))
 
         def failed(error: SiloError) -> None:
@@ -515,7 +514,7 @@ def mark_in_tree(states: Mapping[str, tuple[str, Tone]]) -> None:
         for item in items:
             words, tone = labels.get(item.text(0), ("", Tone.PLAIN))
             if words:
-                item.setToolTip(0, tip(translate("Silo", "Silo: {state}").replace("{state}", words)))
+                item.setToolTip(0, tip(translate("Silo", "Silo: {state}", state=words)))
                 item.setForeground(0, widgets.brush(tone, tree))
 
 

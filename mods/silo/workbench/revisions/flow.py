@@ -29,7 +29,7 @@ from silo.workbench.commit.opened import Base
 from silo.workbench.commit.plan import MOST_S
 from silo.workbench.pane.activity import Line, PaneEntry, Tone
 from silo.workbench.session.session import Session
-from silo.workbench.words import plain, translate
+from silo.workbench.words import filled, plain, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -108,10 +108,7 @@ def _in_words(differences: Differences | None, revision: int) -> str:
     )
     if differences.unknown:
         text += " " + translate("Silo", "Not compared: {unknown} in groups and arrays without links.")
-    values = (differences.removed, differences.moved, differences.added, differences.unknown, revision)
-    for name, value in zip(("removed", "moved", "added", "unknown", "n"), values, strict=True):
-        text = text.replace(f"{{{name}}}", str(value))
-    return text
+    return filled(text, n=revision, **vars(differences))
 
 
 class RevisionFlow:
@@ -170,8 +167,7 @@ class RevisionFlow:
 
         def done(theirs: list[Ghost]) -> None:
             if not theirs:
-                text = translate("Silo", "Silo has no model of revision {n} yet.")
-                report(text.replace("{n}", str(revision)))
+                report(translate("Silo", "Silo has no model of revision {n} yet.", n=revision))
                 return
             try:
                 report(_in_words(self._desk.compare(path, revision, theirs), revision))
@@ -245,20 +241,21 @@ class RevisionFlow:
         if doc is not None:
             self._desk.close(doc)
         self._desk.open(path)
-        sentence = translate("Silo", "Yours is kept for {n} days at {path}")
-        text = (
-            sentence.replace("{n}", str(KEPT_ASIDE_DAYS)).replace("{path}", ", ".join(kept)) if kept else ""
-        )
+        text = ""
+        if kept:
+            text = translate(
+                "Silo", "Yours is kept for {n} days at {path}", n=KEPT_ASIDE_DAYS, path=", ".join(kept)
+            )
         if lost := _not_here(path):
             sentence = translate(
-                "Silo", "It links to {names}, not in this folder: Open from Silo… fetches them."
+                "Silo",
+                "It links to {names}, not in this folder: Open from Silo… fetches them.",
+                names=plain(", ".join(lost), 200),
             )
-            text = " ".join(filter(None, (sentence.replace("{names}", plain(", ".join(lost), 200)), text)))
+            text = " ".join(filter(None, (sentence, text)))
         title = translate("Silo", "Took {who}'s revision {n}: {name}") if theirs.revision else ""
         title = title or translate("Silo", "Took the file on disk: {name}")
-        for key, value in (("{who}", theirs.who), ("{n}", str(theirs.revision)), ("{name}", _name(path))):
-            title = title.replace(key, value)
-        self._box(path, title, text)
+        self._box(path, filled(title, who=theirs.who, n=theirs.revision, name=_name(path)), text)
 
     def _guarded(self, path: str, call: Callable[[], object]) -> None:
         try:
@@ -271,7 +268,7 @@ class RevisionFlow:
     def _box_error(self, path: str, error: SiloError) -> None:
         self._box(
             path,
-            translate("Silo", "Not fetched: {name}").replace("{name}", _name(path)),
+            translate("Silo", "Not fetched: {name}", name=_name(path)),
             str(error),
             Tone.ERROR,
         )
@@ -462,7 +459,7 @@ class ProjectRow:
         if self.edits:
             row_words.append(translate("Silo", "unsaved edits"))
         if self.moved_from:
-            row_words.append(translate("Silo", "was {place}").replace("{place}", self.moved_from))
+            row_words.append(translate("Silo", "was {place}", place=self.moved_from))
         if self.theirs is not None:
             row_words.append(self.theirs.headline)
         return plain("; ".join(row_words), 300)
@@ -488,9 +485,8 @@ class ProjectView:
 
     def heading(self) -> str:
         """How many files there are, and how many of them Silo does not have as they are here."""
-        text = translate("Silo", "{n} files, {left} of them different from Silo")
         left = sum(not row.is_fine for row in self.rows)
-        return text.replace("{n}", str(len(self.rows))).replace("{left}", str(left))
+        return translate("Silo", "{n} files, {left} of them different from Silo", n=len(self.rows), left=left)
 
 
 class ProjectFlow:
@@ -596,7 +592,7 @@ def _project_view(root: str, client: SiloClient | None, store: Store, edited: Se
         translate("Silo", "{place} is gone since its commit."): [(place, "") for place in belonging.gone],
     }
     notes = [
-        plain(text.replace("{place}", place).replace("{name}", name), 300)
+        plain(filled(text, place=place, name=name), 300)
         for text, pairs in sentences.items()
         for place, name in pairs
     ]
@@ -642,8 +638,8 @@ def left_alone(pulled: Pulled) -> Sequence[str]:
     ]
     lost = translate("Silo", "{path}, which {name} links to, was not fetched: {reason}")
     for link in pulled.lost:
-        text = lost.replace("{path}", link.path or "?").replace("{name}", link.position)
-        result.append(plain(text.replace("{reason}", link.reason), 300))
+        text = filled(lost, path=link.path or "?", name=link.position, reason=link.reason)
+        result.append(plain(text, 300))
     return result
 
 

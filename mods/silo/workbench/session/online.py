@@ -78,8 +78,9 @@ class Online:
         """Send what waits for this server."""
 
         def progress(waiting: Waiting, done: int, total: int) -> None:
-            text = translate("Silo", "{file} → {number}").replace("{file}", waiting.file_name)
-            control.progress(text.replace("{number}", waiting.part_number), done / total if total else None)
+            number = waiting.part_number
+            text = translate("Silo", "{file} → {number}", file=waiting.file_name, number=number)
+            control.progress(text, done / total if total else None)
 
         return send_all(
             self._outbox,

@@ -194,7 +194,7 @@ class PreferencePage:
         server, keyring = outcome
         self.in_use.setText(in_use(server, dict(os.environ)))
         if keyring and self.place.findData(KEYRING) < 0:
-            text = translate("Silo", "the keyring of the system ({name})").replace("{name}", keyring)
+            text = translate("Silo", "the keyring of the system ({name})", name=keyring)
             self.place.insertItem(0, text, KEYRING)
             self.place.setCurrentIndex(0)
         kept = translate("Silo", "unchanged; enter another one to replace it")
@@ -253,8 +253,14 @@ class PreferencePage:
         self._tell(translate("Silo", "Asking the server…"), Tone.QUIET)
 
         def opened(login: BrowserLogin) -> None:
-            text = translate("Silo", "Let FreeCAD in on the page that opens. It shows the code {code}.")
-            self._tell(text.replace("{code}", login.code), Tone.QUIET)
+            self._tell(
+                translate(
+                    "Silo",
+                    "Let FreeCAD in on the page that opens. It shows the code {code}.",
+                    code=login.code,
+                ),
+                Tone.QUIET,
+            )
             if not qt.open_url(login.page):
                 self._tell(login.page, Tone.QUIET)
             ask(login)
@@ -314,8 +320,7 @@ def _text() -> str:
     try:
         return PAGE.read_text(encoding="utf-8")
     except OSError:
-        text = translate("Silo", "The documentation is not there: {path}")
-        return text.replace("{path}", str(PAGE))
+        return translate("Silo", "The documentation is not there: {path}", path=PAGE)
 
 
 # The one window; FreeCAD holds no reference to it.
@@ -385,9 +390,11 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         # The work may end after the window is closed; then it comes back and says how that went.
         self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose, False)
         text = translate(
-            "Silo", "Silo needs these Python packages: {names}.\nThey are installed in {folder}."
+            "Silo",
+            "Silo needs these Python packages: {names}.\nThey are installed in {folder}.",
+            names=", ".join(missing),
+            folder=host.packages_folder(),
         )
-        text = text.replace("{names}", ", ".join(missing)).replace("{folder}", host.packages_folder())
         self.text = widgets.label(text)
         self.bar = QtWidgets.QProgressBar()
         self.bar.setRange(0, 0)
@@ -416,12 +423,18 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self.bar.hide()
         self.show()
         if done:
-            sentence = translate("Silo", "The packages are in {folder}. Start FreeCAD again to use Silo.")
-            self.text.setText(sentence.replace("{folder}", text))
+            self.text.setText(
+                translate(
+                    "Silo", "The packages are in {folder}. Start FreeCAD again to use Silo.", folder=text
+                )
+            )
             self.button.hide()
             return
         self.button.setEnabled(True)
         self.button.setText(translate("Silo", "Try again"))
-        failed = translate("Silo", "They could not be installed: {reason}")
         by_hand = packages_hint(missing_packages(), host.packages_folder(), sys.version_info[:2])
-        self.text.setText(visible(failed.replace("{reason}", text), 1500) + "\n\n" + by_hand)
+        self.text.setText(
+            visible(translate("Silo", "They could not be installed: {reason}", reason=text), 1500)
+            + "\n\n"
+            + by_hand
+        )

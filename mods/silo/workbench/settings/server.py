@@ -212,12 +212,13 @@ def test(wanted: ServerPreferences, preferences: ServerPreferences, keyring: Key
         raise ConfigError(translate("Silo", "Enter the address of the server first."))
     with SiloClient(server.url, wanted.token or server.token or None, verify=server.verify) as client:
         user, state = client.whoami(), client.ready()
-    text = translate("Silo", "Connected as {user} ({role}); the server is in {mode} mode.")
     name = user.display_name or user.username
-    return (
-        text.replace("{user}", plain(name, 60))
-        .replace("{role}", plain(user.role, 30) or "?")
-        .replace("{mode}", plain(state.mode, 30))
+    return translate(
+        "Silo",
+        "Connected as {user} ({role}); the server is in {mode} mode.",
+        user=plain(name, 60),
+        role=plain(user.role, 30) or "?",
+        mode=plain(state.mode, 30),
     )
 
 
@@ -252,7 +253,7 @@ def in_use(server: Server, env: Mapping[str, str]) -> str:
     """Which server and token are in use, and where they come from."""
     if not server.configured:
         return translate("Silo", "No server is set up. To try it out, run: silo-mod serve")
-    where = translate("Silo", "In use: {url} ({from}).").replace("{url}", plain(server.url, 100))
+    where = translate("Silo", "In use: {url} ({from}).", url=plain(server.url, 100))
     text = where.replace("{from}", _url_words()[server.url_from])
     text += " " + _token_words()[server.token_from]
     if env.get("SILO_SSL_VERIFY", "").strip():

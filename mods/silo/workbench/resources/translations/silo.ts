@@ -20,12 +20,12 @@
         </message>
         <message>
             <location filename="../../addon.py" />
-            <source>{name} has no Silo part number yet. Register it first.</source>
+            <source>History</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../addon.py" />
-            <source>History</source>
+            <source>{name} has no Silo part number yet. Register it first.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -231,17 +231,17 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
-            <source>{who} committed revision {n}; yours was made from {base}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
             <source>a file that is no revision in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/flow.py" />
             <source>revision {n}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{who} committed revision {n}; yours was made from {base}</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -815,17 +815,17 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
-            <source>Your team works with FreeCAD {team}; this is {here}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
             <source>A file that is saved here may hold objects that the FreeCAD of your colleagues does not know and does not load.</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../pane/entries.py" />
             <source>Files of your colleagues may hold objects that this FreeCAD does not know. You are asked before a save removes such objects from a file.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Your team works with FreeCAD {team}; this is {here}</source>
             <translation type="unfinished" />
         </message>
         <message>

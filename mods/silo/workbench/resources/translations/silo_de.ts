@@ -20,13 +20,13 @@
         </message>
         <message>
             <location filename="../../addon.py" />
-            <source>{name} has no Silo part number yet. Register it first.</source>
-            <translation>{name} hat noch keine Silo-Teilenummer. Bitte zuerst registrieren.</translation>
+            <source>History</source>
+            <translation>Verlauf</translation>
         </message>
         <message>
             <location filename="../../addon.py" />
-            <source>History</source>
-            <translation>Verlauf</translation>
+            <source>{name} has no Silo part number yet. Register it first.</source>
+            <translation>{name} hat noch keine Silo-Teilenummer. Bitte zuerst registrieren.</translation>
         </message>
         <message>
             <location filename="../../addon.py" />
@@ -231,11 +231,6 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
-            <source>{who} committed revision {n}; yours was made from {base}</source>
-            <translation>{who} hat Revision {n} eingecheckt; Ihre entstand aus {base}</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
             <source>a file that is no revision in Silo</source>
             <translation>einer Datei, die keine Revision in Silo ist</translation>
         </message>
@@ -243,6 +238,11 @@
             <location filename="../../commit/flow.py" />
             <source>revision {n}</source>
             <translation>Revision {n}</translation>
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>{who} committed revision {n}; yours was made from {base}</source>
+            <translation>{who} hat Revision {n} eingecheckt; Ihre entstand aus {base}</translation>
         </message>
         <message>
             <location filename="../../commit/flow.py" />
@@ -816,11 +816,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../pane/entries.py" />
-            <source>Your team works with FreeCAD {team}; this is {here}</source>
-            <translation>Ihr Team arbeitet mit FreeCAD {team}; dies ist {here}</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
             <source>A file that is saved here may hold objects that the FreeCAD of your colleagues does not know and does not load.</source>
             <translation>Eine hier gespeicherte Datei kann Objekte enthalten, die das FreeCAD der anderen nicht kennt und nicht lädt.</translation>
         </message>
@@ -828,6 +823,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../pane/entries.py" />
             <source>Files of your colleagues may hold objects that this FreeCAD does not know. You are asked before a save removes such objects from a file.</source>
             <translation>Dateien der anderen können Objekte enthalten, die dieses FreeCAD nicht kennt. Bevor Speichern solche Objekte aus einer Datei entfernt, werden Sie gefragt.</translation>
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Your team works with FreeCAD {team}; this is {here}</source>
+            <translation>Ihr Team arbeitet mit FreeCAD {team}; dies ist {here}</translation>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
