@@ -129,3 +129,9 @@ def test_files_of_one_name_are_told_apart_by_their_folders() -> None:
         "q/b/Lid.FCStd",
     ]
     assert told_apart(["C:\\\\v\\\\a\\\\Lid.FCStd"]) == {"C:\\\\v\\\\a\\\\Lid.FCStd": "Lid.FCStd"}
+
+
+def test_a_value_is_put_in_as_it_is() -> None:
+    """A name that looks like a place for another value stays, and so does a place without a value."""
+    assert words.filled("{who}: {n} {left}", who="{n}", n=3) == "{n}: 3 {left}"
+    assert words.translate("Silo", "{who} has {n}", who="Arm {n}", n=2) == "Arm {n} has 2"
