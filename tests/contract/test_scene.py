@@ -21,8 +21,13 @@ STILL = [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
 TURNED = [0.0, -1, 0, 0.5, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
 
 
-def glb(*keys: str, change: Callable[[dict[str, Any]], object] = lambda _: None, last: int = 2) -> bytes:
-    """A triangle for each key; ``change`` spoils its JSON."""
+def glb(
+    *keys: str,
+    change: Callable[[dict[str, Any]], object] = lambda _: None,
+    last: int = 2,
+    behind: bytes = b"",
+) -> bytes:
+    """A triangle for each key; ``change`` spoils its JSON, and ``behind`` is more of its buffer."""
     made = Glb()
     points = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0]])
     low, size, matrix = cube(points)
@@ -32,7 +37,8 @@ def glb(*keys: str, change: Callable[[dict[str, Any]], object] = lambda _: None,
         made.roots.append(made.node(mesh, matrix, extras={"key": key}))
     body = made.packed()
     length = struct.unpack_from("<I", body, 12)[0]
-    document, rest = json.loads(body[20 : 20 + length]), body[20 + length :]
+    document, blob = json.loads(body[20 : 20 + length]), body[28 + length :] + behind
+    rest = struct.pack("<I4s", len(blob), b"BIN\0") + blob
     change(document)
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
@@ -221,7 +227,34 @@ def spoil(path: str, value: Any) -> Callable[[dict[str, Any]], None]:
     return change
 
 
+def accessor(**more: Any) -> dict[str, Any]:
+    """The first of a view that holds three points."""
+    return {"bufferView": 0, "componentType": 5123, "count": 3, "type": "VEC3", **more}
+
+
+def spoilt(**changes: Any) -> bytes:
+    """A GLB with several values put at ``a__0__b``; what is put at the end of a list makes it longer."""
+
+    def change(document: dict[str, Any]) -> None:
+        for path, value in changes.items():
+            name, _, rest = path.partition("__")
+            if rest.isdigit() and int(rest) == len(document[name]):
+                document[name].append(value)
+            else:
+                spoil(path.replace("__", "."), value)(document)
+
+    return glb("A", change=change, behind=b"\xff" * 1000)
+
+
+def bare(size: int = 0) -> bytes:
+    """A GLB of JSON alone, whose length is off by so much."""
+    text = json.dumps({"asset": {"version": "2.0"}, "scenes": [{"nodes": []}]}).encode()
+    return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text), len(text) + size, b"JSON") + text
+
+
 HUGE = 10**30
+LIGHT = {"attributes": {"POSITION": 0}, "indices": 2}
+KEYED = {"extras": {"key": "A"}}
 GEOMETRIES: dict[str, Any] = {
     "no GLB": b"hello",
     "nothing": b"",
@@ -230,6 +263,25 @@ GEOMETRIES: dict[str, Any] = {
     "a tail": glb("A") + b"1234",
     "a length of 4 GB": b"glTF\2\0\0\0\xff\xff\xff\xff" + glb("A")[12:],
     "a JSON chunk of 4 GB": glb("A")[:12] + b"\xff\xff\xff\xff" + glb("A")[16:],
+    "a JSON chunk that ends behind the file": bare(4),
+    "another chunk than BIN": glb("A").replace(b"BIN\0", b"XXX\0"),
+    "a BIN chunk that is shorter than the rest": glb("A").replace(b",\0\0\0BIN", b"(\0\0\0BIN"),
+    "a view of another buffer": spoilt(bufferViews__0__buffer=1),
+    "a wide stride": spoilt(bufferViews__3={"buffer": 0, "byteLength": 4, "byteStride": 256}),
+    "an accessor of nothing": spoilt(accessors__3=accessor(count=0)),
+    "an accessor before its view": spoilt(accessors__3=accessor(byteOffset=-4)),
+    "an accessor whose stride leads out of its view": spoilt(accessors__3=accessor(count=4)),
+    "ten million vertices": spoilt(
+        bufferViews__3={"buffer": 0, "byteLength": 1000},
+        accessors=[accessor(bufferView=3, componentType=5121, type="SCALAR", count=1000)] * 10_001,
+    ),
+    "20 001 nodes": spoilt(nodes=[KEYED] * 20_001, scenes__0__nodes=list(range(20_001))),
+    "20 001 meshes": spoilt(meshes=[{"primitives": []}] * 20_001, nodes__0=KEYED),
+    "100 001 primitives": spoilt(meshes__0__primitives=[LIGHT] * 100_001),
+    "indices in threes": spoilt(accessors__2__type="VEC3", accessors__2__count=1),
+    "indices with a stride": spoilt(bufferViews__2__byteStride=2),
+    "fewer normals than points": glb("A", last=1, change=spoil("accessors.1.count", 2)),
+    "indices behind an offset": spoilt(bufferViews__2__byteLength=14, accessors__2__byteOffset=8),
     "JSON that nests": struct.pack("<4sIII4s", b"glTF", 2, 100_020, 100_000, b"JSON") + b"[" * 100_000,
     **{
         f"{path} = {value!r:.40}": glb("A", change=spoil(path, value))
@@ -247,6 +299,8 @@ GEOMETRIES: dict[str, Any] = {
             "accessors.0.sparse": {"count": 1},
             "accessors.0.max": [float("nan")] * 3,
             "nodes.0.matrix": [1e400] * 16,
+            "nodes.0.translation": [10**400] * 3,
+            "nodes.0.scale": [-(10**400)] * 3,
             "nodes.0.mesh": 7,
             "nodes.0.children": [0],
             "nodes.0.extras": {},
@@ -276,6 +330,8 @@ STRUCTURES: dict[str, Any] = {
     "a huge number": structure(A={"uses": [use("A", matrix=[1e7, *STILL[1:]])]}),
     "a colour of 2": structure(A={"uses": [use("A", color=[2, 0, 0, 1])]}),
     "control characters": structure(A={"label": "a\0b"}),
+    "control characters in a use": structure(A={"uses": [use("A", member="a\0b")]}),
+    "an endless whole number": structure(A={"uses": [use("A", matrix=[-(10**400), *STILL[1:]])]}),
     "a long label": structure(A={"label": "a" * 2000}),
     "too many products": structure(**{f"P{n}": {} for n in range(20_001)}),
 }

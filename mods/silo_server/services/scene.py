@@ -12,7 +12,6 @@ from __future__ import annotations
 import gzip
 import io
 import json
-import math
 import struct
 import zlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -193,6 +192,8 @@ def check_glb(body: bytes) -> None:
 _SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _PARTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _INDICES: Mapping[int, Literal["B", "H", "I"]] = {5121: "B", 5123: "H", 5125: "I"}
+# A larger whole number is infinity to a browser.
+MOST = 1e300
 # Whatever else a glTF may hold makes a browser load or build something.
 _KEYS = {"asset", "scene", "scenes", "nodes", "meshes", "materials", "accessors", "bufferViews", "buffers"}
 _KEYS |= {"extensionsUsed", "extensionsRequired"}
@@ -216,7 +217,7 @@ def _glb_problem(body: bytes) -> str:
         for primitive in document.get("buffers", ())
     ):
         return "wanted one buffer inside the GLB, got another"
-    if not all(map(math.isfinite, _numbers(document))):
+    if not all(abs(number) <= MOST for number in _numbers(document)):
         return "wanted finite numbers, got NaN or infinity"
     views = document.get("bufferViews", ())
     for view in views:
@@ -271,14 +272,14 @@ def _at(rows: Sequence[Any], number: int) -> Any:
     return rows[number]
 
 
-def _numbers(value: Any) -> Iterable[float]:
+def _numbers(value: Any) -> Iterable[int | float]:
     stack = [value]
     while stack:
         part = stack.pop()
         if isinstance(part, dict | list):
             stack.extend(part.values() if isinstance(part, dict) else part)
         elif isinstance(part, int | float):
-            yield min(part, 1e300) if isinstance(part, int) else part
+            yield part
 
 
 # --- the scene ---
