@@ -15,13 +15,16 @@ FreeCAD loads compiled files, so each ``silo_de.ts`` has its ``silo_de.qm``, as 
 Each of ``DOMAINS`` has ``locale/<language>/LC_MESSAGES/<domain>.po`` in its package, for the standard
 library's gettext, and the compiled ``.mo`` beside it. Their texts stand in ``_("…")``, in ``N_("…")``, which
 is translated when it is shown, or in ``plural(n, "line", "lines")`` (without the last: with an s), in Python,
-templates and scripts. The texts of templates are all that a person reads in them.
+templates and scripts. The texts of templates are all that a person reads in them. Those of silo, without the
+add-on, are its English sentences with ``{name}`` for what is filled in (``silo.bom.errors.spoken``): each
+literal of several words. Its single words stand in ``_WORDS``.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import itertools
 import os
 import re
 import struct
@@ -294,7 +297,132 @@ def _texts_of_server(package: Path) -> Iterator[tuple[str, str, Path]]:
         yield from ((text, "", path) for text in render.texts_of_script(path))
 
 
-DOMAINS = [Domain("silo_server", ROOT / "mods" / "silo_server", _texts_of_server)]
+# Single words that are shown, what argparse says, and what several words are made of.
+_WORDS = """
+usage: |options|positional arguments|show this help message and exit|example:
+the following arguments are required: {arguments}|unrecognized arguments: {arguments}
+argument {argument}: invalid choice: {choice} (choose from {choices})
+argument {argument}: invalid {type} value: {value}|argument {argument}: expected one argument
+argument {argument}: expected at least one argument
+argument {argument}: not allowed with argument {other}|one of the arguments {arguments} is required
+reading|server|geometry|materials|BOM|results|links|working|calculating|reading {n} files
+Part number|Name|Quantity|Unit|Commit|What|Since|State|Why|In|Before|After|By|missing|added|removed
+quantity|line|data|file|updated|Errors|Warnings|Moved|Notes|Cancelled.|Stopped.|same|edited|waiting
+paused|moved|configuration|cache|identities|address|token|mode|who|items|schema|modules|events
+inertia|live|none|{n} merged|{n} unchanged|{n} dry run|{n} blocked|{n} unregistered|{n} failed
+{n} missing|{n} min|{n} hours|{n} days|in {n} s|in {n} min|in {n} hours|in {n} days|BOM merged
+BOM unchanged|BOM blocked|BOM unregistered|BOM failed|reading {n} s|server {n} s
+it is missing
+"""
+# What no person reads as it stands, and what has a catalogue of its own.
+_WITHOUT = re.compile(
+    r"workbench/|inertia/|drawing/|testing\.py|cli/shapes\.py|bom/(headers|standard)\.py|api/wire\.py|"
+    r"fcstd/properties\.py"
+)
+# No text for people.
+_NO_TEXT = re.compile(
+    "|".join(
+        (
+            # SQL
+            r"\b(SELECT|INSERT|DELETE FROM|UPDATE|PRAGMA|CREATE|REPLACE INTO|VALUES|PRIMARY|NOT NULL|NULL)\b",
+            r"\b(INTEGER|REAL|ORDER BY)\b|\{select\}|= \?|^[a-z_]+(, [a-z_]+)+$",
+            # markup, JSON, style
+            r"^</?\w+|</\w+>|=\"|\": |doctype|^:?\w+\{|:[\w-]+\(|[\w-]+:[\w#./-]+;|^(bold|dim) |\{task\.",
+            # HTTP, logs
+            r"Content-|^\w+/[\w+-]+;|Bearer|gzip|boundary|%s",
+            # patterns, names of classes, programs, types
+            r"\(\?|\\|signal \(SIG|^(?=\w+[A-Z])[A-Z]\w+( [A-Z]\w+)*$|\w::\w|sys; print|\w \| \w|Mapping\[",
+            r"UUIDs|Client\(|module \{|^\{typeid\} \{name\} of|^\{meta_key\}",
+            # commands, and what only repeats a sentence
+            r"^\s*silo-mod ([a-z-]+ |\[)|^silo-mod \w+$|^silo-mod \{version\}|^silo-mod: \{(?!text)\w+\}$",
+            r"^silo-mod: \{(error\}\. |why\}: )",
+            # standards, folders
+            r"(\d+ ){2}|\b(ISO|DIN) \d|Application Support",
+        )
+    )
+)
+
+
+def texts_of_sentences(path: Path) -> Iterator[tuple[str, str, Path]]:
+    """Yield the sentences of a Python file that are said in another language when they are shown.
+
+    That is each literal of at least two words, and each with words and placeholders; lines are texts of their
+    own. A placeholder is called as the last name of its expression. Keys of dictionaries are no texts.
+    """
+    found: list[tuple[int, int, str]] = []
+    for node in ast.walk(ast.parse(path.read_text("utf-8"), str(path))):
+        # Docstrings; what is compared; the parts of a literal, and its formats.
+        if isinstance(node, ast.Expr | ast.Compare | ast.JoinedStr | ast.Subscript | ast.MatchValue):
+            continue
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "counted":
+            one, *many = (word.value for word in node.args[1:] if isinstance(word, ast.Constant))
+            found += [(node.lineno, 0, f"{{n}} {word}") for word in (one, *(many or [f"{one}s"]))]
+        for child in ast.iter_child_nodes(node):
+            if not isinstance(child, ast.Constant | ast.JoinedStr):
+                continue
+            lines = _pattern_of(child).split("\n")
+            # Many lines are a program, a style or a schema; those of the command line are a help.
+            is_text = len(lines) < 4 or "cli" in path.parts
+            if is_text and not (isinstance(node, ast.Dict) and child in node.keys):
+                found += [(child.lineno, child.col_offset, line) for line in lines]
+    for _line, _column, text in sorted(found):
+        if not _NO_TEXT.search(text):
+            core = _core(text)
+            if re.search("[A-Za-z]{2}", re.sub(r"\{\w+\}", "", core)) and " " in core:
+                yield core, "", path
+
+
+def _core(text: str) -> str:
+    """Return a text without the signs and spaces around it."""
+    numbers = itertools.count()
+    named = re.sub(r"\{(\w*)(?::\w+|!r)?\}", lambda place: f"{{{place[1] or next(numbers)}}}", text)
+    core = re.sub(r"^[^\w{\[-]+|\s+$", "", named)
+    return core.removesuffix(")") if core.count(")") > core.count("(") else core
+
+
+def _pattern_of(literal: ast.Constant | ast.JoinedStr) -> str:
+    if isinstance(literal, ast.Constant):
+        return literal.value if isinstance(literal.value, str) else ""
+    known: dict[str, str] = {}
+    made = ""
+    for part in literal.values:
+        if isinstance(part, ast.Constant):
+            made += part.value
+            continue
+        source = ast.unparse(part.value)
+        names = re.findall(r"[A-Za-z]\w*", re.sub(r"'[^']*'", "", source.partition(" if ")[0]))
+        name = wanted = names[-1].lower() if names else "value"
+        while known.setdefault(name, source) != source:
+            name = f"{wanted}{len(known)}"
+        made += f"{{{name}}}"
+    return made
+
+
+def _texts_of_silo(package: Path) -> Iterator[tuple[str, str, Path]]:
+    sys.path.insert(0, str(package.parent))
+    from silo.bom.findings import FindingCode
+    from silo.cli.main import THEMES
+
+    # Lists of commands and of endings, in tables of options.
+    lists = {command for commands in THEMES.values() for command in commands}
+    lists |= {"{ask}", "{read}", "{servers}", "html", ".html", ".md", "md", ".json", ".xml", ".csv"}
+    for word in (*THEMES, *re.split(r"[|\n]", _WORDS.strip())):
+        yield word, "", package / "cli" / "main.py"
+    for path in sorted(package.rglob("*.py")):
+        name = path.relative_to(package).as_posix()
+        if name == "bom/findings.py":
+            for code in FindingCode:
+                yield from ((text, "", path) for text in (code.meaning, code.sentence, code.tail) if text)
+        elif not _WITHOUT.match(name):
+            for text, many, where in texts_of_sentences(path):
+                if not lists.issuperset(text.split()):
+                    yield text, many, where
+
+
+DOMAINS = [
+    Domain("silo_server", ROOT / "mods" / "silo_server", _texts_of_server),
+    Domain("silo-mod", ROOT / "mods" / "silo", _texts_of_silo),
+]
 
 
 def po(language: str, messages: Iterable[Message], plurals: str) -> str:

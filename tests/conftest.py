@@ -37,6 +37,7 @@ settings.load_profile("unhurried")
 # What a person has set for herself is no matter here: her server, her terminal, her proxy for loopback.
 for name in ("SILO_API_URL", "SILO_API_TOKEN", "COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR"):
     os.environ.pop(name, None)
+os.environ["SILO_LANGUAGE"] = "en"  # that of the machine is no matter
 for name in ("no_proxy", "NO_PROXY"):
     os.environ[name] = ",".join(filter(None, (os.environ.get(name), "127.0.0.1,localhost,::1")))
 

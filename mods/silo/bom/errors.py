@@ -27,14 +27,19 @@
     │   └── VersionConflictError  412: somebody else changed it first
     └── CancelledError          a person stopped it; not a failure
 
-A message says what was wanted, what was got, where, and what to do.
+A message says what was wanted, what was got, where, and what to do. It is English, for it is stored, compared
+and sent; :func:`spoken` says it in the language of a person where it is shown.
 """
 
 from __future__ import annotations
 
 import difflib
+import os
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
+from functools import cache
+from pathlib import Path
 from typing import Any, ClassVar
 
 
@@ -87,6 +92,69 @@ def listed(names: Sequence[str], most: int = 5) -> str:
     """Return the first ``most`` names, and how many more there are: a, b and 3 more."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
+
+
+def spoken(text: str, language: str = "") -> str:
+    """Say a finished English text of ours in a language (default: that of the environment)."""
+    if not language:
+        names = ("SILO_LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG")
+        language = next(filter(None, map(os.environ.get, names)), "en")
+    return text if language.startswith(("en", "C")) else _sentences(re.split("[_.@-]", language)[0])(text)
+
+
+@cache
+def _sentences(language: str) -> Sentences:
+    import gettext  # an English start does not pay for it
+
+    folder = Path(__file__).parents[1] / "locale"
+    found = gettext.translation("silo-mod", folder, [language], fallback=True)
+    return Sentences(getattr(found, "_catalog", {}))  # texts cannot be listed in another way
+
+
+class Sentences:
+    """Says English sentences in another language.
+
+    The catalogue has patterns with ``{name}`` for what is filled in, which may be a sentence as well; ``{n}``
+    is a number. Of several patterns the one with the most words of its own is taken. What the catalogue does
+    not have stays as it is.
+    """
+
+    LONGEST = 1000
+
+    def __init__(self, catalogue: Mapping[str, str]) -> None:
+        self._catalogue = {text: done for text, done in catalogue.items() if text}
+        split = [(re.split(r"\{\w+\}", text), text) for text in catalogue if "{" in text]
+        # The name of the program is no part of a sentence.
+        self._patterns = sorted(split, key=lambda pair: (pair[1][:4] != "silo", -sum(map(len, pair[0]))))
+
+    def __call__(self, text: str, whole: bool = True) -> str:
+        """Say ``text``; of a part of a sentence, single words stay: they may be somebody's names."""
+        if "\n" in text:
+            return "\n".join(self(line, whole) for line in text.split("\n"))
+        if text in self._catalogue and (whole or " " in text):
+            return self._catalogue[text]
+        for parts, pattern in self._patterns if len(text) <= self.LONGEST else ():
+            if all(map(text.__contains__, parts)) and (found := self._match(parts, pattern, text, whole)):
+                return re.sub(r"\{\w+\}", lambda place: found[place[0]], self._catalogue[pattern])
+        before, core = re.findall(r"^([^\w{\[-]*)(.*?)\s*$", text)[0]
+        if core != text:
+            return f"{before}{self(core, whole)}{text[len(before) + len(core) :]}" if core else text
+        for between in ("  ", ". ", "; ", ": ", " (", ", "):
+            if between in text:
+                return between.join(self(piece, False) for piece in text.split(between))
+        core = text.rstrip(").:;?!…")
+        return f"{self(core, whole)}{text[len(core) :]}" if core not in ("", text) else text
+
+    def _match(self, parts: Sequence[str], pattern: str, text: str, whole: bool) -> dict[str, str]:
+        places = re.findall(r"\{\w+\}", pattern)
+        if not whole and "{n}" not in places and len(re.findall(r"[^\W\d_]{2}\b", " ".join(parts))) < 2:
+            return {}
+        ways = (r"(\d+)" if place == "{n}" else "(.*?)" for place in places)
+        found = re.fullmatch(
+            "".join(map("".join, zip(map(re.escape, parts), (*ways, ""), strict=True))), text
+        )
+        values = (self(value, False) for value in (found.groups() if found else ()))
+        return dict(zip(places, values, strict=False))
 
 
 class SiloError(Exception):

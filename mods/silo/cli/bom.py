@@ -27,6 +27,7 @@ from silo.bom.errors import (
     SiloError,
     counted,
     did_you_mean,
+    spoken,
 )
 from silo.bom.findings import FindingCode
 from silo.bom.headers import safe_cell
@@ -681,7 +682,7 @@ def _show_changes(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: Fol
 
     out = show.console()
     for change in changes:
-        out.print(Text(show.plain(_title(change)), "bold"))
+        out.print(Text(show.plain(spoken(_title(change))), "bold"))
         table = Table(box=None, pad_edge=False, show_header=False)
         columns: tuple[Literal["left", "right"], ...] = ("left", "left", "right", "left")
         for justify in columns:
@@ -693,15 +694,16 @@ def _show_changes(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: Fol
                 Text(f"  {mark}", style),
                 name,
                 _quantities(line),
-                Text(show.plain(_where(line, change)), "dim"),
+                Text(show.plain(spoken(_where(line, change))), "dim"),
             )
         if change.lines:
             out.print(table)
         out.print()
     if not changes:
-        out.print(Text(_unchanged(old, new), "green" if new.assemblies and new.complete else "yellow"))
+        text = spoken(_unchanged(old, new))
+        out.print(Text(text, "green" if new.assemblies and new.complete else "yellow"))
     for words in (*_incomplete(old, "old"), *_incomplete(new, "new")):
-        out.print(Text("✗ ", "bold red").append(show.plain(words), ""))
+        out.print(Text("✗ ", "bold red").append(show.plain(spoken(words)), ""))
 
 
 def _name(entry: BomEntry) -> str:

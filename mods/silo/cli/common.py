@@ -26,6 +26,7 @@ from silo.bom.errors import (
     SeveralAssembliesError,
     SiloError,
     duration,
+    spoken,
 )
 from silo.bom.findings import respelt_findings
 from silo.bom.links import extract
@@ -360,7 +361,7 @@ class ProgressPrinter:
             if self.step:
                 from silo.cli.show import plain
 
-                text = plain(f"silo-mod {self._command}: {self.step}, {now - self._begun:.0f} s")
+                text = plain(f"silo-mod {self._command}: {spoken(self.step)}, {now - self._begun:.0f} s")
                 print(text, file=sys.stderr, flush=True)
 
 

@@ -22,7 +22,7 @@ from urllib.parse import quote
 from xml.etree import ElementTree
 
 from silo.batch import source_document
-from silo.bom.errors import DocumentError, Exit, InputError, ServerFaultError
+from silo.bom.errors import DocumentError, Exit, InputError, ServerFaultError, spoken
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
 from silo.bom.resolve import consolidation_findings
@@ -128,7 +128,7 @@ class Demo:
     def say(self, text: str) -> None:
         self.step += 1
         self.out.print()
-        self.out.rule(f"[bold]{self.step}  {text}", align="left")
+        self.out.rule(f"[bold]{self.step}  {spoken(text)}", align="left")
 
     def play(self) -> None:
         """All steps."""

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext, redirect_stdout, suppress
 from typing import Any, NoReturn, TextIO, TypeVar
 
-from silo.bom.errors import CancelledError, Exit, InputError, SiloError, did_you_mean, exit_of
+from silo.bom.errors import CancelledError, Exit, InputError, SiloError, did_you_mean, exit_of, spoken
 
 T = TypeVar("T")
 
@@ -185,8 +185,32 @@ THEMES = {
 
 _EPILOG = """exit codes: 0 done, 1 differences or something left undone, 2 bad input, 3 server, 130 cancelled
 
-The server and the token come from --server and --token, else from SILO_API_URL and SILO_API_TOKEN, else from
-the configuration file. `silo-mod serve` starts a server of your own; `silo-mod demo` shows it all at once."""
+The server and the token come from --server and --token, else from SILO_API_URL and SILO_API_TOKEN, else \
+from the configuration file. `silo-mod serve` starts a server of your own; `silo-mod demo` shows it all at \
+once."""
+
+
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """In the language of the person; lines are folded, but for examples."""
+
+    def add_usage(self, usage: str | None, actions: Any, groups: Any, prefix: str | None = None) -> None:
+        super().add_usage(usage, actions, groups, spoken("usage: ") if prefix is None else prefix)
+
+    def start_section(self, heading: str | None) -> None:
+        super().start_section(spoken(heading or ""))
+
+    def _get_help_string(self, action: argparse.Action) -> str:
+        return spoken(action.help or "")
+
+    def _fill_text(self, text: str, width: int, _indent: str) -> str:
+        import textwrap
+
+        return "\n".join(
+            line
+            if line.startswith("  silo-mod")
+            else textwrap.fill(line, width, subsequent_indent=" " * 17 * line.startswith(" "))
+            for line in text.splitlines()
+        )
 
 
 class _Parser(argparse.ArgumentParser):
@@ -217,8 +241,10 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     parser = _Parser(
         prog="silo-mod",
         usage="silo-mod [-h] [--version] COMMAND ...",
-        description="The BOM of FreeCAD assemblies in Silo: read, compare, sync, register; mass and inertia.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description=spoken(
+            "The BOM of FreeCAD assemblies in Silo: read, compare, sync, register; mass and inertia."
+        ),
+        formatter_class=_Help,
         allow_abbrev=False,
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
@@ -226,15 +252,16 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     chosen = None if words is None else next((word for word in words if not word.startswith("-")), "")
     lines = []
     for theme, names in THEMES.items():
-        lines.append(f"\n{theme}:")
-        for name, (module, help_text, example) in names.items():
+        lines.append(f"\n{spoken(theme)}:")
+        for name, (module, text, example) in names.items():
+            help_text = spoken(text)
             lines.append(f"  {name:<14} {help_text}")
             one = commands.add_parser(
                 name,
                 help=help_text,
                 description=help_text[0].upper() + help_text[1:] + ".",
-                epilog=f"example:\n  {example}",
-                formatter_class=argparse.RawDescriptionHelpFormatter,
+                epilog=f"{spoken('example:')}\n  {example}",
+                formatter_class=_Help,
                 allow_abbrev=False,  # --all is no --allow-missing
             )
             if chosen in (None, name):
@@ -244,7 +271,7 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
                 getattr(importlib.import_module(f"silo.cli.{module}"), add)(one)
                 add_shared(one, name)
                 one.set_defaults(parser=one)
-    parser.epilog = "\n".join([*lines, "", _EPILOG])
+    parser.epilog = "\n".join([*lines, "", spoken(_EPILOG)])
     return parser
 
 
@@ -266,7 +293,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     output, errors = sys.stdout, sys.stderr
     sys.stdout = kept = _Output(output)
-    sys.stderr = main_output = _Output(errors)
+    sys.stderr = main_output = _Output(errors, spoken)
     try:
         code = _run(argv)
         kept.flush()
@@ -390,17 +417,19 @@ class _Output(io.TextIOBase):
     """A stream whose end does not end the work: what nobody can read any more is dropped, the rest is done.
 
     ``head`` closes its pipe after ten lines, a disk is full: a sync is finished anyway, and its report
-    written. ``failure`` is what went wrong. ``strict``: raise it instead, for commands without an end.
+    written. ``failure`` is what went wrong. ``strict``: raise it instead, for commands without an end. What a
+    person alone reads is ``translated``.
     """
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+    def __init__(self, stream: TextIO, translated: Callable[[str], str] = str) -> None:
+        self._stream, self._translated = stream, translated
         self.failure: OSError | None = None
         self.strict = self.begun = False
 
     def write(self, text: str, /) -> int:
         self.begun = True
-        return self._attempt(lambda: self._stream.write(text), len(text))
+        shown = self._translated(text)
+        return self._attempt(lambda: self._stream.write(shown), len(text))
 
     def flush(self) -> None:
         self._attempt(self._stream.flush, None)

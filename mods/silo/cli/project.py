@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import Exit, UnreachableError, counted, exit_of
+from silo.bom.errors import Exit, UnreachableError, counted, exit_of, spoken
 from silo.bom_sync import draft_text
 from silo.cli import common
 
@@ -138,9 +138,9 @@ def _show_models(models: int, undrawn: list[str]) -> None:
     from silo.cli import show
 
     if models:
-        show.console().print(Text(f"Silo can show {counted(models, 'more file')} in 3D", "dim"))
+        show.console().print(Text(spoken(f"Silo can show {counted(models, 'more file')} in 3D"), "dim"))
     for problem in undrawn:
-        show.console().print(Text(show.plain(f"! {problem}. The commit stands"), "yellow"))
+        show.console().print(Text(show.plain(spoken(f"! {problem}. The commit stands")), "yellow"))
 
 
 def _unsound(belonging: Belonging) -> bool:
@@ -200,24 +200,25 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
     from silo.cli import show
 
     out = show.console()
-    out.print(Text(show.plain(f"Project {belonging.project.root}"), "bold"))
+    out.print(Text(show.plain(spoken(f"Project {belonging.project.root}")), "bold"))
     for standing in standings:
         mark, style = _MARKS[standing.state.name]
         line = (
             Text(f"{mark} ", style)
             .append(show.plain(standing.file.place))
-            .append(f"  {standing.state.value}", style)
+            .append(f"  {spoken(standing.state.value)}", style)
         )
         if standing.newest is not None:
-            line.append(f"  revision {standing.newest.revision_number}", "dim")
+            line.append(spoken(f"  revision {standing.newest.revision_number}"), "dim")
         if not standing.file.item:
             count = len({item for item, _ in standing.file.held})
-            line.append(f"  {f'{count} items in it' if count else 'a file without a part number'}", "dim")
+            held = f"{count} items in it" if count else "a file without a part number"
+            line.append(f"  {spoken(held)}", "dim")
         if standing.file.moved_from:
-            line.append(show.plain(f"  was {standing.file.moved_from}"), "cyan")
+            line.append(show.plain(spoken(f"  was {standing.file.moved_from}")), "cyan")
         out.print(line)
         if standing.file.problem:
-            out.print(Text(show.plain(f"  {standing.file.problem}"), "yellow"))
+            out.print(Text(show.plain(spoken(f"  {standing.file.problem}")), "yellow"))
     notes = [
         *(
             (f"{place}: its link {link} leads out of the project, and is not sent")
@@ -232,7 +233,7 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
         ),
     ]
     for note in notes:
-        out.print(Text(show.plain(f"! {note}"), "yellow"))
+        out.print(Text(show.plain(spoken(f"! {note}")), "yellow"))
 
 
 def _show_sent(
@@ -247,19 +248,21 @@ def _show_sent(
         revision = f"revision {row['revision']}" if row["revision"] else ""
         bom = f"BOM {row['bom'].replace('_', ' ')}" if row["bom"] else ""
         text = ", ".join(filter(None, (row["part_number"], revision, bom, row["remark"])))
-        out.print(Text("✓ ", "green").append(show.plain(f"{row['path']}  {text}")))
+        out.print(Text("✓ ", "green").append(show.plain(f"{row['path']}  {spoken(text)}")))
     for entry in left:
-        out.print(Text("✗ ", "red").append(show.plain(f"{entry.label} waits in the queue: {entry.reason}")))
+        text = spoken(f"{entry.label} waits in the queue: {entry.reason}")
+        out.print(Text("✗ ", "red").append(show.plain(text)))
     for late in behind:
         advice = {
             "NEWER": "was not sent: silo-mod pull fetches the newer file",
             "BOTH": "was not sent: look at the newer file (silo-mod log); --on-top sends yours on top of it",
             "NO_ITEM": "was not sent: is this the right server? Else take the identity out and register it",
         }[late.state.name]
-        out.print(Text("✗ ", "red").append(show.plain(f"{late.file.place} {advice}")))
+        out.print(Text("✗ ", "red").append(show.plain(f"{late.file.place} {spoken(advice)}")))
     if report.busy:
-        out.print(Text("Another program sends the queue now; what waits goes with it", "yellow"))
+        out.print("Another program sends the queue now; what waits goes with it", style="yellow")
     if report.stopped_by is not None:
-        out.print(Text(show.plain(f"Stopped: {report.stopped_by}. Run it again to send the rest"), "red"))
+        text = f"Stopped: {report.stopped_by}. Run it again to send the rest"
+        out.print(show.plain(text), style="red", markup=False)
     if not (sent or left or behind):
         out.print("Nothing to send: Silo has all of it")

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.document import relative
-from silo.bom.errors import ConflictError, DocumentError, Exit, InputError, SiloError, counted
+from silo.bom.errors import ConflictError, DocumentError, Exit, InputError, SiloError, counted, spoken
 from silo.bom.model import Extraction, walk_entries
 from silo.bom.report import base_of
 from silo.bom.resolve import Proposal, propose
@@ -494,7 +494,7 @@ class _Run:
             [article for article in articles if article.entry.key not in declared],
         )
         if already and not self.args.json:
-            print(f"{already} of the table's components had their number already.")
+            print(spoken(f"{already} of the table's components had their number already."))
 
 
 def _declare(args: argparse.Namespace) -> int:
@@ -542,9 +542,10 @@ def _undeclare(args: argparse.Namespace) -> int:
     if args.json:
         common.print_json({"undeclared": taken})
     elif no_part:
-        print(f"No part of any BOM: {', '.join(taken)} (SiloBomExclude).")
+        print(spoken(f"No part of any BOM: {', '.join(taken)} (SiloBomExclude)."))
     else:
-        print(f"Undecided again: {', '.join(taken)}. The next sync flags a line of it as unreferenced.")
+        text = f"Undecided again: {', '.join(taken)}. The next sync flags a line of it as unreferenced."
+        print(spoken(text))
     return Exit.DONE
 
 
@@ -590,7 +591,7 @@ def _asker(how: str) -> Ask:
         for number, item in enumerate(matches, start=1):
             print(f"  {number}  {item['part_number']}  {item.get('created_at') or ''}", file=sys.stderr)
         common.at("")
-        answer = input("which one is it? [number, n = make a new item] ").strip()
+        answer = input(spoken("which one is it? [number, n = make a new item] ")).strip()
         if answer.isdecimal() and 1 <= int(answer) <= len(matches):
             return matches[int(answer) - 1]
         return None if answer.lower() == "n" else unclear(proposal, matches)

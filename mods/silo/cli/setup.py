@@ -33,6 +33,7 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
     exit_of,
+    spoken,
 )
 from silo.bom_sync import activity_text
 from silo.cli import common
@@ -71,7 +72,7 @@ def run_serve(args: argparse.Namespace) -> int:
     from silo_server.run import Greeting, serve
 
     def tell(greeting: Greeting) -> None:
-        text = json.dumps(asdict(greeting)) if args.json else "\n".join(greeting.lines())
+        text = json.dumps(asdict(greeting)) if args.json else spoken("\n".join(greeting.lines()))
         # A reader of a pipe waits for the address, and the server never ends by itself.
         print(text, flush=True)
 
@@ -124,7 +125,7 @@ def run_summaries(args: argparse.Namespace) -> int:
         count = keep_all(db, _report)
     finally:
         db.close()
-    print(json.dumps({"assemblies": count}) if args.json else f"{count} assemblies summed up.")
+    print(json.dumps({"assemblies": count}) if args.json else spoken(f"{count} assemblies summed up."))
     return Exit.DONE
 
 
@@ -149,7 +150,7 @@ def run_backup(args: argparse.Namespace) -> int:
     for checksum in made.missing_files:
         print(f"missing: the file {checksum} is lost or damaged in the server's store", file=sys.stderr)
     text = f"Backup {args.target}: {sum(made.rows.values())} rows, {made.files} files."
-    print(json.dumps(asdict(made)) if args.json else text)
+    print(json.dumps(asdict(made)) if args.json else spoken(text))
     return Exit.UNDONE if made.missing_files else Exit.DONE
 
 
@@ -166,7 +167,7 @@ def run_restore(args: argparse.Namespace) -> int:
         settings = settings_from_environment(database_url=args.database, files_dir=args.files)
         made = restore(settings, args.source, replace=args.replace, report=_report)
         text = f"Restored the backup of {made.made_at}: {sum(made.rows.values())} rows, {made.files} files."
-    print(json.dumps(asdict(made)) if args.json else text)
+    print(json.dumps(asdict(made)) if args.json else spoken(text))
     return Exit.DONE
 
 
@@ -292,7 +293,7 @@ def run_login(args: argparse.Namespace) -> int:
         common.print_json(data)
     else:
         who = ", ".join(filter(None, (name, role))) or "this server does not say who you are"
-        print(f"{client.base_url}: {who}. Kept in {path}, which only you can read.")
+        print(spoken(f"{client.base_url}: {who}. Kept in {path}, which only you can read."))
     return Exit.DONE
 
 
@@ -323,7 +324,7 @@ def _token_by_browser(args: argparse.Namespace) -> str:
 
 def _token(url: str) -> str:
     if sys.stdin.isatty():
-        token = getpass.getpass(f"API token of {url} (its page “API tokens” makes one): ")
+        token = getpass.getpass(spoken(f"API token of {url} (its page “API tokens” makes one): "))
     else:
         token = sys.stdin.readline()
     if not token.strip():
@@ -351,9 +352,10 @@ def run_doctor(args: argparse.Namespace) -> int:
     else:
         from silo.cli import show
 
-        width = max(map(len, checks))
+        width = max(map(len, map(spoken, checks)))
         for name, value in checks.items():
-            print(f"{'✗' if name in failed else ' '} {name:<{width}}  {show.plain(str(value))}")
+            text = f"{spoken(name):<{width}}  {show.plain(spoken(str(value)))}"
+            print(f"{'✗' if name in failed else ' '} {text}")
     return max((exit_of(error) for error in failed.values()), default=Exit.DONE)
 
 
@@ -529,8 +531,8 @@ def run_install_addon(args: argparse.Namespace) -> int:
     if args.json:
         common.print_json(report)
     else:
-        print(f"{report['freecad']}\nAdd-on:   {report['addon']}\nPackages: {report['packages']}")
-        print("Start FreeCAD again, and choose the workbench Silo.")
+        text = f"{report['freecad']}\nAdd-on:   {report['addon']}\nPackages: {report['packages']}"
+        print(spoken(f"{text}\nStart FreeCAD again, and choose the workbench Silo."))
     return Exit.DONE
 
 

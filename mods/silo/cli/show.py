@@ -16,7 +16,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 from silo.bom.document import relative
-from silo.bom.errors import ConfigError, Exit, NotFoundError
+from silo.bom.errors import ConfigError, Exit, NotFoundError, counted, spoken
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.report import MOST_LINES, base_of, check_tree_size, diff_rows, shorten
@@ -58,6 +58,10 @@ class _Terminal(Console):
         """The reader has seen enough; rich would end with exit code 1, the command line says what that is."""
         raise BrokenPipeError
 
+    def print(self, *shown: Any, **how: Any) -> None:
+        """Print; sentences in the language of the person."""
+        super().print(*(spoken(one) if isinstance(one, str) else one for one in shown), **how)
+
 
 def console(stream: TextIO | None = None) -> Console:
     """Return the terminal. A file or a pipe has no width: each record is one line there, and whole."""
@@ -81,7 +85,7 @@ def entry_text(entry: BomEntry, base: str) -> Text:
     where = relative(entry.doc_path, base)
     text.append(f"  {plain(where)}#{plain(entry.object_name)}", "dim")
     if entry.missing:
-        text.append("  missing", "bold red")
+        text.append(f"  {spoken('missing')}", "bold red")
     return text
 
 
@@ -101,7 +105,7 @@ def bom_tree(extraction: Extraction, base: str = "") -> Tree:
     def grow(branch: Tree, entries: Iterable[BomEntry]) -> None:
         for entry in entries:
             if left[0] <= 0:
-                branch.add(Text("… more; --json has all", "dim"))
+                branch.add(Text(spoken("… more; --json has all"), "dim"))
                 return
             left[0] -= 1
             inner = branch.add(entry_text(entry, base))
@@ -110,7 +114,7 @@ def bom_tree(extraction: Extraction, base: str = "") -> Tree:
 
     def grow_own(branch: Tree, entries: Iterable[BomEntry]) -> None:
         for entry in entries:
-            branch.add(entry_text(entry, base).append("  not an item yet", "yellow"))
+            branch.add(entry_text(entry, base).append(spoken("  not an item yet"), "yellow"))
 
     grow(tree, extraction.entries)
     grow_own(tree, head.own)
@@ -121,7 +125,7 @@ def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """The flat BOM: a purchaser's table of totals."""
     table = Table(box=None, pad_edge=False)
     for title in ("Part number", "Name", "Quantity", "Unit", "Standard or file", ""):
-        table.add_column(title, justify="right" if title == "Quantity" else "left", overflow="fold")
+        table.add_column(spoken(title), justify="right" if title == "Quantity" else "left", overflow="fold")
     for row in rows:
         file = f"{row['doc_path']}#{row['object']}"
         table.add_row(
@@ -130,7 +134,7 @@ def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
             str(row["quantity"]),
             row["unit"],
             Text(plain(row["standard"] or file)),
-            Text("missing" if row["missing"] else "", "bold red"),
+            Text(spoken("missing") if row["missing"] else "", "bold red"),
         )
     return table
 
@@ -141,7 +145,9 @@ def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
     lines = []
     for finding in sorted(findings, key=lambda f: order[f.severity]):
         mark, style = _MARK[finding.severity]
-        lines.append(Text().append(f"{mark} ", style).append(plain(shorten(finding.message, base)), ""))
+        lines.append(
+            Text().append(f"{mark} ", style).append(plain(spoken(shorten(finding.message, base))), "")
+        )
     return Group(*lines)
 
 
@@ -154,7 +160,7 @@ def summary_text(summary: ProductSummary) -> Text:
     rest = len(lines) - MOST_LINES
     shown = [*lines[:MOST_LINES], f"… and {rest} more"] if rest > 0 else lines or ["✓ nothing is open"]
     shown += map(plain, values)
-    return Text("\n").join(Text(line) for line in (f"In Silo, {plain(summary.part_number)}:", *shown))
+    return Text("\n").join(Text(spoken(line)) for line in (f"In Silo, {plain(summary.part_number)}:", *shown))
 
 
 def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -> RenderableType:
@@ -171,20 +177,22 @@ def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -
         ("Quantity", "right"),
         ("", "left"),
     ):
-        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+        table.add_column(spoken(title), justify=justify)  # type: ignore[arg-type]
 
     for kind, number, quantity in diff_rows(diff):
         mark, style, note = _DIFFERENCE[kind]
         name = Text(plain(names.get(number, "")))
-        table.add_row(Text(mark, style), Text(plain(number), style), name, quantity, Text(note, "dim"))
+        table.add_row(
+            Text(mark, style), Text(plain(number), style), name, quantity, Text(spoken(note), "dim")
+        )
     if not table.row_count and not whole:
-        return Text(f"Lines that agree: {len(diff.unchanged)}; the others cannot be compared.", "yellow")
+        text = f"Lines that agree: {len(diff.unchanged)}; the others cannot be compared."
+        return Text(spoken(text), "yellow")
     if not table.row_count:
-        return Text(f"No differences; lines that agree: {len(diff.unchanged)}.", "green")
+        return Text(spoken(f"No differences; lines that agree: {len(diff.unchanged)}."), "green")
     if not diff.unchanged:
         return table
-    lines = "line" if len(diff.unchanged) == 1 else "lines"
-    return Group(table, Text(f"{len(diff.unchanged)} {lines} unchanged.", "dim"))
+    return Group(table, Text(spoken(f"{counted(len(diff.unchanged), 'line')} unchanged."), "dim"))
 
 
 _STATUS = {
@@ -207,27 +215,28 @@ def outcome_text(outcome: Outcome, base: str) -> Text:
     head = outcome.assembly
     who = " ".join(filter(None, (head.part_number, head.name))) or display_name(head)
     text = Text().append(f"{mark} ", style).append(plain(who), "bold")
-    text.append(f": {STATUS_WORDS[outcome.status]}")
+    text.append(f": {spoken(STATUS_WORDS[outcome.status])}")
     if outcome.error is not None:
-        text.append(f": {plain(str(outcome.error))}")
+        text.append(f": {plain(spoken(str(outcome.error)))}")
     text.append(f"  {plain(relative(head.doc_path, base))}", "dim")
     if draft := draft_text(outcome.result):
-        text.append(f"\n  {plain(draft)}", "dim")
+        text.append(f"\n  {plain(spoken(draft))}", "dim")
     for message in unusual(outcome.result):
-        text.append(f"\n  ⚠ {plain(message)}", "yellow")
+        text.append(f"\n  ⚠ {plain(spoken(message))}", "yellow")
     return text
 
 
 def activity_box(activity: ActivityText) -> Panel:
     """The Activity pane's box (spec §6)."""
     body = Text()
-    body.append(f"📋 {plain(activity.headline)}\n", "bold")
-    body.append(plain(activity.counts))
+    body.append(f"📋 {plain(spoken(activity.headline))}\n", "bold")
+    body.append(plain(spoken(activity.counts)))
     if activity.resolve_url:
-        body.append(f"\n[View in Silo →] {plain(activity.resolve_url)}", "cyan")
+        body.append(spoken(f"\n[View in Silo →] {plain(activity.resolve_url)}"), "cyan")
     if activity.unregistered:
-        body.append(f"\n{plain(activity.unregistered)}\n", "yellow").append("[Register Parts...]", "cyan")
-    return Panel(body, title="Database Activity", title_align="left", expand=False, padding=(0, 1))
+        body.append(f"\n{plain(spoken(activity.unregistered))}\n", "yellow")
+        body.append(spoken("[Register Parts...]"), "cyan")
+    return Panel(body, title=spoken("Database Activity"), title_align="left", expand=False, padding=(0, 1))
 
 
 # --- registering ----------------------------------------------------------------------------------------
@@ -356,7 +365,7 @@ def run_search(args: argparse.Namespace) -> int:
     if args.json:
         common.print_json(rows)
     else:
-        _print(rows or [{"part_number": "No item has these words."}])
+        _print(rows or [{"part_number": spoken("No item has these words.")}])
     return Exit.DONE if rows else Exit.UNDONE
 
 
@@ -379,7 +388,7 @@ def run_show(args: argparse.Namespace) -> int:
     if args.json:
         common.print_json({**head, "page": page, "bom": rows})
         return Exit.DONE
-    _print([{**head, "current_revision": f"revision {item.current_revision}"}])
+    _print([{**head, "current_revision": spoken(f"revision {item.current_revision}")}])
     _print(rows)
     print(page)
     return Exit.DONE
@@ -406,11 +415,8 @@ def run_whoami(args: argparse.Namespace) -> int:
         common.print_json(account)
     else:
         who = ", ".join(filter(None, (account["username"], account["role"])))
-        print(
-            plain(
-                f"{account['url']} (from {account['from']}): {who or 'this server does not say who you are'}"
-            )
-        )
+        text = f"{account['url']} (from {account['from']}): {who or 'this server does not say who you are'}"
+        print(plain(spoken(text)))
     return Exit.DONE
 
 
@@ -427,9 +433,9 @@ def run_logout(args: argparse.Namespace) -> int:
     if args.json:
         common.print_json({"configuration": str(path), "removed": there})
     else:
-        print(f"{path} is removed." if there else f"There was no {path}; nothing is remembered.")
+        print(spoken(f"{path} is removed." if there else f"There was no {path}; nothing is remembered."))
         if os.environ.get("SILO_API_TOKEN"):
-            print("SILO_API_TOKEN still has a token.")
+            print(spoken("SILO_API_TOKEN still has a token."))
     return Exit.DONE
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.batch import SyncOptions, TopResult
-from silo.bom.errors import ConfigError, Exit, InputError, SiloError, counted, exit_of
+from silo.bom.errors import ConfigError, Exit, InputError, SiloError, counted, exit_of, spoken
 from silo.cli import common
 from silo.files import check_writable, documents_in
 from silo.outbox.store import KEPT_ASIDE_DAYS
@@ -367,12 +367,12 @@ def _show_queue(
     if not left:
         out.print("Nothing waits: every commit of this computer is in Silo.", markup=False)
         return
-    table = Table("", "Commit", "What", "Since", "State", "Why", box=None, pad_edge=False)
+    table = Table(*map(spoken, ("", "Commit", "What", "Since", "State", "Why")), box=None, pad_edge=False)
     for entry, said in queue_rows:
         name = " ".join(filter(None, (entry.part_number, entry.label or entry.file_name)))
         since = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.taken_at))
         cells = (str(entry.id), show.plain(name), parts(entry), since, said.state, show.plain(said.reason))
-        table.add_row(*map(Text, cells), style="bold" if said.urgent else "")
+        table.add_row(*map(Text, map(spoken, cells)), style="bold" if said.urgent else "")
     out.print(table)
 
 
@@ -422,14 +422,14 @@ def _show_pulled(pulled: Pulled, into: Path) -> None:
     for file in pulled.files:
         mark, style, words = _MARKS[file.state.value]
         text = Text(f"{mark} ", style).append(show.plain(os.path.relpath(file.path, os.path.realpath(into))))
-        text.append(f"  {file.part_number}, revision {file.revision}", "dim")
+        text.append(spoken(f"  {file.part_number}, revision {file.revision}"), "dim")
         if words:
-            text.append(f"  {words}{f' {file.kept}' if file.kept else ''}", style)
+            text.append(f"  {spoken(words)}{f' {file.kept}' if file.kept else ''}", style)
         out.print(text)
     for lost in pulled.lost:
         line = f"{lost.position}: {lost.path} was not fetched: {lost.reason}"
-        out.print(Text("✗ ", "bold red").append(show.plain(line), ""))
-    out.print(Text(show.plain(f"Open {pulled.top}"), "bold"))
+        out.print(Text("✗ ", "bold red").append(show.plain(spoken(line)), ""))
+    out.print(Text(show.plain(spoken(f"Open {pulled.top}")), "bold"))
 
 
 def run_log(args: argparse.Namespace) -> int:
@@ -508,12 +508,12 @@ def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
     first, last = (when.strftime("%Y-%m-%d %H:%M") if when else "" for when in (changes.since, changes.to))
     head = f"{changes.part_number}: what changed from {first} to {last} (UTC)"
     if not changes.changes:
-        out.print(Text(f"{show.plain(head)}: nothing on any level"))
+        out.print(f"{show.plain(head)}: nothing on any level", markup=False)
         return
-    out.print(Text(show.plain(head), "bold"))
+    out.print(Text(show.plain(spoken(head)), "bold"))
     table = Table(box=None, pad_edge=False)
     for title in ("", "Part number", "Name", "In", "Before", "After", "By"):
-        table.add_column(title, overflow="fold")
+        table.add_column(spoken(title), overflow="fold")
     styles = {"added": "green", "removed": "red"}
     for change in changes.changes:
         when = f", {change.at:%Y-%m-%d %H:%M}" if change.at else ""
@@ -525,7 +525,7 @@ def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
             change.after,
             change.username + when,
         )
-        what = Text(change.what, styles.get(change.what, "yellow"))
+        what = Text(spoken(change.what), styles.get(change.what, "yellow"))
         table.add_row(what, *(Text(show.plain(cell)) for cell in cells))
     out.print(table)
 
@@ -581,18 +581,18 @@ def _show_log(
     out = show.console()
     out.print(Text(show.plain(f"{number}  {name}"), "bold"))
     if here[0] is None:
-        out.print(Text("This file is no revision in Silo, and it is not known which one it was made from."))
+        out.print("This file is no revision in Silo, and it is not known which one it was made from.")
     for revision in shown:
         stamp = revision.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if revision.created_at else ""
         text = Text(f"{revision.revision_number:>4}  ", "cyan")
         text.append(f"{stamp}  {show.plain(revision.created_by or '')}  ", "dim")
-        text.append(show.plain(revision.comment) or "(no comment)")
+        text.append(show.plain(revision.comment) or spoken("(no comment)"))
         if not (revision.file_name or revision.file_checksum):
-            text.append("  properties only", "dim")
+            text.append(spoken("  properties only"), "dim")
         if revision.revision_number == here[0]:
-            text.append("  ← this file, edited since" if here[1] else "  ← this file", "green")
+            text.append(spoken("  ← this file, edited since" if here[1] else "  ← this file"), "green")
         out.print(text)
         if said := changes.get(revision.revision_number):
-            out.print(Text(f"      {show.plain(said)}", "yellow"))
+            out.print(Text(f"      {show.plain(spoken(said))}", "yellow"))
     if total > len(shown):
-        out.print(Text(f"… and {total - len(shown)} older; --limit shows more", "dim"))
+        out.print(Text(spoken(f"… and {total - len(shown)} older; --limit shows more"), "dim"))

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The command line in German: what people read is translated, what machines read is not."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import gettext
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from silo.bom import errors
+from silo.bom.errors import Sentences, spoken
+from silo.bom.findings import FindingCode
+from silo.cli.main import THEMES, build_parser
+
+CLI = Path(errors.__file__).parents[1] / "cli"
+COMMANDS = [command for commands in THEMES.values() for command in commands]
+WORDS = re.compile(r"[A-Za-z]{2}\b")
+
+
+@pytest.fixture
+def german(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SILO_LANGUAGE", "de")
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def parsers() -> dict[str, argparse.ArgumentParser]:
+    (commands,) = (
+        action for action in build_parser()._actions if isinstance(action, argparse._SubParsersAction)
+    )
+    return dict(commands.choices)
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_help_is_german_and_80_columns_wide(german: None, run: Any, command: str) -> None:
+    """But for examples, which are copied, and groups of options, which argparse never breaks."""
+    ran = run(*filter(None, (command, "--help")))
+    assert ran.code == 0
+    assert ran.out.startswith("Aufruf: silo-mod")
+    assert "diese Hilfe zeigen" in ran.out
+    assert "Beispiel:" in ran.out or not command
+    for line in ran.out.splitlines():
+        assert len(line) <= 80 or line.startswith(("  silo-mod ", " " * len("Aufruf: silo-mod"))), line
+
+
+def test_each_help_is_translated(german: None) -> None:
+    for command, parser in parsers().items():
+        for action in parser._actions:
+            text = action.help or ""
+            assert not text or spoken(text) != text, (command, text)
+        for group in parser._action_groups:
+            assert spoken(group.title or "") != group.title or group.title == "Server", group.title
+
+
+def test_errors_are_german_for_people_and_english_for_machines(german: None, run: Any) -> None:
+    """The exit code is the same."""
+    ran = run("bom", "nothing.FCStd", "--json")
+    assert ran.code == 2
+    assert json.loads(ran.out)["error"]["message"].endswith("nothing.FCStd: there is no such file")
+    assert "diese Datei gibt es nicht" in ran.err
+    assert "unbekannte Argumente: --flatt; ist --flat gemeint?" in run("bom", "x", "--flatt").err
+    assert "keine FreeCAD-Dateien" in run("sync", str(CLI)).err
+
+
+def test_tables_and_findings_are_german(german: None, run: Any, gearbox: Path) -> None:
+    (gearbox.parent / "parts" / "Cover.FCStd").unlink()
+    ran = run("bom", gearbox, "--flat")
+    assert ran.code == 1
+    assert "Teilenummer" in ran.out
+    assert "fehlt" in ran.out
+    assert re.search(r"✗ Die Datei \S*Cover.FCStd fehlt; verwendet von Cover", ran.out)
+    assert "missing" not in ran.out
+    rows = run("bom", gearbox, "--csv", "-").out.splitlines()
+    assert rows[0] == "level,part number,name,quantity,unit,standard,file,object,missing"
+    found = run("bom", gearbox, "--json").json()["findings"]
+    assert any("is missing; used by" in finding["message"] for finding in found)
+
+
+@pytest.mark.parametrize(
+    ("variables", "said"),
+    [
+        ({"LANG": "de_DE.UTF-8"}, "nicht in Silo"),
+        ({"LANG": "de_DE.UTF-8", "LC_ALL": "C.UTF-8"}, "not in Silo"),
+        ({"LANG": "en_GB.UTF-8", "LC_MESSAGES": "de_AT"}, "nicht in Silo"),
+        ({"LC_ALL": "de_DE", "SILO_LANGUAGE": "en"}, "not in Silo"),
+        ({"LANG": "fr_FR.UTF-8"}, "not in Silo"),
+        ({}, "not in Silo"),
+    ],
+)
+def test_the_language_is_that_of_the_environment(
+    monkeypatch: pytest.MonkeyPatch, variables: dict[str, str], said: str
+) -> None:
+    for name in ("SILO_LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert spoken("not in Silo") == said
+
+
+def test_english_reads_no_catalogue(run: Any) -> None:
+    errors._sentences.cache_clear()
+    assert run("--help").code == 0
+    assert run("bom", "nothing.FCStd").code == 2
+    assert errors._sentences.cache_info().currsize == 0
+
+
+def test_names_stay(german: None) -> None:
+    """A part may be called as a word of ours, and look like the beginning or the end of a sentence."""
+    for name in ("missing", "Open frame", "server", "cover moved", "a: b", "in Silo", "x (file)", "…"):
+        said = spoken(f"The file {name}.FCStd is missing; used by {name}, {name} 2.")
+        assert said == f"Die Datei {name}.FCStd fehlt; verwendet von {name}, {name} 2."
+
+
+def test_each_finding_is_german(german: None) -> None:
+    for code in FindingCode:
+        assert spoken(code.meaning) != code.meaning
+        for text in filter(None, (code.sentence, code.tail)):
+            named = {name: f"<{name.upper()}>" for name in re.findall(r"{(\w+)}", text)}
+            said = spoken(text.format(**named))
+            assert said != text.format(**named)
+            for value in named.values():
+                assert said.count(value) == text.format(**named).count(value), said
+
+
+def test_each_sentence_is_known_again(german: None) -> None:
+    """Filled with values, each pattern of the catalogue gives its own translation with these values."""
+    found = gettext.translation("silo-mod", CLI.parent / "locale", ["de"])
+    catalogue: dict[str, str] = {text: done for text, done in found._catalog.items() if text}
+    speak = Sentences(catalogue)
+    other = []
+    for text, done in catalogue.items():
+        names = dict.fromkeys(re.findall(r"{\w+}", text))
+        said, wanted = text, done
+        for number, name in enumerate(names):
+            value = "7" if name == "{n}" else f"/v{number}/x"
+            said, wanted = said.replace(name, value), wanted.replace(name, value)
+        own = re.sub(r"{\w+}", "", text)
+        # In the middle of a sentence a single word may be somebody's name.
+        if speak(said) != wanted or (
+            len(WORDS.findall(own)) > 1 and speak(f"silo-mod: {said}") != f"silo-mod: {wanted}"
+        ):
+            other.append((said, speak(said), speak(f"silo-mod: {said}"), wanted))
+    assert not other
+
+
+def test_what_the_command_line_prints_goes_through_the_catalogue() -> None:
+    """Headings, marks and prompts are said; standard error, and sentences on a console, are said there."""
+    found = []
+    for path in sorted(CLI.glob("*.py")):
+        tree = ast.parse(path.read_text("utf-8"))
+        said = {
+            id(inner)
+            for call in ast.walk(tree)
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "spoken"
+            for inner in ast.walk(call)
+        }
+        for node in ast.walk(tree):  # keys are no texts
+            if isinstance(node, ast.Subscript | ast.Dict):
+                said.update(map(id, node.keys if isinstance(node, ast.Dict) else [node.slice]))
+        for call in ast.walk(tree):
+            if not isinstance(call, ast.Call):
+                continue
+            name = getattr(call.func, "attr", getattr(call.func, "id", ""))
+            to_errors = any(given.arg == "file" for given in call.keywords)
+            plain = isinstance(call.func, ast.Name) and name == "print" and not to_errors
+            styled = name == "append" and len(call.args) == 2
+            if plain or styled or name in ("Text", "add_column", "input", "getpass"):
+                for one in ast.walk(call.args[0]) if call.args else ():
+                    if not isinstance(one, ast.Constant) or not isinstance(one.value, str):
+                        continue
+                    if WORDS.search(one.value) and id(one) not in said:
+                        found.append(f"{path.name}:{one.lineno}: {one.value}")
+    assert [text for text in found if not re.search(r"silo-mod( \(not installed\))?", text)] == []
