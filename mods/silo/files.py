@@ -325,7 +325,7 @@ def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[s
             tell(text)
             due = now + 60
         time.sleep(0.02 if patience else 0)
-    raise OSError(errno.ESTALE, "its disk shows another file each time")
+    raise OSError(errno.ESTALE, "its disk returns a different file each time")
 
 
 def job_text(env: Mapping[str, str]) -> str | None:

@@ -88,7 +88,7 @@ class Grid:
         if cell.text:
             self.cells[row, column] = cell._replace(text=" ".join(cell.text.splitlines()))
             if len(self.cells) > MOST_CELLS:
-                raise InputError(f"sheet “{self.name}” has more than {MOST_CELLS} cells; that is no BOM")
+                raise InputError(f"sheet “{self.name}” has more than {MOST_CELLS} cells, too many for a BOM")
 
     def covered(self) -> set[tuple[int, int]]:
         """Return the cells that say something under a merged cell, where no program shows it."""
@@ -98,7 +98,7 @@ class Grid:
             size = (bottom - top + 1) * (right - left + 1)
             effort += min(size, len(self.cells))
             if effort > 10 * MOST_CELLS:
-                raise InputError(f"sheet “{self.name}” has merged cells that lie on each other")
+                raise InputError(f"sheet “{self.name}” has merged cells that overlap")
             inside = ((row, column) for row in range(top, bottom + 1) for column in range(left, right + 1))
             for row, column in inside if size < len(self.cells) else self.cells:
                 if top <= row <= bottom and left <= column <= right and (row, column) != (top, left):
@@ -113,7 +113,7 @@ class Grid:
             if (row, column) not in covered:
                 by_row.setdefault(row, {})[column] = cell.text
         if sum(map(max, by_row.values())) > 10 * MOST_CELLS:
-            raise InputError(f"sheet “{self.name}” is too wide; delete what stands outside of the table")
+            raise InputError(f"sheet “{self.name}” is too wide; delete the cells outside of the table")
         return [
             SheetRow(row + 1, tuple(cells.get(column, "") for column in range(max(cells) + 1)))
             for row, cells in by_row.items()

@@ -226,7 +226,7 @@ def _save_tables(settings: Settings, path: Path, report: Report) -> tuple[str, d
         if tx.postgres:
             tx.conn.execute(text("SET LOCAL statement_timeout = 0"))
         if not inspect(tx.conn).has_table("alembic_version"):
-            raise ConfigError("backup: this is no database of a Silo server")
+            raise ConfigError("backup: this is not the database of a Silo server")
         schema = str(tx.conn.scalar(text("SELECT version_num FROM alembic_version")))
         # The backup has the schema that the database has, also where that is older than this version's.
         check_revision(schema)
@@ -354,7 +354,7 @@ def _read_manifest(source: Path) -> Manifest:
     try:
         made = Manifest(**json.loads((source / "manifest.json").read_text("utf-8")))
     except (OSError, ValueError, TypeError) as error:
-        raise ConfigError(f"restore: {source} is no backup: its manifest.json cannot be read") from error
+        raise ConfigError(f"restore: {source} is not a backup: its manifest.json cannot be read") from error
     if made.format != FORMAT:
         raise ConfigError(
             f"restore: the backup has the format {made.format}, this version knows {FORMAT}; use a newer one"

@@ -436,7 +436,7 @@ def running_server(
     thread.start()
     try:
         if not up.wait(START_SECONDS):
-            raise ConfigError(f"the embedded server did not come up within {START_SECONDS} seconds")
+            raise ConfigError(f"the embedded server did not start within {START_SECONDS} seconds")
         yield RunningServer(base_url, welcome.token or "", _login_url(given, welcome) or "", given, app)
     finally:
         server.should_exit = True

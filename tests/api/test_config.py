@@ -67,7 +67,7 @@ def test_the_check_may_name_a_file_that_exists(path: Path, tmp_path: Path) -> No
     authorities = tmp_path / "ca.pem"
     authorities.write_text("x")
     assert resolve_server("https://h", verify=str(authorities), env={}, path=path).verify == str(authorities)
-    with pytest.raises(ConfigError, match=r"ca2\.pem is no file"):
+    with pytest.raises(ConfigError, match=r"ca2\.pem is not a file"):
         resolve_server("https://h", env={"SILO_SSL_VERIFY": str(tmp_path / "ca2.pem")}, path=path)
     save_config("https://h", verify=False, path=path)
     assert resolve_server(env={}, path=path).verify is False

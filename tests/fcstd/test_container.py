@@ -48,7 +48,7 @@ def test_any_other_file_is_refused(tmp_path: Path) -> None:
     """A text file with a document's name is distinguished from a cut one."""
     path = tmp_path / "text.FCStd"
     path.write_text("hello" * 100)
-    assert "no FreeCAD document" in refused(path)
+    assert "not a FreeCAD document" in refused(path)
 
 
 def test_a_folder_with_the_name_of_a_document_is_refused(tmp_path: Path) -> None:

@@ -724,4 +724,4 @@ def test_a_disk_that_shows_another_file_each_time_is_no_endless_wait(
     (tmp_path / "shared").mkdir()
     monkeypatch.setattr(os, "lstat", numbered)
     with Journal(tmp_path / "one").turn(str(tmp_path / "shared" / "a.FCStd"), "a") as turn:
-        assert turn.unseen == "its disk shows another file each time"
+        assert turn.unseen == "its disk returns a different file each time"

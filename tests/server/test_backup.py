@@ -313,7 +313,7 @@ def test_a_backup_that_fails_leaves_nothing(tmp_path: Path, databases: Databases
     with db.engine.begin() as connection:
         connection.execute(text("CREATE TABLE items (id INTEGER)"))
     db.close()
-    with pytest.raises(ConfigError, match="no database of a Silo server"):
+    with pytest.raises(ConfigError, match="not the database of a Silo server"):
         backup.back_up(foreign, tmp_path / "saved")
     with pytest.raises(ConfigError, match="there is no folder"):
         backup.back_up(foreign, tmp_path / "none" / "saved")

@@ -404,7 +404,7 @@ def _checked(part_number: str, lines: list[BomLine]) -> list[BomLine]:
     for line in lines:
         if line.parent_part_number and line.parent_part_number.casefold() != part_number.strip().casefold():
             raise ServerFaultError(
-                f"the BOM of {part_number}: the server answered with that of {line.parent_part_number}"
+                f"the BOM of {part_number}: the server answered with the BOM of {line.parent_part_number}"
             )
     return lines
 

@@ -150,7 +150,7 @@ def _http(url: str) -> SplitResult:
             f"the server address holds a user name; leave it out, a token says who you are; {_ADVICE}"
         )
     if parts.scheme not in _DEFAULT_PORTS or not parts.hostname or not port_is_valid:
-        raise ConfigError(f"{url!r} is no server address; {_ADVICE}")
+        raise ConfigError(f"{url!r} is not a server address; {_ADVICE}")
     return parts
 
 
@@ -337,7 +337,7 @@ def verify_of(source: str, text: str) -> bool | str:
         return said
     if not Path(text).expanduser().exists():
         raise ConfigError(
-            f"{source}: wanted true, false or a file with certificate authorities; {text} is no file"
+            f"{source}: wanted true, false or a file with certificate authorities; {text} is not a file"
         )
     return str(Path(text).expanduser())
 

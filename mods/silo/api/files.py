@@ -435,7 +435,7 @@ class FileCalls(Caller):
         if (checksum_of(revision) or sent) != sent:
             # Sending it again by itself would make a revision each time.
             raise ConflictError(
-                f"{self._address.host} stored another content than was sent for {subject} "
+                f"{self._address.host} stored other content than was sent for {subject} "
                 f"(revision {revision.revision_number}); look at that revision, then send the file again"
             )
         return revision

@@ -408,7 +408,7 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         return (
             CycleError(said.path)
             if cycle
-            else ConflictError(f"{asked}: in conflict with what is there{detail}")
+            else ConflictError(f"{asked}: in conflict with the present data{detail}")
         )
     if status == 412:
         return VersionConflictError(

@@ -106,9 +106,9 @@ class FindingCode(StrEnum):
         "cycle",
         _E,
         "an assembly contains itself",
-        "delete one of the links of the ring that the message names",
+        "delete one of the links of the cycle that the message names",
         "An assembly contains itself: {path}",
-        "the ring is closed by {users}",
+        "the cycle is closed by {users}",
     )
     TOO_DEEP = (
         "too_deep",
@@ -131,8 +131,8 @@ class FindingCode(StrEnum):
         "in_document_link",
         _I,
         "a link leads to an object of its own file",
-        "nothing; it says how the link was counted",
-        "Links within the file lead to what is no part: construction geometry, not counted",
+        "nothing; this is for information",
+        "Links within the file lead to construction geometry, which is not a part: not counted",
         "these are: {users}",
     )
     SUB_ELEMENT_LINK = (
@@ -145,29 +145,29 @@ class FindingCode(StrEnum):
     NO_COMPONENT = (
         "no_component",
         _I,
-        "a link leads to what is no component",
-        "nothing; it says what was not counted",
-        "{obj} links to {target}, {words}: no component, not counted.",
+        "a link leads to an object that is not a component",
+        "nothing; this is for information",
+        "{obj} links to {target}, {words}: not a component, not counted.",
     )
     SUPPRESSED = (
         "suppressed",
         _I,
         "suppressed, so not counted",
-        "nothing, if it is meant; else end the suppression",
+        "nothing, if this is intended; else end the suppression",
         "{obj} is suppressed and not counted.",
     )
     EXCLUDED = (
         "excluded",
         _I,
         "excluded by hand, so not counted",
-        "nothing, if it is meant; else set `SiloBomExclude` to false",
+        "nothing, if this is intended; else set `SiloBomExclude` to false",
         "{obj} is excluded by SiloBomExclude on {by} and not counted.",
     )
     MIRRORED = (
         "mirrored",
         _W,
         "a mirrored part, counted as the part itself",
-        "make the mirrored part a part of its own if it is bought or made differently",
+        "make the mirrored part a separate part if it is bought or made differently",
         "{obj} is a mirrored {target} and counted as one; the other hand of a part usually needs a number"
         " of its own.",
     )
@@ -175,7 +175,7 @@ class FindingCode(StrEnum):
         "variant",
         _W,
         "a variant, counted as the part itself",
-        "save the variant as a part of its own if it needs a number",
+        "save the variant as a separate part if it needs a number",
         "{obj} is a variant of {target} (copy on change) and counted as one of it.",
     )
     DRAFT_ARRAY = (
@@ -197,7 +197,7 @@ class FindingCode(StrEnum):
         "consumed",
         _I,
         "used up by another object, so not counted",
-        "nothing, if it is no piece to buy; else take it out of the cut or fusion",
+        "nothing, if nobody buys or makes it separately; else take it out of the cut or fusion",
         "{obj} is used up by {target} (a cut, a boolean or a fusion) and not counted.",
     )
     NO_HARDWARE = (
@@ -211,8 +211,8 @@ class FindingCode(StrEnum):
     SAME_ARTICLE = (
         "same_article",
         _I,
-        "several designations are one standard part",
-        "use one standard for it in the project",
+        "several designations name one standard part",
+        "use one of the standards in the project",
     )
     LOCAL_GEOMETRY = (
         "local_geometry",
@@ -226,21 +226,21 @@ class FindingCode(StrEnum):
         _W,
         "a component of another program",
         "import the part again from an FCStd file",
-        "A2plus imported parts that name no FreeCAD file; they are own parts of this file",
+        "A2plus imported parts without naming a FreeCAD file; they count as parts of this file",
         "these are: {users}",
     )
     NO_CONTAINER = (
         "no_container",
         _W,
         "components lie in no assembly",
-        "put the components into an assembly, or leave it: they are counted",
+        "put the components into an assembly, or leave them there: they are counted",
         "The components lie in the document itself, in no assembly; they were counted.",
     )
     BESIDE_ASSEMBLY = (
         "beside_assembly",
         _W,
         "components lie beside the assembly, so they are not counted",
-        "move into the assembly what belongs to it",
+        "move the components of the assembly into it",
         "Components lie in the document itself, beside the assembly",
         "not counted: {users}",
     )
@@ -286,28 +286,28 @@ class FindingCode(StrEnum):
     RESPELT = (
         "respelt",
         _W,
-        "a path is recorded in other letters than the file's",
-        "name the file in the letters of the link, or `silo-mod relink`: other systems do not find it",
+        "a path differs from the file's name in upper and lower case",
+        "rename the file as the link spells it, or `silo-mod relink`: other systems do not find it",
     )
     EMPTY_BOM = (
         "empty_bom",
         _W,
         "an assembly without components",
-        "nothing, if it is empty; else look at what the other findings leave out",
+        "nothing, if the assembly is empty; else see which parts the other findings leave out",
         "{obj} holds no components that are linked from other files, so its BOM is empty.",
     )
     NO_ROLE = (
         "no_role",
         _E,
         "an object has no role in the count; please report this",
-        "report it, with the file if you may",
+        "report it, with the file if you are allowed to share it",
         "{obj} has no role in the count; please report this.",
     )
     TWO_ROLES = (
         "two_roles",
         _E,
         "an object has two roles in the count; please report this",
-        "report it, with the file if you may",
+        "report it, with the file if you are allowed to share it",
         "{obj} counts in two roles; please report this.",
     )
     CONSOLIDATION = (
@@ -345,7 +345,7 @@ class FindingCode(StrEnum):
     CONFLICT = (
         "conflict",
         _W,
-        "a manual line that is a component as well",
+        "a manual line for a part that is a component as well",
         "on the BOM page: take the quantity of CAD, or keep that of Silo",
     )
 

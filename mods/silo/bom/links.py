@@ -178,7 +178,7 @@ def why(
     if not lines:
         wanted = next((each_part for each_part in parts if isinstance(each_part, str)), "This line")
         meant_by = did_you_mean(wanted, sorted(line_number - {""})) or "."
-        raise InputError(f"{wanted!r} is no part of {label_of(assembly_obj)} itself{meant_by}")
+        raise InputError(f"{wanted!r} is not a part of {label_of(assembly_obj)} itself{meant_by}")
     return [f"{total} × {part} in {label_of(assembly_obj)}:", *lines]
 
 

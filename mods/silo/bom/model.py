@@ -596,7 +596,7 @@ class Notes:
             the assembly holds none at all, so it may be the wrong one.
         """
         code = FindingCode.BESIDE_ASSEMBLY
-        more = ", which holds none; move them into it, or name the one that is meant" if empty else ""
+        more = ", which holds none; move them into it, or name the right assembly" if empty else ""
         for obj in objects:
             severity = Severity.ERROR if empty else None
             self.add(code, obj, "", severity=severity, sentence=code.sentence + more)

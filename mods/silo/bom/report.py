@@ -259,7 +259,7 @@ def from_plain(data: Mapping[str, Any]) -> Extraction:
             findings=tuple(_finding(finding) for finding in data["findings"]),
         )
     except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise InputError(f"this is no complete BOM snapshot: {error!r}") from error
+        raise InputError(f"this BOM snapshot is not complete: {error!r}") from error
 
 
 def whole_row(row: Mapping[str, Any]) -> dict[str, Any]:

@@ -39,7 +39,7 @@ from silo.bom.roles import SHOWING, Files, Reader, Reading
 from silo.bom.targets import Inspect, is_assembly_link
 
 # What to do where a document holds several assemblies. The window says it in words of its own.
-NAME_ONE = "Name the one that is meant (--assembly NAME)."
+NAME_ONE = "Name the right assembly (--assembly NAME)."
 
 # The rank of a part that holds no components; what it holds makes it likelier.
 _HOLDS_NOTHING = 4
@@ -261,8 +261,8 @@ def _named(document: Any, name: str) -> Any:
             return matching[0]
         if matching:
             raise InputError(
-                f"{_file(document)} holds {len(matching)} assemblies labelled {name!r}; give the name of the "
-                f"one that is meant instead: {_names_of(matching)}."
+                f"{_file(document)} holds {len(matching)} assemblies labelled {name!r}; give the name of "
+                f"the right assembly instead: {_names_of(matching)}."
             )
     raise InputError(f"{_file(document)} has no assembly named {name!r}; it has: {_names_of(containers)}.")
 

@@ -283,7 +283,7 @@ def run_where_used(args: argparse.Namespace) -> int:
     from silo.vault.reading import Question
 
     if not os.path.isdir(args.root):
-        raise InputError(f"{args.root} is no folder. Name the folder of the vault.")
+        raise InputError(f"{args.root} is not a folder. Name the folder of the vault.")
     base, part = os.path.realpath(args.root), os.path.realpath(args.part)
     if not os.path.lexists(part) and os.path.lexists(inner := os.path.join(base, args.part)):
         part = os.path.realpath(inner)  # as the other commands print it

@@ -490,7 +490,7 @@ class NoDrawer:
 
     def faces(self, path: Path, named: str, place: Floats) -> list[Mesh | None]:
         """Raise DocumentError."""
-        raise DocumentError(named, "is no shape that can be drawn")
+        raise DocumentError(named, "is not a shape that can be drawn")
 
     def simplified(self, mesh: Mesh, error: float, keep_border: bool) -> Mesh:
         """Return the same."""
@@ -498,7 +498,7 @@ class NoDrawer:
 
     def measured(self, shapes: Sequence[Stored], weigh: bool) -> tuple[Box, Measured | None]:
         """Raise DocumentError."""
-        raise DocumentError(shapes[0][1], "is no shape that can be measured")
+        raise DocumentError(shapes[0][1], "is not a shape that can be measured")
 
 
 class KernelDrawer:

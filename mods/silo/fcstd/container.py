@@ -314,7 +314,7 @@ class ContainerFile:
             return self._error("it is empty")
         if self._read(0, min(4, self.state.size)) == _LOCAL_MARK:
             return self._error("it is cut short: the end of its zip container is missing")
-        return self._error("it is no FreeCAD document (no zip container)")
+        return self._error("it is not a FreeCAD document (no zip container)")
 
     def _read(self, offset: int, length: int) -> bytes:
         begin = offset - self._window_at

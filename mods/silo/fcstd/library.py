@@ -306,7 +306,7 @@ class FileContents:
         with ContainerFile(self._instead.get(path, path), self.limits) as container:
             entry = container.entry(DOCUMENT_XML)
             if entry is None:
-                reason = "it is no FreeCAD document (there is no Document.xml in it)"
+                reason = "it is not a FreeCAD document (there is no Document.xml in it)"
                 raise FcstdError(path, reason, state=container.state)
             packed = container.packed(entry, self.limits.packed)
             if container.changed():

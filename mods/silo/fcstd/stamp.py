@@ -168,7 +168,7 @@ def document_xml(container: ContainerFile, limits: Limits) -> tuple[ZipEntry, by
     """The entry Document.xml and its text. Raises DocumentError."""
     entry = container.entry(DOCUMENT_XML)
     if entry is None:
-        raise FcstdError(container.path, "it is no FreeCAD document (there is no Document.xml in it)")
+        raise FcstdError(container.path, "it is not a FreeCAD document (there is no Document.xml in it)")
     packed = container.packed(entry, limits.packed)
     return entry, Inflater(container.path, entry, packed, limits.document_xml, limits).whole()
 
@@ -337,7 +337,7 @@ def _check_identity(path: str, identity: str) -> None:
     odd = any(unicodedata.category(c) in ("Cc", "Cs", "Cn") or c in "\ufffe\uffff" for c in identity)
     if not identity.strip() or identity != identity.strip() or len(identity) > _LONGEST or odd:
         raise DocumentError(
-            path, f"{identity!r} is no identity: wanted is one line of 1 to {_LONGEST} characters"
+            path, f"{identity!r} is not an identity: wanted one line of 1 to {_LONGEST} characters"
         )
 
 

@@ -126,7 +126,7 @@ class _DocumentIndex:
         self.path.append(tag)
         if depth == 1:
             if tag != "Document":
-                raise Malformed(f"is no FreeCAD document: it begins with <{tag}>")
+                raise Malformed(f"is not a FreeCAD document: it begins with <{tag}>")
             self.head.attributes = dict(attributes)
         elif depth == 2 and tag == "Properties":
             self.begin = at

@@ -175,7 +175,7 @@ def _yaml(text: str, source: str) -> Any:
     try:
         data = yaml.load(text, Loader)
     except (yaml.YAMLError, RecursionError) as error:
-        raise ConfigError(f"{source}: this is no YAML ({' '.join(str(error).split())})") from error
+        raise ConfigError(f"{source}: this is not valid YAML ({' '.join(str(error).split())})") from error
     if twice:
         raise ConfigError(
             f"{source}: given twice: {', '.join(twice)}; write all parts of a link in one place"

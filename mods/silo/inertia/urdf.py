@@ -128,7 +128,7 @@ class Urdf:
         try:
             parser.Parse(self.data, True)
         except expat.ExpatError as error:
-            raise InputError(f"{self.source}: this is no XML that can be read ({error})") from error
+            raise InputError(f"{self.source}: this is not valid XML ({error})") from error
         count = Counter(self.names)
         problems = [f"has {number} links named {name}" for name, number in count.items() if number > 1]
         problems += [

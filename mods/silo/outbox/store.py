@@ -571,7 +571,7 @@ class Store(FileOrigins):
         self.finish(commit.key, commit.file)
         entry = self.by_key(commit.key)
         if entry is None:
-            raise InputError(f"{commit.path}: discarded while it was kept")
+            raise InputError(f"{commit.path}: discarded while its copy was made")
         return entry
 
     # -- what a person decides --------------------------------------------------------------------------
@@ -585,8 +585,8 @@ class Store(FileOrigins):
         entry = self._existing(entry_id)
         if entry.superseded:
             raise ConflictError(
-                f"{entry.part_number or entry.label}: a newer commit of it was sent since, and this one "
-                "would undo it. Discard it"
+                f"{entry.part_number or entry.label}: a newer commit of it was sent since, and this commit "
+                "would undo that. Discard this commit"
             )
         ready = State.WAITING if entry.sha256 or not entry.file_left else State.KEEPING
         renamed = SAME_PART if entry.renamed == ASKED else entry.renamed
@@ -797,7 +797,7 @@ class Store(FileOrigins):
 
 
 def _place(copy: Path, path: str) -> dict[str, str]:
-    """Where the file is and what it links to; nothing where it is no FreeCAD file."""
+    """Where the file is and what it links to; nothing where it is not a FreeCAD file."""
     if not path:
         return {}
     from silo.fcstd.linked import place_of

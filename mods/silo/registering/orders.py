@@ -576,7 +576,7 @@ def read_table(data: bytes, name: str) -> list[TableRow]:
         raise InputError(f"{name}: the row of line {begins} cannot be read as CSV: {error}") from None
     lacking = [column for column in COLUMNS if column not in (*(header or ()), *_SUPPLY)]
     if lacking:
-        raise InputError(f"{name} is no table of --plan: it has no column {', '.join(lacking)}")
+        raise InputError(f"{name} is not a table of --plan: it has no column {', '.join(lacking)}")
     twice = sorted(column for column, count in Counter(header).items() if count > 1 and column)
     problems[:0] = [f"line 1: the column {column} is there more than once" for column in twice]
     if problems:
@@ -587,7 +587,7 @@ def read_table(data: bytes, name: str) -> list[TableRow]:
 def _decoded(data: bytes, name: str) -> str:
     encoding = unicode_name(data) or "utf-8"
     if b"\0" in data and encoding == "utf-8":
-        raise InputError(f"{name} is no CSV file; save the table as CSV (UTF-8)")
+        raise InputError(f"{name} is not a CSV file; save the table as CSV (UTF-8)")
     # Names of files may be no UTF-8; any other text that is none is a problem of its row.
     return data.decode(encoding, "replace" if "16" in encoding else "surrogateescape")
 
@@ -640,7 +640,7 @@ def orders_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name:
             order_problems.append(f"{what} is no component here{hint}")
         problems += [f"line {row.line}: {words}" for words in order_problems]
     if problems:
-        raise InputError(f"{name}: nothing was registered, for not all of it can be", problems)
+        raise InputError(f"{name}: nothing was registered, because some rows have problems", problems)
     listed = {row.key for row in rows}
     unlisted = tuple(
         each_candidate

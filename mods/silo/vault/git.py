@@ -66,7 +66,7 @@ def top_of(folder: Path | str) -> tuple[str, str, bool]:
     while not os.path.isdir(real) and os.path.dirname(real) != real and not os.path.lexists(real):
         real = os.path.dirname(real)
     if not os.path.isdir(real):
-        raise InputError(f"{folder} is no folder. Name a folder inside a git repository.")
+        raise InputError(f"{folder} is not a folder. Name a folder inside a git repository.")
     if _git(real, "rev-parse", "--is-bare-repository").strip() == b"true":
         return _path(real, "--absolute-git-dir"), "", False
     top = _path(real, "--show-toplevel")

@@ -134,7 +134,9 @@ class IndexDatabase:
     def _open(self, path: Path, given: bool) -> None:
         try:
             if given and not _may_replace(path):
-                raise InputError(f"{path} is no index of silo-mod and is not touched. Name another file.")
+                raise InputError(
+                    f"{path} is not an index of silo-mod, so it is left as it is. Name another file."
+                )
             path.parent.mkdir(parents=True, exist_ok=True)
             for attempt in range(2):
                 self._guard = hold_lock(f"{path}.lock", shared=True)

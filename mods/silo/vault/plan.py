@@ -89,7 +89,7 @@ def read_folder(
     """
     base = os.path.realpath(folder)
     if not os.path.isdir(base):
-        raise InputError(f"{folder} is no folder. Name a folder of FreeCAD files.")
+        raise InputError(f"{folder} is not a folder. Name a folder of FreeCAD files.")
     assemblies: dict[tuple[str, str], ComparedAssembly] = {}
     unreadable = [(relative(os.path.join(root or base, path), base), why) for path, why in lost]
     findings: dict[Finding, None] = {}

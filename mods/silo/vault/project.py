@@ -135,7 +135,7 @@ def find_project(tops: Sequence[str], root: str | None = None) -> Project:
     """
     if root is not None:
         if not os.path.isdir(root):
-            raise InputError(f"{root} is no folder; name the folder of the project")
+            raise InputError(f"{root} is not a folder; name the folder of the project")
         return Project(one_path(root))
     roots = {marked.root for top in tops if (marked := Project.of(top)) is not None}
     if len(roots) > 1:

@@ -421,7 +421,7 @@ def _refused(path: str) -> str:
     if (refused := refusal(path)) is not None:
         return refused.detail or "its path cannot be one"
     if posixpath.splitext(path)[1].lower() != ".fcstd":
-        return "it is no FreeCAD file"
+        return "it is not a FreeCAD file"
     return ""
 
 

@@ -377,7 +377,7 @@ def _patient_connection(seconds: float, *args: Any, **named: Any) -> Any:
                     ready = yield wanted
                     if not ready and time.monotonic() > end:
                         self.pgconn.finish()
-                        raise psycopg.OperationalError(f"the database said nothing for {seconds:g} s")
+                        raise psycopg.OperationalError(f"the database did not answer for {seconds:g} s")
                     wanted = gen.send(ready)
             except StopIteration as done:
                 return done.value

@@ -217,7 +217,7 @@ async def json_body(request: Request) -> Any:
 
 
 def _no_constant(name: str) -> Any:
-    raise ValueError(f"{name} is no JSON number")
+    raise ValueError(f"{name} is not a JSON number")
 
 
 def etag_of(version: int) -> str:

@@ -45,7 +45,7 @@ def _exact(value: object) -> object:
             raise ValueError(reading.problem)
         return reading.value
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError("wanted a number, or one as text")
+        raise ValueError("wanted a number, or a number as text")
     return as_decimal(value)
 
 

@@ -114,7 +114,7 @@ class Schema:
         result = self.categories.get(code.strip().upper())
         if result is None:
             raise RejectedError(
-                f"category: wanted one of schema {self.name} (such as A01, F01, M01), got {code!r}; "
+                f"category: wanted a category of schema {self.name} (such as A01, F01, M01), got {code!r}; "
                 f"GET /api/schemas/{self.name} lists them"
             )
         return result

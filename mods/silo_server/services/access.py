@@ -595,7 +595,7 @@ def set_own_password(db: Database, actor: Actor, new: str, current: str | None) 
         try:
             _proved(db, actor.username, current or "", actor.address)
         except AuthError:
-            raise RejectedError("current password: wanted the one you have now, got another") from None
+            raise RejectedError("current password: wanted your present password, got another one") from None
     with db.write(actor, even_when_read_only=True) as tx:
         change_user(tx, actor.username, password=new)
 
@@ -631,7 +631,7 @@ def create_login_link(tx: Tx, username: str) -> str:
     check_lasting(tx, "make a login link")
     if tx.actor.user_id == user.id:
         raise ForbiddenError(
-            "nobody makes a login link for the own account; set the password on the account page, or ask "
+            "you cannot make a login link for your own account; set the password on the account page, or ask "
             "another admin"
         )
     secret = secrets.token_urlsafe(32)

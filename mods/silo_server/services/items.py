@@ -260,7 +260,9 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     item_type = _item_type(new.item_type, category)
     number = check_number(new.part_number) if new.part_number else None
     if number is None and category is None:
-        raise RejectedError("category: wanted one (such as F01) or an explicit part_number, got neither")
+        raise RejectedError(
+            "category: wanted a category (such as F01) or an explicit part_number, got neither"
+        )
     check_json("properties", new.properties)
     uuid = normal_uuid(new.uuid, "id") if new.uuid is not None else None
     request = KeyedRequest.of("item", uuid or new.key, asdict(replace(new, uuid=uuid, key=None)))
@@ -488,7 +490,7 @@ def _insert(tx: Tx, number: str, values: Mapping[str, Any]) -> None:
         )
     except IntegrityError as error:
         raise DuplicateError(
-            f"part number {number} is taken; numbers are unique whatever their case"
+            f"part number {number} is taken; numbers that differ only in upper and lower case count as equal"
         ) from error
 
 

@@ -61,7 +61,7 @@ def unpacked(part: Part, body: bytes, packed: bool) -> bytes:
             raise RejectedError(f"{part}: wanted gzip, as Content-Encoding says, got damaged data") from error
         if len(body) <= most and (not reader.eof or reader.unused_data):
             raise RejectedError(
-                f"{part}: wanted one whole gzip stream, got one that is cut off or has a tail"
+                f"{part}: wanted one whole gzip stream, got one that is cut off or has data after its end"
             )
     if len(body) > most:
         raise TooLargeError(f"{part}: wanted at most {most // MIB} MiB unpacked, got more")

@@ -138,7 +138,7 @@ def test_a_given_column_that_is_not_there_is_reported(bom: Callable[..., BomTabl
     [
         ({"columns": {"colour": "x"}}, "unknown column role colour"),
         ({"decimal": ";"}, "decimal mark"),
-        ({"mass_unit": "stone"}, "no unit of mass"),
+        ({"mass_unit": "stone"}, "not a unit of mass"),
         ({"delimiter": ";;"}, "one character"),
         ({"encoding": "klingon"}, "cannot be read as klingon"),
     ],

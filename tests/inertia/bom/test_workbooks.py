@@ -190,7 +190,7 @@ def test_a_stray_cell_in_a_far_corner_costs_nothing() -> None:
 
 
 def test_a_sheet_with_more_cells_than_a_bom_can_have_is_refused() -> None:
-    """Whatever makes it so: cells that are repeated, wide lines, merged cells that lie on each other."""
+    """Whatever makes it so: cells that are repeated, wide lines, merged cells that overlap."""
     cell = '<table:table-cell table:number-columns-repeated="16384"><text:p>x</text:p></table:table-cell>'
     row = f'<table:table-row table:number-rows-repeated="99">{cell}</table:table-row></table:table>'
     with pytest.raises(InputError, match="more than 500000 cells"):

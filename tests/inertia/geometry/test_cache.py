@@ -309,6 +309,6 @@ def test_a_pickle_in_a_stored_file_is_never_loaded(tmp_path: Path) -> None:
     """An array of objects would run code when it is read: refused."""
     path = tmp_path / "evil.npz"
     np.savez(path, header=np.array([{"format": FORMAT}], dtype=object))
-    with pytest.raises(InputError, match="no stored geometry"):
+    with pytest.raises(InputError, match="not stored geometry"):
         load(path)
     assert Cache(tmp_path).get("evil", path) is None

@@ -171,7 +171,7 @@ def test_the_configuration_file_comes_last() -> None:
 
 def test_a_certificate_setting_nobody_understands_is_reported() -> None:
     """Neither yes nor no must not mean "do not check"."""
-    with pytest.raises(ConfigError, match=r"SILO_SSL_VERIFY: wanted true, false or .*; maybe is no file"):
+    with pytest.raises(ConfigError, match=r"SILO_SSL_VERIFY: wanted true, false or .*; maybe is not a file"):
         choose_server(ServerPreferences(HOME), EMPTY, {"SILO_SSL_VERIFY": "maybe"})
 
 

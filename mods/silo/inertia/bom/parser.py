@@ -219,7 +219,7 @@ class BOMParser:
         if decimal not in (None, ".", ","):
             raise InputError(f"the decimal mark is “.” or “,”, got “{decimal}”")
         if mass_unit is not None and unit_factor(mass_unit) is None:
-            raise InputError(f"“{mass_unit}” is no unit of mass; known are kg, g, mg, t, lb, oz")
+            raise InputError(f"“{mass_unit}” is not a unit of mass; known are kg, g, mg, t, lb, oz")
         self._columns = columns
         self._encoding = encoding
         self._delimiter = delimiter

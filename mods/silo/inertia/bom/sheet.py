@@ -157,7 +157,9 @@ def read_sheet(
     encoding does not fit; the message lists what was seen.
     """
     if len(data) > MAX_BYTES:
-        raise InputError(f"{source}: {len(data) / 1e6:.0f} MB is no BOM (limit {MAX_BYTES / 1e6:.0f} MB)")
+        raise InputError(
+            f"{source}: {len(data) / 1e6:.0f} MB is too large for a BOM (limit {MAX_BYTES / 1e6:.0f} MB)"
+        )
     if delimiter is not None and len(delimiter) != 1:
         raise InputError(f"a delimiter is one character, got “{delimiter}”")
     first_lines: list[str] = []

@@ -414,7 +414,7 @@ def load(path: Path) -> tuple[Assembly, dict[str, Any]]:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
             return _assembly_in(arrays)
     except (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: is no stored geometry of format {FORMAT}: {error}") from error
+        raise InputError(f"{path}: is not stored geometry of format {FORMAT}: {error}") from error
 
 
 def _problems_out(problems: tuple[Note, ...]) -> list[list[str]]:

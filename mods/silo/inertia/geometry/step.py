@@ -715,7 +715,7 @@ class Bodies:
         keyword = self._products.solids[number][0]
         word, parts = self._products.trees.get(number, ("", ()))
         if self._left < 0:
-            raise ValueError("a tree without end")
+            raise ValueError("its parts nest without end")
         if keyword == "CSG_SOLID":
             return self._made(parts[0], factors)
         if keyword == "BOOLEAN_RESULT":

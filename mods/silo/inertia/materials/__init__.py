@@ -477,7 +477,7 @@ def _toml_records(text: str, source: str) -> Iterator[_Record]:
     try:
         table = tomllib.loads(text).get("materials", {})
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{source}: this is no TOML ({error})") from error
+        raise ConfigError(f"{source}: this is not valid TOML ({error})") from error
     if not isinstance(table, dict) or not table:
         raise ConfigError(f"{source}: wanted a table [materials] with name = density")
     for name, value in table.items():

@@ -84,7 +84,7 @@ class FreeCadDrawer:
         except Exception as error:
             raise DocumentError(named, f"holds no shape that FreeCAD can draw: {error}") from error
         if made.countSegments() != len(shape.Faces):
-            raise DocumentError(named, "FreeCAD drew other faces than it has")
+            raise DocumentError(named, "FreeCAD drew a different number of faces than the shape has")
         points, rows = made.Topology
         vertices = MM * np.array([tuple(point) for point in points]).reshape(-1, 3)
         faces = np.array(rows, dtype=np.int64).reshape(-1, 3)

@@ -474,7 +474,7 @@ class LiveDesk:
             return None
         extraction = self.snapshot(doc).extraction
         if extraction is None:
-            raise DocumentError(path, "it holds no assembly, so nothing in it has another place")
+            raise DocumentError(path, "it holds no assembly, so there is nothing to compare")
         mine = [name for entry in extraction.entries for name in entry.instances]
         differences = self._overlay.compare(doc, extraction.assembly.object_name, mine, theirs)
         self._overlay.ghost_of = (path, revision)

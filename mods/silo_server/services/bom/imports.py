@@ -156,7 +156,7 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None, of: Table
     try:
         table = list(islice(rows, layout.header + 1 + max_rows + 1))
     except csv.Error as error:
-        raise RejectedError(f"file: wanted CSV, got something that does not read as such ({error})") from None
+        raise RejectedError(f"file: wanted CSV, got a file that cannot be read as CSV ({error})") from None
     if len(table) - layout.header - 1 > max_rows:
         raise TooLargeError(f"file: this server takes at most {max_rows} rows, got more")
     header, body = table[layout.header] if table else [], table[layout.header + 1 :]
@@ -200,7 +200,7 @@ def as_csv(data: bytes, of: Table = BOM) -> bytes:
     likely = [sheet for sheet in sheets if guess_of(sheet[1], of)]
     if likely[1:]:
         names = listed([f"“{grid.name}”" for grid, _ in likely])
-        raise RejectedError(f"file: the sheets {names} each hold such a table; save the one that is meant")
+        raise RejectedError(f"file: the sheets {names} each hold such a table; save the right sheet alone")
     if not sheets:
         raise RejectedError("file: wanted a workbook with a table, got one without a sheet")
     grid, text = (likely or sheets)[0]
@@ -260,7 +260,7 @@ def guess(text: str, of: Table = BOM) -> Layout:
     if near:
         raise RejectedError(near)
     if broken is not None:
-        raise RejectedError(f"file: wanted CSV, got something that does not read as such ({broken})")
+        raise RejectedError(f"file: wanted CSV, got a file that cannot be read as CSV ({broken})")
     names = " and ".join(f"'{role.replace('_', ' ').capitalize()}'" for role in of.needed)
     raise RejectedError(
         f"file: wanted a header row with {names} among the first {HEADER_WITHIN} rows, found none"

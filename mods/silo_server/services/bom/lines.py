@@ -138,7 +138,7 @@ def line_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
         ids = ", ".join(f"{line.state.rel_type}: {line.id}" for line in matches)
         raise ConflictError(
             f"the BOM of {parent.part_number} has {len(matches)} lines for {which!r} ({ids}); "
-            "name one by its id"
+            "name a line by its id"
         )
     if not matches:
         raise NotFoundError(f"the BOM of {parent.part_number} has no line for {which!r}")

@@ -536,7 +536,7 @@ def lines_for(tx: Tx, part_number: str, action: Action, seen: str) -> tuple[list
         conflict.line.child_id: (conflict.cad_quantity, conflict.since) for conflict in open_lines.conflicts
     }
     if lines and seen != _mark(open_lines.parent.bom_version, conflicts):
-        raise VersionConflictError(f"the BOM of {part_number} is not as it was seen")
+        raise VersionConflictError(f"the BOM of {part_number} has changed since you looked")
     return lines, gone
 
 
@@ -606,7 +606,9 @@ def follow(tx: Tx, target: str, *, on: bool) -> None:
     rowcount = tx.conn.execute(delete(follows).where(row.user_id == user_id, row.target == target)).rowcount
     count = tx.conn.scalar(select(func.count()).select_from(follows).where(row.user_id == user_id)) or 0
     if on and not rowcount and count >= MOST_FOLLOWED:
-        raise RejectedError(f"one person follows at most {MOST_FOLLOWED} items and folders; end some first")
+        raise RejectedError(
+            f"you can follow at most {MOST_FOLLOWED} items and folders; stop following some first"
+        )
     if on:
         seen = {"seen": tx.stamp, "event": events.bounds(tx)[1]}
         tx.conn.execute(insert(follows).values(user_id=user_id, target=target, **seen))

@@ -341,7 +341,7 @@ def _counted(amount: Exact, line: Line) -> Exact:
     if amount > MAX_TOTAL:
         raise ConflictError(
             f"the quantities above {line.child_part_number} multiply to more than {MAX_TOTAL:.0e}, which "
-            "nobody can mean; look for a wrong quantity on the way to it"
+            "cannot be right; look for a wrong quantity on the way to it"
         )
     return amount
 
