@@ -3,12 +3,13 @@
 
     python scripts/english.py
 
-Exit code 1 if a phrase is in the docs, in a page, or in a Python file of ``mods``, or if a package (``silo``,
-``silo_server``) has a class name twice.
+Exit code 1 if a phrase is in the docs, in a page, or in a Python file of ``mods``, if a package (``silo``,
+``silo_server``) has a class name twice, or if the docstring of a function does not begin with a verb.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 import sys
 from pathlib import Path
@@ -46,6 +47,17 @@ BANNED = {
     r"as ever": "as usual",
     r"of no avail|by no means|not least": "say it directly",
 }
+# Words with which no docstring of a function begins: it begins with a verb (Return, Yield, Show, Note, …).
+NO_VERB = re.compile(
+    r"a|about|after|again|all|also|an|another|any|as|at|back|before|between|both|but|"
+    r"by|each|either|every|everybody|everything|false|first|for|from|he|her|here|his|"
+    r"how|i|if|in|into|it|its|less|like|many|more|most|neither|never|no|nobody|none|"
+    r"not|nothing|now|of|on|once|one|only|others|our|out|she|since|so|some|somebody|"
+    r"something|such|that|the|their|theirs|there|these|they|this|those|three|to|true|"
+    r"two|until|up|we|what|whatever|when|where|whether|which|while|who|whole|whom|whose|"
+    r"why|with|within|without",
+    re.IGNORECASE,
+)
 PHRASE = re.compile(
     "|".join(rf"(?P<p{n}>\b(?:{text})(?!\w))" for n, text in enumerate(BANNED)), re.IGNORECASE
 )
@@ -61,6 +73,13 @@ def problems() -> list[str]:
             for match in PHRASE.finditer(line):
                 instead = list(BANNED.values())[int(str(match.lastgroup)[1:])]
                 found.append(f"{path.relative_to(ROOT)}:{number}: “{match[0]}”: {instead}")
+    for path in sorted(ROOT.glob("mods/**/*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and (text := ast.get_docstring(node)):
+                word = text.split()[0].rstrip(".,:;")
+                if not word.isalpha() or NO_VERB.fullmatch(word):
+                    place = f"{path.relative_to(ROOT)}:{node.body[0].lineno}"
+                    found.append(f"{place}: “{word}”: begin the docstring with a verb")
     for package in ("silo", "silo_server"):
         places: dict[str, str] = {}
         for path in sorted(ROOT.glob(f"mods/{package}/**/*.py")):

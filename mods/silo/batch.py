@@ -89,7 +89,7 @@ class TopResult:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Everything worth a report, each once: of the walk, and of each comparison with the server."""
+        """Return everything worth a report, each once: of the walk, and of each comparison with the server."""
         unique: dict[Finding, None] = dict.fromkeys(self.whole.findings if self.whole is not None else ())
         for outcome in self.outcomes:
             unique.update(dict.fromkeys(outcome.resolved.findings))
@@ -100,13 +100,13 @@ class TopResult:
 
     @property
     def unregistered(self) -> tuple[BomEntry, ...]:
-        """The components without an item, each once; of assemblies their outcome says it."""
+        """Return the components without an item, each once; of assemblies their outcome says it."""
         several = [self.whole] if self.whole is not None else [outcome.resolved for outcome in self.outcomes]
         return tuple({entry.key: entry for resolved in several for entry in resolved.unresolved}.values())
 
     @property
     def fine(self) -> bool:
-        """True if nothing was left undone; own parts that are no items yet are."""
+        """Return True if nothing was left undone; own parts that are no items yet are."""
         outcomes = self.outcomes
         return self.error is None and all(
             outcome.status in _FINE and not outcome.assembly.own for outcome in outcomes
@@ -133,7 +133,7 @@ def sync_top(top: str, extraction: Extraction | SiloError, api: SyncApi, options
 def _identities_before(
     compared: Iterable[tuple[Resolved, Iterable[Mapping[str, Any]]]],
 ) -> dict[tuple[str, str], str]:
-    """What the last syncs said of components: (file, object) → the Silo UUID of its item.
+    """Return what the last syncs said of components: (file, object) → the Silo UUID of its item.
 
     compared
         assemblies, each with the server's lines.
@@ -153,7 +153,7 @@ def _lacks_files(resolved: Resolved) -> bool:
 
 
 def ask_for_moved(whole: Resolved, api: SyncApi) -> Resolved:
-    """:func:`suggest_by_identity`, with the lines that the server has of assemblies that lack files."""
+    """Return :func:`suggest_by_identity`, with the lines that the server has of assemblies that lack files."""
     lacking = [assembly for assembly in assemblies(whole) if _lacks_files(assembly)]
     return suggest_by_identity(whole, [(resolved, server_lines(resolved, api)) for resolved in lacking])
 
@@ -163,7 +163,7 @@ def suggest_by_identity(
     compared: Sequence[tuple[Resolved, Iterable[Mapping[str, Any]]]],
     candidates: Callable[[Iterable[str]], Iterable[str]] | None = None,
 ) -> Resolved:
-    """Findings of missing files, with the one that has the identity known from the last sync.
+    """Return findings of missing files, with the one that has the identity known from the last sync.
 
     compared
         assemblies, each with the server's lines.
@@ -183,7 +183,9 @@ def suggest_by_identity(
 
 
 def stopped_by(result: TopResult, api: object = None) -> SiloError | None:
-    """The error that makes it useless to try the next file: no right, no server, a server that is busy."""
+    """Return the error that makes it useless to try the next file: no right, no server, a server that is
+    busy.
+    """
     from silo.api.policy import ends_run  # loads the network's packages
 
     errors = (result.error, *(outcome.error for outcome in result.outcomes))
@@ -191,7 +193,9 @@ def stopped_by(result: TopResult, api: object = None) -> SiloError | None:
 
 
 def _is_library(extraction: Extraction) -> bool:
-    """A file of screws or of several parts for others to link: unregistered, and nothing of other files."""
+    """Return a file of screws or of several parts for others to link: unregistered, and nothing of other
+    files.
+    """
     path = extraction.assembly.doc_path
     return extraction.assembly.silo_uuid is None and all(
         entry.doc_path == path for entry in extraction.entries
@@ -211,7 +215,9 @@ def _outcomes(whole: Resolved, api: SyncApi, options: SyncOptions) -> Iterable[O
 
 
 def source_document(entry: BomEntry, top: str = "") -> SourceDocument:
-    """Which file, with which content, an assembly's BOM was taken from; ``top``: the assembly of the run."""
+    """Return which file, with which content, an assembly's BOM was taken from; ``top``: the assembly of the
+    run.
+    """
     return SourceDocument(
         file=os.path.basename(entry.doc_path),
         folder=project_folder(entry.doc_path, top),
@@ -223,7 +229,7 @@ def source_document(entry: BomEntry, top: str = "") -> SourceDocument:
 
 
 def result_json(result: TopResult) -> dict[str, Any]:
-    """One file's result for machines."""
+    """Return one file's result for machines."""
     data: dict[str, Any] = {"top": result.top, "ok": result.fine}
     if result.error is not None:
         data["error"] = {"code": result.error.code, "message": str(result.error)}
@@ -237,7 +243,7 @@ def result_json(result: TopResult) -> dict[str, Any]:
 
 
 def outcome_json(outcome: Outcome, base: str) -> dict[str, Any]:
-    """One assembly's outcome for machines."""
+    """Return one assembly's outcome for machines."""
     head = outcome.assembly
     data: dict[str, Any] = {
         "doc_path": relative(head.doc_path, base),
@@ -275,7 +281,8 @@ _CHANGES = {
 
 
 def cell(text: str) -> str:
-    """Text of others as Markdown that shows it and does nothing: one line, no markup, nobody is notified.
+    """Return text of others as Markdown that shows it and does nothing: one line, no markup, nobody is
+    notified.
 
     On GitHub ``@team`` and ``#12`` mean somebody, escaped or not; a space without width parts them.
     """
@@ -329,7 +336,9 @@ class Summary:
 
     @property
     def exit_code(self) -> Exit:
-        """The worst: 3 if the server kept anything from being sent, 1 if something else was left undone."""
+        """Return the worst: 3 if the server kept anything from being sent, 1 if something else was left
+        undone.
+        """
         if self.unsent:
             return Exit.REMOTE
         return Exit.DONE if self.fine == self.files else Exit.UNDONE
@@ -398,7 +407,7 @@ class Summary:
         return [f"{name} ({shorten(path, self.base)})" for (path, _), name in self.unregistered.items()]
 
     def to_json(self) -> dict[str, Any]:
-        """For machines."""
+        """Return the data for machines."""
         return {
             "files": self.files,
             "in_order": self.fine,
@@ -422,7 +431,7 @@ class Summary:
         return {"message": words, "cause": self.causes.get(words, words), "files": files}
 
     def sentence(self) -> str:
-        """The run in one line; first what the server kept from being sent."""
+        """Return the run in one line; first what the server kept from being sent."""
         words = []
         for why, count in self.unsent.most_common():
             words.append(f"{counted(count, 'assembly', 'assemblies')} not sent: {why.rstrip('.')}. ")
@@ -566,7 +575,7 @@ def form_of(path: str) -> Form:
 
 
 def is_news(outcome: Outcome) -> bool:
-    """True for what a reader of a report wants to see: all but assemblies that are as they were."""
+    """Return True for what a reader of a report wants to see: all but assemblies that are as they were."""
     if outcome.status is Status.DRY_RUN:
         return outcome.plan is not None and (outcome.plan.news or outcome.plan.diff.drifted)
     return outcome.status is not Status.UNCHANGED
@@ -683,7 +692,7 @@ def _others(words: str, files: Iterable[str]) -> str:
 
 
 def reasons_of(outcome: Outcome) -> list[str]:
-    """Why an assembly was not synced."""
+    """Return why an assembly was not synced."""
     if outcome.error is not None:
         return [str(outcome.error)]
     return [finding.message for finding in blocking(outcome.resolved)] if outcome.status in _LEFT else []

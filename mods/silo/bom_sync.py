@@ -74,7 +74,7 @@ class Memory:
         self.path = path or data_folder() / "standard-items.json"
 
     def known(self, server: str) -> dict[str, str]:
-        """What is known of a server; nothing where the file cannot be read, which only costs a search."""
+        """Return what is known of a server; nothing where the file cannot be read, which only costs a search."""
         return self._read().get(server, {})
 
     def remember(self, server: str, items: Mapping[str, str]) -> None:
@@ -92,7 +92,7 @@ class Memory:
 def find_items(
     entries: Iterable[BomEntry], items_by_uuid: Mapping[str, Any], api: Any, memory: Memory | None = None
 ) -> dict[str, Mapping[str, Any]]:
-    """The items of standard parts that the server does not know by their UUID: UUID → item.
+    """Return the items of standard parts that the server does not know by their UUID: UUID → item.
 
     known
         what the server answered for the UUIDs of the whole tree.
@@ -131,7 +131,9 @@ def _remembered(
 
 
 def by_description(designation: str, api: Any) -> Mapping[str, Any] | None:
-    """The one item whose description (or name) is exactly the designation; None for none and for several."""
+    """Return the one item whose description (or name) is exactly the designation; None for none and for
+    several.
+    """
     search = getattr(api, "search_items", None)
     if not callable(search):
         return None
@@ -149,7 +151,7 @@ def by_description(designation: str, api: Any) -> Mapping[str, Any] | None:
 
 
 def server_of(api: Any) -> str:
-    """How a memory names the server."""
+    """Return how a memory names the server."""
     return str(getattr(api, "base_url", ""))
 
 
@@ -196,7 +198,7 @@ class _Findings(tuple[Finding, ...]):
 
     @cached_property
     def _by_file(self) -> Mapping[str, list[int]]:
-        """Where the errors of each file stand; under "" the loops, which block every assembly."""
+        """Return where the errors of each file stand; under "" the loops, which block every assembly."""
         result: dict[str, list[int]] = {}
         for number, finding in enumerate(self):
             if finding.severity is Severity.ERROR:
@@ -227,7 +229,7 @@ class Resolved:
 
     @property
     def unregistered(self) -> tuple[BomEntry, ...]:
-        """The components without an item, parts first, the assembly itself last."""
+        """Return the components without an item, parts first, the assembly itself last."""
         head = () if self.assembly.part_number else (self.assembly,)
         return tuple(
             sorted((*self.unresolved, *head), key=lambda e: (e.is_assembly, e.is_standard, -e.level))
@@ -235,26 +237,27 @@ class Resolved:
 
     @property
     def folder(self) -> str:
-        """Where the assembly's file lies; a merge names components relative to it."""
+        """Return where the assembly's file lies; a merge names components relative to it."""
         return os.path.dirname(self.assembly.doc_path)
 
     @property
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What a sync of this assembly cannot bring to the server."""
+        """Return what a sync of this assembly cannot bring to the server."""
         errors = (finding for finding in blocking(self))
         return left_out_of(self.entries, self.assembly.unregistered, errors, self.folder)
 
     def diff(self, lines: Iterable[Mapping[str, Any]]) -> BomDiff:
-        """CAD against these lines of the server."""
+        """Compare CAD with these lines of the server."""
         return diff_bom(self.entries, lines, self._missing())
 
     def plan(self, lines: Iterable[Mapping[str, Any]]) -> MergePlan:
-        """What a merge into these lines of the server would do."""
+        """Return what a merge into these lines of the server would do."""
         return plan_merge(self.entries, lines, self._missing())
 
     def is_news(self, plan: MergePlan, lines: Iterable[Mapping[str, Any]] = ()) -> bool:
-        """True where the server learns anything from this merge into these lines of its own: if only that the
-        BOM is (in)complete now, or that a component has another file."""
+        """Return True if the server learns anything from this merge into these lines of its own: if only that
+        the BOM is (in)complete now, or that a component has another file.
+        """
         if plan.news:
             return True
         last = self.last_syncs.get(self.assembly.silo_uuid or "")
@@ -311,13 +314,13 @@ def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
 
 
 def known_items(uuids: Iterable[str], entries: Iterable[BomEntry], api: ItemLookup) -> Known:
-    """The server's items of these identities, and those of the standard parts among the entries."""
+    """Return the server's items of these identities, and those of the standard parts among the entries."""
     items = look_up(uuids, api)
     return {**items, **find_items(entries, items, api)}
 
 
 def resolve_known(extraction: Extraction, items: Known) -> Resolved:
-    """:func:`resolve` against items fetched before; pure."""
+    """Return :func:`resolve` against items fetched before; pure."""
     head = extraction.assembly
     entries, unresolved = resolve_with(extraction.entries, items)
     item = items.get(head.silo_uuid) if head.silo_uuid else None
@@ -342,7 +345,7 @@ def resolve_known(extraction: Extraction, items: Known) -> Resolved:
 
 
 def server_lines(resolved: Resolved, api: SyncApi) -> tuple[Mapping[str, Any], ...]:
-    """The server's lines of this assembly as they are now; none while it has no part number."""
+    """Return the server's lines of this assembly as they are now; none while it has no part number."""
     number = resolved.assembly.part_number
     if number is None:
         return ()
@@ -350,17 +353,17 @@ def server_lines(resolved: Resolved, api: SyncApi) -> tuple[Mapping[str, Any], .
 
 
 def plain_lines(lines: Iterable[Any]) -> tuple[Mapping[str, Any], ...]:
-    """Lines as mappings, whatever the client made of them."""
+    """Return lines as mappings, whatever the client made of them."""
     return tuple(line if isinstance(line, Mapping) else line.model_dump() for line in lines)
 
 
 def compare(resolved: Resolved, api: SyncApi) -> MergePlan:
-    """What a merge would do, against the server's lines as they are now."""
+    """Return what a merge would do, against the server's lines as they are now."""
     return resolved.plan(server_lines(resolved, api))
 
 
 def names_of(resolved: Resolved, lines: Iterable[Mapping[str, Any]] = ()) -> dict[str, str]:
-    """Part number → name, of all that was resolved and of the server's own lines; for showing."""
+    """Return part number → name, of all that was resolved and of the server's own lines; for showing."""
     names = {
         line["child_part_number"]: line.get("child_description") or line.get("child_name") or ""
         for line in lines
@@ -372,7 +375,7 @@ def names_of(resolved: Resolved, lines: Iterable[Mapping[str, Any]] = ()) -> dic
 def decide(
     resolved: Resolved, lines: Sequence[Mapping[str, Any]], *, allow_missing: bool = False, server: str = ""
 ) -> Outcome:
-    """What is to become of one assembly: unregistered, blocked, unchanged, or to be merged.
+    """Return what is to become of one assembly: unregistered, blocked, unchanged, or to be merged.
 
     lines
         the server's lines of the assembly.
@@ -392,7 +395,7 @@ def decide(
 
 
 def _reported_lines() -> Memory:
-    """Server → part number of an assembly → its unreferenced lines that the server has heard of."""
+    """Return server → part number of an assembly → its unreferenced lines that the server has heard of."""
     return Memory(cache_folder() / "unreferenced.json")
 
 
@@ -448,7 +451,7 @@ def sync(
 
 
 def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | None = None) -> MergeRequest:
-    """The request of spec §5: the direct children only.
+    """Return the request of spec §5: the direct children only.
 
     A server that remembers its syncs also gets what each line is in the CAD model, and what is left out; for
     any other the request is exactly the spec's.
@@ -475,7 +478,7 @@ def blocking(resolved: Resolved) -> tuple[Finding, ...]:
 
 
 def assemblies(resolved: Resolved) -> Iterator[Resolved]:
-    """The assembly and its sub-assemblies, each once, children before parents."""
+    """Yield the assembly and its sub-assemblies, each once, children before parents."""
     seen: set[tuple[str, str]] = set()
 
     def below(entries: Sequence[BomEntry]) -> Iterator[BomEntry]:
@@ -534,7 +537,7 @@ class ActivityText:
     unregistered: str = ""
 
     def lines(self) -> tuple[str, ...]:
-        """All of it, a line each."""
+        """Return all of it, a line each."""
         link = "View in Silo →" if self.resolve_url else ""
         return tuple(line for line in (self.headline, self.counts, link, self.unregistered) if line)
 
@@ -549,14 +552,14 @@ class MergeCount(StrEnum):
 
 
 def headline(item: str, translate: Translate = english) -> str:
-    """``BOM Updated: ASM-001``."""
+    """Return ``BOM Updated: ASM-001``."""
     return translate("Silo", "BOM Updated: {number}").replace("{number}", item)
 
 
 def count_texts(
     diff: MergeDiff, warnings: Iterable[MergeWarning] = (), translate: Translate = english
 ) -> dict[MergeCount, str]:
-    """Each count of a merge in words, such as ``+1 added``, without those that are zero."""
+    """Return each count of a merge in words, such as ``+1 added``, without those that are zero."""
     conflicts = sum(1 for warning in warnings if warning.type == "conflict")
     counted = (
         (MergeCount.ADDED, len(diff.added), translate("Silo", "+{n} added")),
@@ -568,24 +571,24 @@ def count_texts(
 
 
 def no_changes(translate: Translate = english) -> str:
-    """What stands there instead of counts."""
+    """Return what stands there instead of counts."""
     return translate("Silo", "no changes")
 
 
 def counts_text(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> str:
-    """``+1 added  ~1 qty changed  ⚠1 unreferenced``, without what is zero."""
+    """Return ``+1 added ~1 qty changed ⚠1 unreferenced``, without what is zero."""
     return "  ".join(count_texts(diff, warnings).values()) or no_changes()
 
 
 def unregistered_text(count: int, translate: Translate = english) -> str:
-    """``2 components have no Silo part number``; "" for none."""
+    """Return ``2 components have no Silo part number``; "" for none."""
     text = translate("Silo", "{n} component has no Silo part number")
     many = translate("Silo", "{n} components have no Silo part number")
     return (text if count == 1 else many).replace("{n}", str(count)) if count else ""
 
 
 def draft_text(result: MergeResult | Revision | None, translate: Translate = english) -> str:
-    """Which draft a change of a released product is part of; "" if nothing of it is released."""
+    """Return which draft a change of a released product is part of; "" if nothing of it is released."""
     draft = result.draft if result is not None else None
     if draft is None:
         return ""
@@ -594,7 +597,7 @@ def draft_text(result: MergeResult | Revision | None, translate: Translate = eng
 
 
 def summary_texts(summary: ProductSummary, translate: Translate = english) -> tuple[list[str], list[str]]:
-    """What is open in each BOM of a product; and what it weighs and costs, as the server keeps it."""
+    """Return what is open in each BOM of a product; and what it weighs and costs, as the server keeps it."""
     texts = [f"{number}: {words}" for number, words in (*summary.open.items(), *summary.incomplete.items())]
     mass = f"{summary.total_mass_kg:g} kg" if summary.total_mass_kg else ""
     costs = ", ".join(f"{total.total_cost:.2f} {total.currency}" for total in summary.totals)
@@ -607,7 +610,7 @@ def summary_texts(summary: ProductSummary, translate: Translate = english) -> tu
 
 
 def rules_text(problem: str, translate: Translate = english) -> str:
-    """That the site's category rules have a mistake, and which; "" where they have none."""
+    """Say which mistake the site's category rules have; "" if they have none."""
     text = translate("Silo", "The category rules of this Silo are not used until they are mended: {problem}")
     return text.replace("{problem}", problem) if problem else ""
 
@@ -615,7 +618,7 @@ def rules_text(problem: str, translate: Translate = english) -> str:
 def activity_text(
     item: str, merge: MergeEvent | MergeResult, *, resolve_url: str = "", unregistered: int = 0
 ) -> ActivityText:
-    """The box of one merge; ``resolve_url`` overrides the event's (made absolute by the caller)."""
+    """Return the box of one merge; ``resolve_url`` overrides the event's (made absolute by the caller)."""
     without = unregistered_text(unregistered)
     return ActivityText(
         headline=headline(item),

@@ -49,7 +49,7 @@ Check = Callable[[str], bool | None]
 
 
 def documents_in(tops: Iterable[str]) -> list[str]:
-    """The files that are meant, each once: a folder stands for all FCStd files below it.
+    """Return the files that are meant, each once: a folder stands for all FCStd files below it.
 
     Left out are backups, hidden files and folders, recycle bins, and what a ``.siloignore`` in the folder or
     below it names (in the syntax of ``.gitignore``). A folder that cannot be listed is in the result itself,
@@ -73,7 +73,7 @@ def documents_in(tops: Iterable[str]) -> list[str]:
 
 
 def must_exist(*paths: str) -> None:
-    """InputError for files and folders that are not there, before anything is done; it names all of them."""
+    """Raise InputError that names all missing files and folders, before anything is done."""
     lost = [path for path in paths if not os.path.exists(path)]
     if len(lost) == 1:
         raise InputError(f"{_quoted(lost[0])}: there is no such file or folder")
@@ -90,7 +90,8 @@ _NOT_OURS = ("#recycle", "#snapshot", "$recycle.bin", "@recycle", "@recently-sna
 
 
 def _below(folder: str, rules: tuple[tuple[int, Check], ...] = (), inner: str = "") -> Iterator[str]:
-    """The FCStd files below a folder. One that cannot be listed stands for itself, so that reading it fails.
+    """Yield the FCStd files below a folder. One that cannot be listed stands for itself, so that reading it
+    fails.
 
     rules
         of the folders above: where paths below each begin in ``inner``, and its patterns.
@@ -121,7 +122,7 @@ def _below(folder: str, rules: tuple[tuple[int, Check], ...] = (), inner: str = 
 
 
 def _ignored(name: str, rules: Sequence[tuple[int, Check]]) -> bool:
-    """As git decides it: the last pattern of the innermost file that says anything about a name."""
+    """Decide as git does: the last pattern of the innermost file that says anything about a name."""
     for begin, check in reversed(rules):
         if (decided := check(name[begin:])) is not None:
             return decided
@@ -129,7 +130,9 @@ def _ignored(name: str, rules: Sequence[tuple[int, Check]]) -> bool:
 
 
 def _patterns(path: str) -> Check:
-    """What a file of patterns says of a name: True to leave it out, False to keep it, None for nothing."""
+    """Return what a file of patterns says of a name: True to leave it out, False to keep it, None for
+    nothing.
+    """
     try:
         from pathspec import GitIgnoreSpec
     except ImportError as error:  # inside FreeCAD
@@ -329,7 +332,8 @@ def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[s
 
 
 def job_text(env: Mapping[str, str]) -> str | None:
-    """The arguments of a job inside FreeCAD: the file that ``SILO_ARGS_FILE`` names, else ``SILO_ARGS``.
+    """Return the arguments of a job inside FreeCAD: the file that ``SILO_ARGS_FILE`` names, else
+    ``SILO_ARGS``.
 
     An environment variable ends at 32 767 characters on Windows, and at 128 KiB on Linux. Raises OSError.
     """
@@ -349,13 +353,13 @@ def check_writable(*paths: str | None) -> None:
 
 
 def content_hash(path: Path | str) -> str:
-    """The SHA-256 of a file's content, in hexadecimal. Raises OSError."""
+    """Return the SHA-256 of a file's content, in hexadecimal. Raises OSError."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def sha256_of(path: str) -> str:
-    """The hash of a document that must be readable; DocumentError where it is not."""
+    """Return the hash of a document that must be readable; DocumentError if it is not."""
     try:
         return content_hash(path)
     except OSError as error:
@@ -363,18 +367,21 @@ def sha256_of(path: str) -> str:
 
 
 def bare_checksum(checksum: str | None) -> str:
-    """A SHA-256 as a server may name it, in lower-case hex; "" where it names none."""
+    """Return a SHA-256 as a server may name it, in lower-case hex; "" if it names none."""
     return (checksum or "").lower().removeprefix("sha256:")
 
 
 def seen_as(number: int, checksum: str | None) -> str:
-    """What names the file of a revision that a person saw: by its content too, where the server knows that; a
-    server that was restored gives the same number to another file."""
+    """Return what names the file of a revision that a person saw: by its content too, where the server knows
+    that; a server that was restored gives the same number to another file.
+    """
     return f"{number} {bare_checksum(checksum)}".strip()
 
 
 def shipped() -> Path:
-    """The folder with the example and the add-on's own files: the checkout, or what the wheel holds of it."""
+    """Return the folder with the example and the add-on's own files: the checkout, or what the wheel holds of
+    it.
+    """
     wheel = Path(__file__).parent / "shipped"
     return wheel if wheel.is_dir() else Path(__file__).resolve().parents[2]
 
@@ -393,7 +400,7 @@ class FoundFile(NamedTuple):
     respelt: bool = False
 
     def is_straight(self, recorded: str, folder: str) -> bool:
-        """True where the path itself leads to the file: it is found so for as long as it lies there."""
+        """Return True if the path itself leads to the file: it is found so for as long as it lies there."""
         return self.real == os.path.normpath(os.path.join(folder, recorded))
 
 
@@ -423,16 +430,16 @@ class Locator:
             self.root = self._spelling.real(self.root)
 
     def real(self, path: str) -> str:
-        """The one path of a file: without symlinks, as its folders list it."""
+        """Return the one path of a file: without symlinks, as its folders list it."""
         return self._spelling.look(path).path
 
     def inside(self, real_path: str) -> bool:
-        """True where a path without symlinks may be read."""
+        """Return True if a path without symlinks may be read."""
         root = self.root
         return root is None or real_path == root or real_path.startswith(os.path.join(root, ""))
 
     def find(self, recorded: str, folders: tuple[str, ...]) -> FoundFile | NotFound:
-        """The file that a link in a document of (one of) these folders means."""
+        """Return the file that a link in a document of (one of) these folders means."""
         if not self.remembers_files:
             return self._find(recorded, folders)
         result: FoundFile | NotFound | None = self._files.get((recorded, folders))
@@ -466,11 +473,11 @@ class Locator:
         return self._respelt(recorded, folders)
 
     def lies_straight(self, path: str) -> bool:
-        """True where what is there has this very path: no folder is a symlink, names are as listed."""
+        """Return True if what is there has this very path: no folder is a symlink, names are as listed."""
         return self._spelling.is_plain(path)
 
     def _respelt(self, recorded: str, folders: tuple[str, ...]) -> FoundFile | NotFound:
-        """Written on Windows or macOS, where ``Part.FCStd`` opens ``part.FCStd``: taken if only one fits."""
+        """Find a file that Windows or macOS would open (``part.FCStd`` for ``Part.FCStd``), if only one fits."""
         for path in _candidates(recorded, folders):
             matches = list(self._spellings(path))
             if len(matches) > 1:
@@ -510,7 +517,7 @@ class Locator:
 
 
 def refusal(recorded: str) -> NotFound | None:
-    """Why a recorded path is not even looked at; None where it may be.
+    """Return why a recorded path is not even looked at; None if it may be.
 
     The rules are those of Windows, where a mere look can do harm, and the same on every platform: a project
     must not read in one way here and in another there.
@@ -530,7 +537,7 @@ def refusal(recorded: str) -> NotFound | None:
 
 
 def _respelt_by_disk(recorded: str, spelt: Spelt) -> bool:
-    """True where a disk that ignores case found a name of the link under another spelling.
+    """Return True if a disk that ignores case found a name of the link under another spelling.
 
     How the user spelt the folders above is not the link's matter.
     """

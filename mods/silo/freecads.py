@@ -69,7 +69,7 @@ _BUNDLES = ("/Applications", "~/Applications")
 
 
 def commands(env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT) -> Iterator[str]:
-    """Every ``freecadcmd`` that can be started here, those on the PATH first. ``root``: of the disk."""
+    """Yield every ``freecadcmd`` that can be started here, those on the PATH first. ``root``: of the disk."""
     on_path = (shutil.which(name, path=env.get("PATH")) for name in _COMMANDS)
     elsewhere = (str(path) for path in _matching(env, root, *_command_places(env, platform)))
     # Windows and macOS find one program under two of these names.
@@ -95,7 +95,7 @@ def _command_places(env: Mapping[str, str], platform: str) -> tuple[str, ...]:
 
 
 def start(command: str) -> list[str]:
-    """The words that start FreeCAD without its window: some packages need more than a path."""
+    """Return the words that start FreeCAD without its window: some packages need more than a path."""
     name = os.path.basename(command)
     if name.casefold().endswith(".appimage"):
         return [command, "freecadcmd"]  # an AppImage runs the program that its first argument names
@@ -107,7 +107,7 @@ def start(command: str) -> list[str]:
 def material_folders(
     env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT
 ) -> Iterator[Path]:
-    """Folders with FreeCAD's material cards: its own ones, then the user's. ``root``: of the disk."""
+    """Yield folders with FreeCAD's material cards: its own ones, then the user's. ``root``: of the disk."""
     if platform == "win32":
         shipped = [f"{base}/{data}Mod/Material" for base in _windows(env) for data in ("data/", "")]
         own = ["{APPDATA}/FreeCAD"]
@@ -137,7 +137,7 @@ def material_folders(
 def cache_folders(
     env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT
 ) -> Iterator[Path]:
-    """The cache folders of this user's FreeCADs. ``root``: of the disk."""
+    """Yield the cache folders of this user's FreeCADs. ``root``: of the disk."""
     # Both are used as they are; the others get a folder for the program (App/ApplicationDirectories).
     moved = [Path(env[name], part) for name, part in _MOVED_CACHES if env.get(name)]
     yield from (folder for folder in moved if folder.is_dir())
@@ -152,7 +152,7 @@ def cache_folders(
 
 
 def exchange_folder(command: str, env: Mapping[str, str] = os.environ) -> str | None:
-    """Where files for a FreeCAD must lie so that it sees them; None where any temporary folder will do.
+    """Return where files for a FreeCAD must lie so that it sees them; None if any temporary folder will do.
 
     Snap and Flatpak give a program a ``/tmp`` of its own, and a part of the user's home.
     """
@@ -166,7 +166,7 @@ def exchange_folder(command: str, env: Mapping[str, str] = os.environ) -> str | 
 
 
 def _windows(env: Mapping[str, str]) -> list[str]:
-    """Installed for all users, or for one."""
+    """Find programs that are installed for all users, or for one."""
     roots = [name for name in ("PROGRAMFILES", "PROGRAMW6432", "LOCALAPPDATA") if env.get(name)]
     places = [f"{{{name}}}" for name in roots]
     places += ["{LOCALAPPDATA}/Programs"] if "LOCALAPPDATA" in roots else []
@@ -178,7 +178,7 @@ def _flatpak_bases() -> tuple[str, str]:
 
 
 def _matching(env: Mapping[str, str], root: Path, *patterns: str) -> Iterator[Path]:
-    """What is there, each once; within a pattern the newest version first."""
+    """Yield what is there, each once; within a pattern the newest version first."""
     seen = set()
     for pattern in patterns:
         for path in sorted(_glob(env, root, pattern), key=_version, reverse=True):
@@ -217,7 +217,7 @@ class OpenInFreecad:
         self._hashes = frozenset(digest for cache in caches for digest in _open_in(cache, but_not))
 
     def has(self, *paths: str) -> bool:
-        """True where a file, by any of these spellings, is open in FreeCAD."""
+        """Return True if a file, by any of these spellings, is open in FreeCAD."""
         return any(
             hashlib.sha1(os.fsencode(path), usedforsecurity=False).hexdigest()[:6] in self._hashes
             for path in paths
@@ -225,7 +225,7 @@ class OpenInFreecad:
         )
 
     def has_file(self, path: str) -> bool:
-        """True where a file is open in FreeCAD under its given, its absolute or its real path.
+        """Return True if a file is open in FreeCAD under its given, its absolute or its real path.
 
         FreeCAD writes "/" on Windows too.
         """
@@ -235,12 +235,12 @@ class OpenInFreecad:
 
 
 def open_in_any() -> OpenInFreecad:
-    """What any FreeCAD of this user has open now."""
+    """Return what any FreeCAD of this user has open now."""
     return OpenInFreecad(cache_folders())
 
 
 def open_in_others(own_folder: str) -> OpenInFreecad:
-    """What FreeCADs other than this one have open now.
+    """Return what FreeCADs other than this one have open now.
 
     own_folder
         the cache folder of a document that is open here (``Document.TransientDir``); without it, nothing is
@@ -272,7 +272,9 @@ _CODE = 'import os, runpy; runpy.run_path(os.environ["SILO_SCRIPT"], run_name="_
 
 
 def find_freecadcmd(given: str | None = None, env: Mapping[str, str] = os.environ) -> str:
-    """The ``freecadcmd`` to start: the given one, ``SILO_FREECADCMD``, or one found. ConfigError if none."""
+    """Return the ``freecadcmd`` to start: the given one, ``SILO_FREECADCMD``, or one found. ConfigError if
+    none.
+    """
     wanted = given or env.get("SILO_FREECADCMD")
     if wanted:
         command = shutil.which(wanted)
@@ -299,7 +301,7 @@ with open(os.environ["SILO_OUT"], "w") as out:
 
 
 def freecad_for(saved_by: tuple[int, ...]) -> tuple[str, str]:
-    """A FreeCAD that can open what this version saved: its command, and its own version.
+    """Return a FreeCAD that can open what this version saved: its command, and its own version.
 
     The first here that is no older, else the newest. What ``SILO_FREECADCMD`` names is taken as it is.
     ConfigError if there is none.
@@ -389,7 +391,7 @@ def run_freecad(
 
 
 def _result(line: Mapping[str, Any]) -> Extraction | SiloError:
-    """The answer of one line, or the error that the script inside FreeCAD wrote into it."""
+    """Return the answer of one line, or the error that the script inside FreeCAD wrote into it."""
     error = line.get("error")
     if error is None:
         return from_plain(line["extraction"])
@@ -467,7 +469,7 @@ class FreeCADRun:
         self._folder.cleanup()
 
     def lines(self) -> Iterator[dict[str, Any]]:
-        """The results as they are written; ends with the process, or with its time."""
+        """Yield the results as they are written; ends with the process, or with its time."""
         assert self._process is not None  # entered
         deadline = time.monotonic() + self.timeout_s
         with open(self._results, encoding="utf-8") as results:
@@ -489,7 +491,9 @@ class FreeCADRun:
                 time.sleep(_POLL_S)
 
     def failure(self, path: str) -> SiloError:
-        """Why the file that was being read has no result. ConfigError where FreeCAD never got that far."""
+        """Return why the file that was being read has no result. ConfigError where FreeCAD never got that
+        far.
+        """
         if self.timed_out:
             return DocumentError(path, f"FreeCAD did not finish it within {self.timeout_s:g} s")
         if not self.begun:
@@ -516,7 +520,7 @@ _CRASHED = re.compile(r"Program received signal (SIGSEGV|SIGABRT|SIGILL|SIGFPE)"
 
 
 def _last_words(code: int, log: Path) -> tuple[str, str]:
-    """How a FreeCAD ended, and the last lines that it said, without those of a crash."""
+    """Return how a FreeCAD ended, and the last lines that it said, without those of a crash."""
     text = log.read_text(encoding="utf-8", errors="replace")
     if crash := _CRASHED.search(text):
         code, text = -signal.Signals[crash[1]], text[: crash.start()]
@@ -578,7 +582,7 @@ class Installation:
 
     @property
     def mod(self) -> Path:
-        """Where the add-on goes."""
+        """Return where the add-on goes."""
         return self.data / "Mod" / FOLDER
 
 
@@ -623,7 +627,7 @@ def _run(command: list[str], seconds: float, **more: Any) -> subprocess.Complete
 
 
 def _has_pip(python: str, version: tuple[int, int] | None = None) -> bool:
-    """True if this is a Python with pip, of that version."""
+    """Return True if this is a Python with pip, of that version."""
     code = "import pip, sys; print(*sys.version_info[:2])"
     try:
         ran = _run([python, "-c", code], _ASK_SECONDS)
@@ -633,7 +637,7 @@ def _has_pip(python: str, version: tuple[int, int] | None = None) -> bool:
 
 
 def _any_python() -> str:
-    """A Python with pip. Inside FreeCAD, ``sys.executable`` is FreeCAD."""
+    """Return a Python with pip. Inside FreeCAD, ``sys.executable`` is FreeCAD."""
     paths = (sys.executable, shutil.which("python3"), shutil.which("python"), shutil.which("py"))
     for python in paths:
         if python and "freecad" not in os.path.basename(python).lower() and _has_pip(python):

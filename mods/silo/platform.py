@@ -84,12 +84,14 @@ _DEVICE = re.compile(
 
 
 def is_device_name(name: str) -> bool:
-    """True where Windows takes this name of a file for a device; asked on every platform, as files travel."""
+    """Return True if Windows takes this name of a file for a device; asked on every platform, as files
+    travel.
+    """
     return _DEVICE.match(name) is not None
 
 
 def no_device_name(name: str) -> str:
-    """``name``, or what a file of that name is called where nobody may call it so."""
+    """Return ``name``, or what a file of that name is called where nobody may call it so."""
     return "_" * is_device_name(name) + name
 
 
@@ -204,7 +206,7 @@ def sync_folder(folder: str | os.PathLike[str]) -> None:
 
 
 def is_locked(path: str) -> bool | None:
-    """True where another process holds a lock on a file; None where this cannot be known.
+    """Return True if another process holds a lock on a file; None if this cannot be known.
 
     Asking takes the lock for a moment. Must not be asked of a file that this process has locked: closing it
     gives that lock up.
@@ -262,7 +264,7 @@ def hold_lock(path: str | os.PathLike[str], *, shared: bool = False) -> BinaryIO
 
 
 def shows_locks(path: str, mounts: str = "/proc/self/mountinfo") -> bool:
-    """True where other computers that share the disk see a lock on it. FUSE and the folders of virtual
+    """Return True if other computers that share the disk see a lock on it. FUSE and the folders of virtual
     machines keep locks to themselves, without an error.
 
     mounts
@@ -334,7 +336,7 @@ def allow_many_files(resources: Resources | None = None) -> None:
 
 
 def child_options(*, group: bool = False, offered: object = subprocess) -> dict[str, Any]:
-    """Options of ``subprocess`` for a child that nobody sees: no console window opens on Windows.
+    """Return options of ``subprocess`` for a child that nobody sees: no console window opens on Windows.
 
     group
         the child and its own children can be ended together, by :func:`end`.
@@ -395,7 +397,7 @@ _CRASHES = {"SIGSEGV", "SIGABRT", "SIGILL", "SIGBUS", "SIGFPE"}
 
 
 def how_it_ended(code: int) -> str:
-    """The exit code of a child in words, such as ``crashed (SIGSEGV)`` or ``ended with exit code 3``.
+    """Return the exit code of a child in words, such as ``crashed (SIGSEGV)`` or ``ended with exit code 3``.
 
     A shell that started the child adds 128 to the signal; Windows has codes from 0xC0000000 on for crashes.
     """
@@ -409,7 +411,7 @@ def how_it_ended(code: int) -> str:
 
 
 def python_beside(prefix: str) -> list[str]:
-    """Where a Python interpreter lies below its prefix."""
+    """Return where a Python interpreter lies below its prefix."""
     names = ("python.exe", "bin/python.exe") if WINDOWS else ("bin/python3", "bin/python")
     return [os.path.join(prefix, *name.split("/")) for name in names]
 
@@ -452,12 +454,13 @@ def _folder(
 
 
 def config_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
-    """Where the configuration lives (not created here)."""
+    """Return where the configuration lives (not created here)."""
     return _folder(env, platform, "XDG_CONFIG_HOME", ".config", "Library/Application Support", _ROAMING)
 
 
 def data_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
-    """Where what must not be lost lives: the outbox, the journal of registrations, the embedded database.
+    """Return where what must not be lost lives: the outbox, the journal of registrations, the embedded
+    database.
 
     On Windows not in the roaming profile: a database that is copied between machines while it is open is soon
     a broken one.
@@ -466,12 +469,13 @@ def data_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Pa
 
 
 def cache_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
-    """Where what can be made again lives."""
+    """Return where what can be made again lives."""
     return _folder(env, platform, "XDG_CACHE_HOME", ".cache", "Library/Caches", _LOCAL)
 
 
 def scratch_folder(prefix: str, parent: Path | str | None = None) -> tempfile.TemporaryDirectory[str]:
-    """A temporary folder, as a context manager of its path; below ``parent``, else where the system has them.
+    """Return a temporary folder, as a context manager of its path; below ``parent``, else where the system
+    has them.
 
     A file in it that another program still has open (Windows) stays, and is no error.
     """
@@ -508,7 +512,7 @@ def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO
 
 
 def read_memory(path: Path) -> dict[str, Any]:
-    """What a small JSON file remembers; {} where it is not there, damaged, or no JSON object.
+    """Return what a small JSON file remembers; {} where it is not there, damaged, or no JSON object.
 
     For files whose loss costs a repeated question and never an answer.
     """
@@ -531,7 +535,7 @@ def write_memory(path: Path, content: Mapping[str, Any]) -> OSError | None:
 
 
 def replace_patiently(source: Path | str, target: Path | str) -> None:
-    """``os.replace``, which on Windows waits for a program that has the target open. Raises OSError."""
+    """Replace a file; on Windows wait for a program that has the target open. Raises OSError."""
     patiently(lambda: os.replace(source, target))
 
 
@@ -553,7 +557,7 @@ def private_file(path: Path | str) -> None:
 
 
 def stamp_of(path: Path | str | int) -> Stamp | None:
-    """The stamp of a file, by its path or as an open one; None where there is no file."""
+    """Return the stamp of a file, by its path or as an open one; None if there is no file."""
     try:
         status = os.stat(path)
     except OSError:
@@ -591,11 +595,13 @@ class Spelling:
         self._listings: dict[str, dict[str, list[tuple[str, int]]]] = {}
 
     def real(self, path: str) -> str:
-        """``os.path.realpath`` with each name as its folder lists it; also for paths that are not there."""
+        """Return ``os.path.realpath`` with each name as its folder lists it; also for paths that are not
+        there.
+        """
         return self.look(os.path.abspath(path)).path
 
     def look(self, path: str) -> Spelt:
-        """The same for an absolute path, with what was asked for and whether anything is there."""
+        """Return the same for an absolute path, with what was asked for and whether anything is there."""
         folder, name = os.path.split(path)
         if not name:
             real = os.path.realpath(path)
@@ -616,14 +622,14 @@ class Spelling:
         return Spelt(os.path.join(real_folder, listed), os.path.join(plain, name), True)
 
     def is_plain(self, path: str) -> bool:
-        """True where what is known to lie there, and to be no symlink, has no other path."""
+        """Return True if what is known to lie there, and to be no symlink, has no other path."""
         folder, _, name = path.rpartition(os.sep)
         if name.isascii() and folder in self._exact and self._folders.get(folder) == (folder, folder):
             return True
         return self.look(path).path == path
 
     def _as_listed(self, real: str) -> str:
-        """A path without symlinks, each name as its folder lists it."""
+        """Return a path without symlinks, each name as its folder lists it."""
         text = self._canonical.get(real)
         if text is None:
             folder, name = os.path.split(real)
@@ -657,7 +663,7 @@ class Spelling:
         return next((other for other, number in listed if number == status.st_ino), listed[0][0])
 
     def _listing(self, folder: str) -> dict[str, list[tuple[str, int]]]:
-        """Names and inode numbers of a folder's entries, by :func:`folded` name."""
+        """Return names and inode numbers of a folder's entries, by :func:`folded` name."""
         listing = self._listings.get(folder)
         if listing is None:
             listing = self._listings[folder] = {}
@@ -671,10 +677,10 @@ class Spelling:
 
 
 def one_path(path: str) -> str:
-    """:meth:`Spelling.real` for a single look."""
+    """Return :meth:`Spelling.real` for a single look."""
     return Spelling().real(path)
 
 
 def folded(name: str) -> str:
-    """Equal for names that differ in case or normal form only."""
+    """Return a text that is equal for names that differ in case or normal form only."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFD", name).casefold())

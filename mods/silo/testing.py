@@ -82,11 +82,11 @@ class Stored:
     lines: list[dict[str, Any]] = field(default_factory=list)
 
     def search_text(self) -> str:
-        """What a search looks into: number, name, and the hashes of its files."""
+        """Return what a search looks into: number, name, and the hashes of its files."""
         return "\n".join((self.item.part_number, self.item.name, *self.hashes())).casefold()
 
     def hashes(self) -> list[str]:
-        """The SHA-256 of its files, as far as they are known."""
+        """Return the SHA-256 of its files, as far as they are known."""
         checksums = [self.item.properties.get("file_sha256"), *(r.file_checksum for r in self.revisions)]
         return [str(checksum).removeprefix("sha256:") for checksum in checksums if checksum]
 
@@ -103,7 +103,7 @@ def check_base(stored: Stored, base: int | None, checksum: str | None) -> None:
 
 
 def check_document(stored: Stored, base: int | None, checksum: str | None) -> None:
-    """The same for the BOM of a file."""
+    """Check the same for the BOM of a file."""
     same = [r.revision_number for r in stored.revisions if checksum and r.file_checksum == checksum]
     check_base(stored, base_of(base, checksum, max(same, default=None)), checksum)
 
@@ -316,7 +316,7 @@ Bom = Callable[[str], Sequence[BomLine]]
 
 
 def entries_of(request: MergeRequest, numbers: Mapping[str, str]) -> list[dict[str, Any]]:
-    """The request's entries under the server's own numbers (``known``: case-folded → number).
+    """Return the request's entries under the server's own numbers (``known``: case-folded → number).
 
     Raises :class:`RejectedError` with all unknown children at once, each with its index.
     """
@@ -340,14 +340,14 @@ def entries_of(request: MergeRequest, numbers: Mapping[str, str]) -> list[dict[s
 
 
 def missing_of(request: MergeRequest) -> list[tuple[str, str]]:
-    """The components that the assembly has lost."""
+    """Return the components that the assembly has lost."""
     return [(part.file, part.object) for part in request.left_out or () if part.reason == Reason.MISSING]
 
 
 def with_components(
     lines: Sequence[Mapping[str, Any]], entries: Iterable[Mapping[str, Any]], kept: Iterable[str]
 ) -> list[dict[str, Any]]:
-    """The lines, each with what it is in the CAD model."""
+    """Return the lines, each with what it is in the CAD model."""
     before = {line["child_part_number"]: line.get("components", []) for line in lines}
     after = remembered(before, entries, kept)
     return [{**line, "components": after.get(line["child_part_number"], [])} for line in lines]
@@ -394,13 +394,13 @@ class FakeSilo(FakeStore):
         return ServerState(mode=self.mode, status="ready", freecad=self.freecad)
 
     def set_mode(self, mode: str) -> None:
-        """``normal``, ``read-only`` or ``degraded``; announced as the server does."""
+        """Set ``normal``, ``read-only`` or ``degraded``, and announce it as the server does."""
         with self._lock:
             self.mode = mode
             self._announce(STATE, {"mode": mode})
 
     def open_events(self, last_event_id: str | None = None) -> FakeStream:
-        """The events after ``last_event_id``; None = only what is new."""
+        """Return the events after ``last_event_id``; None = only what is new."""
         self.before("open_events")
         with self._lock:
             start = len(self.log) if last_event_id is None else min(int(last_event_id), len(self.log))
@@ -544,7 +544,7 @@ class FakeSilo(FakeStore):
         return str(self._stored(part_number).item.bom_version)
 
     def get_summary(self, part_number: str, /) -> ProductSummary | None:
-        """None: this Silo keeps no summaries."""
+        """Return None: this Silo keeps no summaries."""
         return None
 
     def add_bom_line(self, part_number: str, child: str, /, **values: Any) -> BomLine:

@@ -142,7 +142,7 @@ def back_up(settings: Settings, target: Path, report: Report = lambda _: None) -
 
 
 def verify(source: Path) -> Manifest:
-    """The manifest of a backup that is whole: the database and all files are as they were written.
+    """Return the manifest of a backup that is whole: the database and all files are as they were written.
 
     Raises ConfigError.
     """
@@ -210,7 +210,7 @@ def _open(settings: Settings) -> Iterator[Database]:
 
 @contextmanager
 def _exclusive(db: Database) -> Iterator[Connection]:
-    """A transaction that keeps all other writers, and migrations, waiting; readers continue."""
+    """Begin a transaction that keeps all other writers, and migrations, waiting; readers continue."""
     with db.engine.execution_options(silo_write=True).connect() as connection, connection.begin():
         if connection.dialect.name == "postgresql":
             connection.execute(text("SET LOCAL statement_timeout = 0"))
@@ -307,7 +307,7 @@ def _copy_rows(reader: Connection, query: Select[Any], writer: Tx, target: Table
 
 
 def _highest_ids(connection: Connection, tables: Collection[Table]) -> dict[str, int]:
-    """The highest id that was ever given out, by table."""
+    """Return the highest id that was ever given out, by table."""
     names = [t.name for t in tables if "id" in t.c and t.c["id"].type.python_type is int]
     if connection.dialect.name == "sqlite":
         rows = connection.execute(text("SELECT name, seq FROM sqlite_sequence")).all()
@@ -334,7 +334,7 @@ def _set_highest_ids(connection: Connection, highest: dict[str, int]) -> None:
 
 
 def _checksums(path: Path) -> set[str]:
-    """Every file that the saved database refers to."""
+    """Return every file that the saved database refers to."""
     checksums: set[str] = set()
     with closing(sqlite3.connect(path)) as saved:
         # An older schema has fewer tables.

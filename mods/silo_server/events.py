@@ -59,7 +59,7 @@ class LoggedEvent:
 
     @property
     def mark(self) -> Mark:
-        """What a listener that was given this event comes back with."""
+        """Return what a listener that was given this event comes back with."""
         return Mark(self.id, f"{zlib.crc32(f'{self.name} {self.at} {self.data}'.encode()):08x}")
 
 
@@ -135,7 +135,7 @@ def set_mode(tx: Tx, mode: str) -> str:
 
 
 def read_after(tx: Tx, after: int, limit: int = 500) -> list[LoggedEvent]:
-    """The next events after id ``after``, oldest first."""
+    """Return the next events after id ``after``, oldest first."""
     rows = tx.conn.execute(select(events).where(events.c.id > after).order_by(events.c.id).limit(limit)).all()
     return [from_row(LoggedEvent, row) for row in rows]
 
@@ -167,7 +167,9 @@ def newest(
     before: int | None = None,
     after: int | None = None,
 ) -> list[LoggedEvent]:
-    """The newest events that were asked for, newest first; ``before`` and ``after`` are ids to page from."""
+    """Return the newest events that were asked for, newest first; ``before`` and ``after`` are ids to page
+    from.
+    """
     query = select(events)
     if asked.names:
         query = query.where(events.c.name.in_(asked.names))
@@ -188,30 +190,30 @@ def newest(
 
 
 def usernames(tx: Tx) -> list[str]:
-    """Everybody of whom there are events."""
+    """Return everybody of whom there are events."""
     scalars = tx.conn.scalars(select(events.c.username).distinct().where(events.c.username.is_not(None)))
     return sorted(scalars, key=str.casefold)
 
 
 def horizon_of(tx: Tx) -> int:
-    """The newest id that was trimmed away."""
+    """Return the newest id that was trimmed away."""
     return int(get_state(tx, HORIZON) or 0)
 
 
 def bounds(tx: Tx) -> tuple[int, int]:
-    """(horizon, head): the newest id that was trimmed away, and the newest id there is."""
+    """Return (horizon, head): the newest id that was trimmed away, and the newest id there is."""
     horizon = horizon_of(tx)
     head = tx.conn.scalar(select(func.max(events.c.id))) or 0
     return horizon, max(head, horizon)
 
 
 def head(tx: Tx) -> Mark:
-    """The newest place of the log."""
+    """Return the newest place of the log."""
     return mark_at(tx, bounds(tx)[1])
 
 
 def reaches(tx: Tx, mark: Mark) -> bool:
-    """True where the log goes back to ``mark`` without a gap: what came after it can be given, all of it.
+    """Return True if the log goes back to ``mark`` without a gap: what came after it can be given, all of it.
 
     False for one that was trimmed away, that is of the future, or whose event is another one by now.
     """
@@ -222,7 +224,7 @@ def reaches(tx: Tx, mark: Mark) -> bool:
 
 
 def mark_at(tx: Tx, event_id: int) -> Mark:
-    """The mark of the event with this id; without a tag where there is none, or no more."""
+    """Return the mark of the event with this id; without a tag where there is none, or no more."""
     row = tx.conn.execute(select(events).where(events.c.id == event_id)).one_or_none()
     return from_row(LoggedEvent, row).mark if row is not None else Mark(event_id)
 
@@ -247,12 +249,12 @@ def trim(tx: Tx, keep: int, keep_bytes: int | None = None, limit: int | None = N
 
 
 def bytes_of(tx: Tx, written: ColumnElement[str]) -> ColumnElement[int]:
-    """How many bytes a text takes, uncompressed."""
+    """Return how many bytes a text takes, uncompressed."""
     return func.octet_length(written) if tx.postgres else func.length(cast(written, LargeBinary))
 
 
 def beyond(tx: Tx, newest: Select[Any], budget: int) -> Any:
-    """The key of the newest row with which the sizes pass ``budget``; None where they never do.
+    """Return the key of the newest row with which the sizes pass ``budget``; None if they never do.
 
     newest
         selects (key, size in bytes), newest first. One row is always kept.
@@ -310,7 +312,7 @@ class Batch:
 
 
 def to_frame(event: LoggedEvent) -> Frame:
-    """``id:``, ``event:``, ``data:`` and an empty line; the data is JSON and so has no line break."""
+    """Return ``id:``, ``event:``, ``data:`` and an empty line; the data is JSON and so has no line break."""
     mark = event.mark
     payload = f"id: {mark}\nevent: {event.name}\ndata: {event.data}\n\n".encode()
     return Frame(mark, event.item_uuid, event.part_number_key, payload)
@@ -361,16 +363,18 @@ class Hub:
         self._wake()
 
     def poke(self) -> None:
-        """There may be news in the log; may be called from any thread."""
+        """Look for news in the log; any thread may call this."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._poke.set)
 
     async def wait(self) -> None:
-        """Until there is news, a heartbeat is due, or the hub closes."""
+        """Wait until there is news, a heartbeat is due, or the hub closes."""
         await self._news.wait()
 
     async def take(self, cursor: Mark) -> Batch:
-        """What comes after ``cursor``: from the ring where it reaches back far enough, else from the log."""
+        """Return what comes after ``cursor``: from the ring where it reaches back far enough, else from the
+        log.
+        """
         if cursor.id >= self.head.id:
             return Batch((), cursor)
         if cursor.id >= self._ring_start:
@@ -388,7 +392,7 @@ class Hub:
         return newer
 
     async def place(self, last: Mark | None) -> tuple[Mark, bool]:
-        """(cursor to begin at, whether a ``reset`` is due) for a client that says what it saw last."""
+        """Return (cursor to begin at, whether a ``reset`` is due) for a client that says what it saw last."""
         # The log and not the ring says where "now" is: the ring may be a moment behind a commit.
         return await asyncio.to_thread(self._read_place, last)
 
@@ -426,7 +430,9 @@ class Hub:
             self._wake()
 
     async def _begin_again(self) -> None:
-        """The log was trimmed beyond what was read, or the database put back: all read everything again."""
+        """Make all listeners read everything again: the log was trimmed beyond them, or the database
+        restored.
+        """
         logger.warning("the event log is another one than before; every listener gets a reset")
         self.head = await asyncio.to_thread(self._read_head)
         self._ring.clear()
@@ -440,7 +446,7 @@ class Hub:
             self._beat_now()
 
     def beat(self) -> None:
-        """A heartbeat now, with which each stream looks whether it may go on; from any thread."""
+        """Send a heartbeat now, with which each stream checks if it may continue; from any thread."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._beat_now)
 
@@ -456,7 +462,7 @@ class Hub:
         news.set()
 
     def _read_page(self, after: Mark) -> list[Frame] | None:
-        """What comes after ``after``; None where that is no place of this log."""
+        """Return what comes after ``after``; None if that is no place of this log."""
         with self._db.read() as tx:
             if not reaches(tx, after):
                 return None

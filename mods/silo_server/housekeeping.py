@@ -102,13 +102,13 @@ class Run:
 
 
 def last_run(tx: Tx) -> Run | None:
-    """The newest run of any process, None where there was none yet."""
+    """Return the newest run of any process, None if there was none yet."""
     kept = get_state(tx, STATE)
     return None if kept is None else Run(**json.loads(kept))
 
 
 def tidy(db: Database, store: FileStore) -> Run:
-    """One run of everything; what cannot be done is noted in the run, and the rest is done."""
+    """Do all housekeeping once; note in the run what cannot be done, and do the rest."""
     started, at = time.monotonic(), stamp(db.clock())
     removed: dict[str, int] = {}
     problems: list[str] = []
@@ -201,7 +201,7 @@ def _places(tx: Tx) -> datetime:
 
 
 def _answers(tx: Tx) -> int:
-    """Answers beyond their age, or beyond their bytes; the oldest first."""
+    """Delete answers beyond their age, or beyond their bytes; the oldest first."""
     by_age = _days("sync_days")(tx)
     newest = select(answers.c.at, events.bytes_of(tx, answers.c.answer)).order_by(answers.c.at.desc())
     by_size = events.beyond(tx, newest, tx.settings.sync_bytes)
@@ -218,7 +218,7 @@ def _events(tx: Tx) -> int:
 
 
 def _history(tx: Tx) -> int:
-    """Of one BOM: fold the changes older than ``history_days`` into one, which has the state they led to."""
+    """Fold, for one BOM, the changes older than ``history_days`` into one, which has the state they led to."""
     before = _days("history_days")(tx)
     if before is None:
         return 0
@@ -345,7 +345,7 @@ class State:
 
     @property
     def ready(self) -> bool:
-        """True where it can do all of its work."""
+        """Return True if it can do all of its work."""
         return self.database == self.files == "ok"
 
 
@@ -360,7 +360,7 @@ class Probe:
         self.last = State("normal", "ok", "ok")
 
     async def look(self, seconds: float) -> State | None:
-        """How the server is now, None where that does not turn out within ``seconds``."""
+        """Return how the server is now, None if that does not turn out within ``seconds``."""
         if self._running is None or self._running.done():
             self._running = asyncio.get_running_loop().run_in_executor(self._executor, self._look)
         running = self._running  # while this one waits, another caller may begin the next look
@@ -387,7 +387,7 @@ class Probe:
 
 
 def has_space(folder: Path, wanted: int) -> bool:
-    """True where the disk of this folder has so many bytes free; also where nobody can say."""
+    """Return True if the disk of this folder has so many bytes free; also where nobody can say."""
     try:
         return shutil.disk_usage(folder).free >= wanted
     except OSError:
@@ -433,7 +433,7 @@ class Metrics:
         self._seconds.labels(method_name, route).observe(seconds)
 
     def render(self, db: Database, hub: Hub, files: FileStore) -> bytes:
-        """The text for Prometheus. The database's numbers are left out while it cannot be read."""
+        """Return the text for Prometheus. The database's numbers are left out while it cannot be read."""
         self._listeners.set(hub.listeners)
         self._connections.set(db.connections)
         now = CollectorRegistry()
@@ -468,7 +468,7 @@ class Metrics:
 
 
 def standing(db: Database, hub: Hub, files: FileStore, large_reads: Turnstile) -> dict[str, Any]:
-    """How this server is at the moment, for an administrator; the queues are those of one process."""
+    """Return how this server is at the moment, for an administrator; the queues are those of one process."""
     with db.read() as tx:
         row = sessions.c
         counts = {

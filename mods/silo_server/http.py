@@ -65,7 +65,7 @@ class RequestInfo:
 
 
 def info_of(scope: Scope) -> RequestInfo:
-    """The request's info; one of its own where the application runs without :class:`Observed`."""
+    """Return the request's info; one of its own where the application runs without :class:`Observed`."""
     info = scope.get(KEY)
     return info if isinstance(info, RequestInfo) else RequestInfo("-")
 
@@ -178,7 +178,7 @@ def error_answer(
     revision: Mapping[str, Any] | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """An error in the one shape; ``problems``, ``path`` and ``revision`` only where there are any."""
+    """Return an error in the one shape; ``problems``, ``path`` and ``revision`` only where there are any."""
     body: dict[str, Any] = {"error": code, "message": message}
     if problems:
         body["problems"] = list(problems)

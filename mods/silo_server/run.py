@@ -134,7 +134,7 @@ def routers() -> tuple[APIRouter, ...]:
 
 
 def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
-    """The server as an ASGI application; ``bootstrap.prepare`` has brought the database up to date."""
+    """Return the server as an ASGI application; ``bootstrap.prepare`` has brought the database up to date."""
     from silo_server.routes.context import Server
 
     db = Database(settings, clock)
@@ -183,13 +183,15 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
 
 
 def app_from_environment() -> Observed:
-    """For other ASGI servers: ``uvicorn --factory silo_server.run:app_from_environment``."""
+    """Make the application for other ASGI servers: ``uvicorn --factory
+    silo_server.run:app_from_environment``.
+    """
     settings = settings_from_environment()
     return observed(create_app(settings), settings)
 
 
 def observed(app: FastAPI, settings: Settings) -> Observed:
-    """The application as it is served: with request ids, log, metrics, below its sub-path."""
+    """Return the application as it is served: with request ids, log, metrics, below its sub-path."""
     return Observed(app, settings, app.state.metrics)
 
 
@@ -232,7 +234,7 @@ class Greeting:
     warnings: Sequence[str] = ()
 
     def lines(self) -> list[str]:
-        """For people, and for scripts that look for the first address and the token."""
+        """Return the lines for people, and for scripts that look for the first address and the token."""
         lines = [
             f"Silo server: {self.url}",
             *([f"Token:       {self.token}"] if self.token else []),
@@ -414,7 +416,7 @@ def running_server(
     files_dir: Path | None = None,
     settings: Settings | None = None,
 ) -> Iterator[RunningServer]:
-    """A server on a background thread, for the demo and for tests; ends with the ``with`` block.
+    """Run a server on a background thread, for the demo and for tests; ends with the ``with`` block.
 
     settings
         everything else; ``database_url`` and ``files_dir`` win over it.
@@ -477,7 +479,7 @@ def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
 
 
 def _run_workers(settings: Settings, workers: int, sock: socket.socket) -> None:
-    """Worker processes on one socket; one that dies is replaced, a signal ends all."""
+    """Run worker processes on one socket; one that dies is replaced, a signal ends all."""
     context = multiprocessing.get_context("spawn")
     ending = threading.Event()
     for name in (signal.SIGINT, signal.SIGTERM):
@@ -549,7 +551,7 @@ def _base_url(host: str, port: int) -> str:
 
 
 def is_loopback(host: str) -> bool:
-    """True where only this machine can reach ``host``."""
+    """Return True if only this machine can reach ``host``."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

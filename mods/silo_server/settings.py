@@ -30,17 +30,20 @@ Clock = Callable[[], datetime]
 
 
 def utc_now() -> datetime:
-    """Now, in UTC."""
+    """Return the present time, in UTC."""
     return datetime.now(UTC)
 
 
 def stamp(when: datetime) -> str:
-    """As stored: microseconds always, so that text order is time order (``2026-02-08T22:15:00.000000Z``)."""
+    """Return a time as stored: microseconds always, so that text order is time order
+    (``2026-02-08T22:15:00.000000Z``).
+    """
     return when.astimezone(UTC).replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"
 
 
 def wire(stored: str | None) -> str | None:
-    """As sent to clients, to the microsecond, so that a time that came from here means the same moment again.
+    """Return a time as sent to clients, to the microsecond, so that it means the same moment when it comes
+    back.
 
     Without the fraction where there is none, as in the spec (``2026-02-08T22:15:00Z``).
     """
@@ -48,7 +51,7 @@ def wire(stored: str | None) -> str | None:
 
 
 def spec_time(stored: str) -> str:
-    """As the spec's events have it: whole seconds (``2026-02-08T22:15:00Z``)."""
+    """Return a time as the spec's events have it: whole seconds (``2026-02-08T22:15:00Z``)."""
     return stored[:19] + "Z"
 
 
@@ -104,7 +107,7 @@ class ArchivedPartsError(ConflictError):
 
 
 def cause_of(error: BaseException) -> str:
-    """What the database's driver or the operating system said, in one line; no SQL and no values."""
+    """Return what the database's driver or the operating system said, in one line; no SQL and no values."""
     return str(getattr(error, "orig", None) or error).strip().partition("\n")[0] or type(error).__name__
 
 
@@ -112,7 +115,7 @@ MIB = 1024 * 1024
 
 
 def default_database_url() -> str:
-    """SQLite in the user's data folder."""
+    """Return the address of the SQLite database in the user's data folder."""
     return f"sqlite:///{data_folder() / 'silo.db'}"
 
 
@@ -204,7 +207,7 @@ class Settings:
 
     @property
     def sqlalchemy_url(self) -> str:
-        """The URL with the driver that we ship. Raises ConfigError for a database of another kind."""
+        """Return the URL with the driver that we ship. Raises ConfigError for a database of another kind."""
         for short in ("postgresql://", "postgres://"):
             if self.database_url.startswith(short):
                 return "postgresql+psycopg://" + self.database_url[len(short) :]
@@ -222,7 +225,7 @@ class Settings:
 
     @property
     def sqlite_path(self) -> Path | None:
-        """The database file, None for another database; in-memory databases are refused."""
+        """Return the database file, None for another database; in-memory databases are refused."""
         if not self.is_sqlite:
             return None
         name = self.database_url.partition(":///")[2].partition("?")[0]
@@ -235,7 +238,7 @@ class Settings:
 
     @property
     def storage(self) -> Path:
-        """Where uploaded files are kept."""
+        """Return where uploaded files are kept."""
         if self.files_dir is not None:
             return self.files_dir
         path = self.sqlite_path
@@ -253,7 +256,7 @@ _ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir":
 
 
 def settings_from_environment(environ: Mapping[str, str] | None = None, **given: Any) -> Settings:
-    """Settings from ``SILO_…`` variables (docs/server.md lists them); what is given wins over them."""
+    """Return settings from ``SILO_…`` variables (docs/server.md lists them); what is given wins over them."""
     environ = os.environ if environ is None else environ
     values: dict[str, Any] = {"database_url": default_database_url()}
     kinds = {f.name: str(f.type) for f in fields(Settings)}

@@ -38,7 +38,7 @@ def dumps(value: Any) -> str:
 
 
 def json_problem(value: Any) -> str | None:
-    """What is wrong with a JSON value that a user gave, None where nothing is."""
+    """Return what is wrong with a JSON value that a user gave, None if nothing is."""
     stack = [(value, 1)]
     while stack:
         part, depth = stack.pop()
@@ -69,7 +69,7 @@ def check_json(name: str, value: Any) -> None:
 
 
 def merge_patch(target: Any, patch: Any) -> Any:
-    """``target`` after a JSON merge patch (RFC 7386): null removes a member, objects merge.
+    """Return ``target`` after a JSON merge patch (RFC 7386): null removes a member, objects merge.
 
     The patch has passed the guard, which bounds how deep this goes.
     """
@@ -105,7 +105,7 @@ class Role(StrEnum):
     ADMIN = "admin"  # users, mode, audit
 
     def covers(self, needed: Role) -> bool:
-        """True where this role may do what ``needed`` may."""
+        """Return True if this role may do what ``needed`` may."""
         order = list(Role)
         return order.index(self) >= order.index(needed)
 
@@ -119,11 +119,11 @@ class Scope(StrEnum):
 
     @property
     def role(self) -> Role:
-        """The role beyond which this scope does not go."""
+        """Return the role beyond which this scope does not go."""
         return {Scope.READ: Role.VIEWER, Scope.WRITE: Role.EDITOR, Scope.ADMIN: Role.ADMIN}[self]
 
     def covers(self, wanted: Scope) -> bool:
-        """True where this scope includes ``wanted``."""
+        """Return True if this scope includes ``wanted``."""
         return self.role.covers(wanted.role)
 
 
@@ -157,7 +157,7 @@ class Actor:
 
     @property
     def own_id(self) -> int:
-        """The user's id; every caller that a guard let in is a user."""
+        """Return the user's id; every caller that a guard let in is a user."""
         assert self.user_id is not None
         return self.user_id
 
@@ -204,12 +204,12 @@ class Item:
 
     @property
     def subject(self) -> str:
-        """What people read in messages."""
+        """Return what people read in messages."""
         return self.part_number
 
     @property
     def is_bought(self) -> bool:
-        """True for an item that is purchased: it says so, or says nothing and a supplier is known."""
+        """Return True for an item that is purchased: it says so, or says nothing and a supplier is known."""
         return bought(self.texts.get("sourcing_type"), self.supplier_parts or self.properties.get("supplier"))
 
 
@@ -232,7 +232,7 @@ class Document:
 
     @property
     def subject(self) -> str:
-        """What people read where an item has its part number."""
+        """Return what people read where an item has its part number."""
         return f"document {self.uuid}"
 
 
@@ -306,18 +306,18 @@ class Line(NamedTuple):
 
 
 def names_of(kind: Any) -> Iterable[str]:
-    """The names of the fields of a frozen value's class."""
+    """Return the names of the fields of a frozen value's class."""
     names: Iterable[str] = kind.__dataclass_fields__  # dataclasses.fields() makes a new tuple for each row
     return names
 
 
 def from_row(kind: type[T], row: Any, /, **given: Any) -> T:
-    """A frozen value from a row whose columns have the names of its fields; ``given`` wins over them."""
+    """Return a frozen value from a row whose columns have the names of its fields; ``given`` wins over them."""
     return kind(**given, **{name: getattr(row, name) for name in names_of(kind) if name not in given})
 
 
 def to_wire(value: Any, *left_out: str) -> dict[str, Any]:
-    """The fields of a frozen value, under their own names, as the API sends them."""
+    """Return the fields of a frozen value, under their own names, as the API sends them."""
     kind = type(value)
     if kind not in _TIMES:
         # Found once for each class: a BOM has thousands of lines.

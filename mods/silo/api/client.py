@@ -120,7 +120,7 @@ class ItemCalls(FileCalls):
     _is_silo: bool | None = None
 
     def get_item_by_uuid(self, uuid: str, /) -> Item | None:
-        """The item with this identity; None where the server has none (unknown, archived, or no UUID)."""
+        """Return the item with this identity; None if the server has none (unknown, archived, or no UUID)."""
         if not uuid.strip(". ") or any(c in "/\\?#%" or c < " " for c in uuid):
             return None
         try:
@@ -141,7 +141,7 @@ class ItemCalls(FileCalls):
     def get_items_by_uuid(
         self, uuids: Iterable[str], /, *, cancelled: Cancel | None = None
     ) -> dict[str, Item]:
-        """The items of these identities, by the identity as it was given; unknown ones are left out.
+        """Return the items of these identities, by the identity as it was given; unknown ones are left out.
 
         One request per 1000 where the server offers the batch look-up, else a bounded pool of single ones.
         """
@@ -171,11 +171,11 @@ class ItemCalls(FileCalls):
         return self._is_silo
 
     def get_item(self, part_number: str, /) -> Item:
-        """The item with this part number; raises :class:`NotFoundError` where there is none."""
+        """Return the item with this part number; raises :class:`NotFoundError` if there is none."""
         return self._get(f"item {part_number}", "items", part_number).model(Item)
 
     def thumbnail(self, part_number: str, /) -> bytes | None:
-        """The picture of an item as PNG; None where there is none, or the server keeps none."""
+        """Return the picture of an item as PNG; None if there is none, or the server keeps none."""
         try:
             return self._get(f"the picture of {part_number}", "items", part_number, "thumbnail").content
         except (NotFoundError, RejectedError, ServerFaultError):
@@ -184,7 +184,7 @@ class ItemCalls(FileCalls):
     def search_items(
         self, query: str = "", *, item_type: str | None = None, limit: int = 50, offset: int = 0
     ) -> list[Item]:
-        """Items that fit the words; without words all, page by page."""
+        """Return items that fit the words; without words all, page by page."""
         params: dict[str, str | int] = {"limit": limit, "offset": offset}
         if item_type:
             params["item_type"] = item_type
@@ -246,7 +246,7 @@ class ItemCalls(FileCalls):
         return item
 
     def _made(self, reply: Reply) -> Item:
-        """The item of an answer to its creation, bare or wrapped; else asked for by its number."""
+        """Return the item of an answer to its creation, bare or wrapped; else asked for by its number."""
         said = reply.data()
         for wrapped in ("item", "data", "result"):
             if isinstance(said, dict) and "id" not in said and isinstance(said.get(wrapped), dict):
@@ -257,7 +257,8 @@ class ItemCalls(FileCalls):
             return Item.model_validate(said)
 
     def get_properties(self, part_number: str, /) -> dict[str, Any]:
-        """All properties of an item, from its newest revision where the item's own answer carries none.
+        """Return all properties of an item, from its newest revision where the item's own answer carries
+        none.
 
         Raises :class:`silo.bom.errors.ServerFaultError` where they cannot be read: no answer is not "none".
         """
@@ -301,17 +302,17 @@ class ItemCalls(FileCalls):
         self._delete(f"item {part_number}", "items", part_number)
 
     def generate_part_number(self, schema: str, category: str) -> str:
-        """The number that the next item of this category would get: a preview, nothing is reserved."""
+        """Return the number that the next item of this category would get: a preview, nothing is reserved."""
         wanted = {"schema": schema, "category": category}
         reply = self._change("POST", f"a number in {category}", "generate-part-number", body=wanted)
         return reply.model(NumberAnswer).part_number
 
     def get_schema(self, name: str = "kindred-rd") -> dict[str, Any]:
-        """The part-number schema as the server describes it."""
+        """Return the part-number schema as the server describes it."""
         return self._get(f"schema {name}", "schemas", name).mapping()
 
     def find_schema(self, wanted: str = "kindred-rd") -> str:
-        """The name of the part-number schema to use: the wanted one, else the server's only one.
+        """Return the name of the part-number schema to use: the wanted one, else the server's only one.
 
         Raises :class:`InputError` that lists the schemas where there are several others, or none.
         """
@@ -344,7 +345,9 @@ class ItemCalls(FileCalls):
         ) from missing
 
     def categories(self, name: str = "kindred-rd") -> Categories:
-        """The categories of a schema: code → description, in the schema's order, with the site's rules."""
+        """Return the categories of a schema: code → description, in the schema's order, with the site's
+        rules.
+        """
         schema = self.get_schema(name)
         problem = schema.get("category_rules_problem")
         return Categories(categories_of(schema), rules_of(schema), str(problem or ""))
@@ -352,7 +355,7 @@ class ItemCalls(FileCalls):
     def find_look_alikes(
         self, wanted: Iterable[tuple[str, str]], /, *, cancelled: Cancel | None = None
     ) -> dict[tuple[str, str], list[LookAlike]]:
-        """The items that have a component's name or its file, by (name, SHA-256 of the file or "").
+        """Return the items that have a component's name or its file, by (name, SHA-256 of the file or "").
 
         One request per 1000 where the server offers that, else searches for each.
         """
@@ -465,15 +468,17 @@ class SiloClient(ItemCalls, BomCalls):
 
     @property
     def base_url(self) -> str:
-        """The address of the server's pages, without a slash at the end."""
+        """Return the address of the server's pages, without a slash at the end."""
         return self._address.web_root
 
     def web_url(self, path: str, /) -> str:
-        """The full address of a page such as ``resolve_url``; :class:`InputError` for another server's."""
+        """Return the full address of a page such as ``resolve_url``; :class:`InputError` for another
+        server's.
+        """
         return self._address.web(path)
 
     def whoami(self) -> User:
-        """Who the token belongs to; raises :class:`silo.bom.errors.AuthError` where it is not accepted."""
+        """Return who the token belongs to; raises :class:`silo.bom.errors.AuthError` if it is not accepted."""
         return self._get("who we are", "auth", "me").model(User)
 
     def begin_login(self, program: str) -> BrowserLogin | None:
@@ -492,7 +497,7 @@ class SiloClient(ItemCalls, BomCalls):
 
     @property
     def keeps_item_ids(self) -> bool:
-        """True where the server says that a new item gets the UUID that we propose, or was seen to do it."""
+        """Return True if the server says that a new item gets the UUID that we propose, or was seen to do it."""
         if not self.abilities.keeps_item_ids and not self._asked_for_item_ids:
             self._asked_for_item_ids = True
             with suppress(SiloError):
@@ -500,7 +505,7 @@ class SiloClient(ItemCalls, BomCalls):
         return self.abilities.keeps_item_ids
 
     def ready(self) -> ServerState:
-        """Whether the server takes changes: ``normal``, ``read-only`` or ``degraded``."""
+        """Return whether the server takes changes: ``normal``, ``read-only`` or ``degraded``."""
         call = Call("GET", f"{self._address.web_root}/ready", "/ready", repeatable=False)
         with self._transport.opened(call) as response:
             reply = self._transport.reply(response, call)
@@ -508,7 +513,7 @@ class SiloClient(ItemCalls, BomCalls):
         return ServerState.model_validate(reply.mapping(accept=(503,)))
 
     def modules(self) -> list[str]:
-        """The names of the server's modules that are on."""
+        """Return the names of the server's modules that are on."""
         said = self._get("its modules", "modules").mapping()
         data = said.get("modules", said)
         if isinstance(data, dict):
@@ -525,7 +530,7 @@ class SiloClient(ItemCalls, BomCalls):
     def events(
         self, last_event_id: str | None = None, *, cancelled: Cancel | None = None
     ) -> Iterator[ServerEvent]:
-        """The events from one connection, heartbeats included, until the server ends it.
+        """Yield the events from one connection, heartbeats included, until the server ends it.
 
         ``last_event_id`` replays what came after. ``cancelled`` is looked at with each event.
         Raises :class:`silo.bom.errors.UnreachableError` when the stream falls silent or breaks.

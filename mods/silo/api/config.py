@@ -41,7 +41,7 @@ Origin = tuple[str, str, int]
 
 
 def origin_of(url: str) -> Origin:
-    """(scheme, host, port) of an absolute URL, lower case, the port always given.
+    """Return (scheme, host, port) of an absolute URL, lower case, the port always given.
 
     Raises :class:`ConfigError` where it is no http(s) URL.
     """
@@ -50,7 +50,7 @@ def origin_of(url: str) -> Origin:
 
 
 def may_carry_token(sender: Origin, receiver: Origin) -> bool:
-    """True where a redirect from one to the other may take the token along.
+    """Return True if a redirect from one to the other may take the token along.
 
     Only the same server, or its own http → https upgrade on the standard ports.
     """
@@ -59,7 +59,8 @@ def may_carry_token(sender: Origin, receiver: Origin) -> bool:
 
 
 def canonical(url: str) -> str:
-    """One spelling for all addresses of one server: what waits for it is found again under any of them.
+    """Return one spelling for all addresses of one server: what waits for it is found again under any of
+    them.
 
     Text that is no address is given back as it is.
     """
@@ -103,22 +104,22 @@ class ServerAddress:
 
     @property
     def origin(self) -> Origin:
-        """(scheme, host, port)."""
+        """Return (scheme, host, port)."""
         return origin_of(self.web_root)
 
     @property
     def host(self) -> str:
-        """``host`` or ``host:port``, for messages."""
+        """Return ``host`` or ``host:port``, for messages."""
         return urlsplit(self.web_root).netloc
 
     @property
     def is_loopback(self) -> bool:
-        """True for this computer itself."""
+        """Return True for this computer itself."""
         name = self.origin[1]
         return name in _LOOPBACK or name.startswith("127.")
 
     def api(self, *segments: str) -> str:
-        """The URL of an API path; each segment is quoted whole, also a part number with a slash."""
+        """Return the URL of an API path; each segment is quoted whole, also a part number with a slash."""
         for text in segments:
             # Every HTTP library resolves "." and "..": such a part number would ask for something else.
             if not text.strip(".") or not text.strip():
@@ -128,7 +129,9 @@ class ServerAddress:
         return "/".join((self.api_root, *(quote(text, safe="") for text in segments)))
 
     def web(self, path: str) -> str:
-        """The full URL of a page such as ``resolve_url``; raises :class:`InputError` for another server's."""
+        """Return the full URL of a page such as ``resolve_url``; raises :class:`InputError` for another
+        server's.
+        """
         url = urljoin(self.web_root + "/", path) if path.startswith(("http:", "https:", "//")) else None
         if url is None:
             return f"{self.web_root}/{path.lstrip('/')}"
@@ -138,7 +141,7 @@ class ServerAddress:
 
 
 def _http(url: str) -> SplitResult:
-    """The parts of any http(s) URL."""
+    """Return the parts of any http(s) URL."""
     try:
         parts = urlsplit(url)
         port_is_valid = parts.port is None or parts.port > 0
@@ -179,7 +182,7 @@ class ServerSettings:
 
 
 def config_path(env: Mapping[str, str] = os.environ) -> Path:
-    """The configuration file, whether it exists or not."""
+    """Return the configuration file, whether it exists or not."""
     return config_folder(env) / "config.toml"
 
 
@@ -218,7 +221,7 @@ def resolve_server(
 
 
 def load_config(path: Path) -> dict[str, Any]:
-    """The whole file as TOML tables; empty where there is none."""
+    """Return the whole file as TOML tables; empty where there is none."""
     try:
         with path.open("rb") as file:
             if MODES_COUNT and os.fstat(file.fileno()).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
@@ -262,7 +265,7 @@ def save_config(
 
 
 def checked_config(path: Path) -> dict[str, Any]:
-    """The file's tables; ConfigError, with the lines, where a key or a table means nothing to us."""
+    """Return the file's tables; ConfigError, with the lines, where a key or a table means nothing to us."""
     config = load_config(path)
     problems = []
     for name, value in config.items():
@@ -288,7 +291,7 @@ def _hint(name: str, names: Sequence[str]) -> str:
 
 
 def _line(path: Path, name: str) -> int:
-    """Where a key or a table is first named; TOML's reader does not say."""
+    """Return where a key or a table is first named; TOML's reader does not say."""
     begins = re.compile(rf"""\s*\[*\s*["']?{re.escape(name)}["']?\s*[.=\]]""")
     lines = path.read_text(encoding="utf-8").splitlines()
     return next((number for number, line in enumerate(lines, start=1) if begins.match(line)), 1)
@@ -304,7 +307,7 @@ def _text(table: Mapping[str, Any], key: str, path: Path) -> str | None:
 def first_of(
     *candidates: tuple[Source, str | Callable[[], str | None] | None],
 ) -> tuple[str | None, Source | None]:
-    """The first setting that says anything, and who said so; a callable is asked when its turn comes."""
+    """Return the first setting that says anything, and who said so; a callable is asked when its turn comes."""
     for source, value in candidates:
         said = value() if callable(value) else value
         if said is not None and said.strip():
@@ -313,7 +316,7 @@ def first_of(
 
 
 def same_server(url: str, other: str | None) -> bool:
-    """True where two addresses, as people write them, mean one server: a token for one is for the other."""
+    """Return True if two addresses, as people write them, mean one server: a token for one is for the other."""
     if not url or not other:
         return False
     try:
@@ -332,7 +335,7 @@ def _verify(option: bool | str | None, variable: str | None, stored: Any, path: 
 
 
 def verify_of(source: str, text: str) -> bool | str:
-    """How certificates are checked: yes, no, or the path of a file. ConfigError, naming ``source``."""
+    """Return how certificates are checked: yes, no, or the path of a file. ConfigError, naming ``source``."""
     if (said := yes_or_no(text)) is not None:
         return said
     if not Path(text).expanduser().exists():
@@ -367,7 +370,7 @@ class Pause:
     told: bool = False
 
     def left(self, now: float) -> float:
-        """Seconds that are left, 0 where it is over."""
+        """Return seconds that are left, 0 if it is over."""
         # One that is longer than any that we make was noted before the clock was set back.
         left = self.until - now
         return left if 0 < left <= LONGEST_TOLD or math.isinf(left) else 0.0

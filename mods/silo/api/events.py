@@ -92,7 +92,7 @@ class ServerEvent:
 
     @property
     def item(self) -> str | None:
-        """The part number that the event is about, in either dialect."""
+        """Return the part number that the event is about, in either dialect."""
         if self.merge is not None:
             return self.merge.item
         number = self.data.get("part_number", self.data.get("item")) if isinstance(self.data, dict) else None
@@ -100,7 +100,7 @@ class ServerEvent:
 
     @property
     def mode(self) -> str | None:
-        """The mode in a ``server.state`` event."""
+        """Return the mode in a ``server.state`` event."""
         mode = self.data.get("mode") if self.type == STATE and isinstance(self.data, dict) else None
         return mode if isinstance(mode, str) else None
 
@@ -120,7 +120,7 @@ class SseParser:
         self.last_event_id: str | None = None
 
     def feed(self, chunk: bytes) -> list[ServerEvent]:
-        """The events that this piece completes."""
+        """Return the events that this piece completes."""
         searched = max(0, len(self._buffer) - 1)
         self._buffer += self._normal(self._without_mark(chunk))
         events: list[ServerEvent] = []
@@ -159,7 +159,7 @@ class SseParser:
 
 
 def read_block(block: bytes) -> ServerEvent | None:
-    """The event of one block of lines; None for a comment or a block without data."""
+    """Return the event of one block of lines; None for a comment or a block without data."""
     name, lines = "", list[str]()
     for line in block.decode("utf-8", "replace").split("\n"):
         field_, _, value = line.partition(":")
@@ -237,7 +237,7 @@ class HttpEventStream:
 
     @property
     def last_event_id(self) -> str | None:
-        """The id to resume from: of the last event, or of a bare mark that the server set."""
+        """Return the id to resume from: of the last event, or of a bare mark that the server set."""
         return self._parser.last_event_id
 
     def __iter__(self) -> Iterator[ServerEvent]:
@@ -348,7 +348,7 @@ class EventSource(Protocol):
 
 
 def _kind(pause: Pause) -> Connection:
-    """How the connection is in a pause."""
+    """Return the state of the connection in a pause."""
     return {AuthError.code: Connection.REFUSED, ConfigError.code: Connection.REFUSED}.get(
         pause.code, Connection.OFFLINE
     )
@@ -414,7 +414,7 @@ class EventListener:
 
     @property
     def last_event_id(self) -> str | None:
-        """Where the next connection resumes."""
+        """Return where the next connection resumes."""
         return self._last_id
 
     def start(self) -> None:
@@ -520,7 +520,7 @@ class EventListener:
             self._adopt(stop, stream.last_event_id)
 
     def _go_well(self) -> None:
-        """The server answers: end the pause, unless it named the time or takes no changes."""
+        """End the pause when the server answers, unless it named the time or takes no changes."""
         pause = self._pauses.get()
         if pause is not None and not pause.told and self.state.kind is not Connection.READ_ONLY:
             self._pauses.set(None)

@@ -65,14 +65,14 @@ class Standing:
 
     @property
     def newer(self) -> Revision | None:
-        """The revision that committing the file would undo; None where it would undo nothing."""
+        """Return the revision that committing the file would undo; None if it would undo nothing."""
         if self.newest is None or self.newest.revision_number <= self.base_number:
             return None
         return self.newest
 
     @property
     def base_number(self) -> int:
-        """The base's number; -1 where it is not known, so that any revision is newer."""
+        """Return the base's number; -1 where it is not known, so that any revision is newer."""
         return self.base.revision_number if self.base is not None else -1
 
     def check(self, part_number: str) -> None:
@@ -92,14 +92,14 @@ class Standing:
 
 
 def has_file(revision: Revision) -> bool:
-    """True for a revision with a file; the others only change properties."""
+    """Return True for a revision with a file; the others only change properties."""
     return bool(revision.file_checksum or revision.file_name or revision.file_key or revision.file_size)
 
 
 def standing(
     revisions: Iterable[Revision], origin: str, checksum: int | None = None, seen: str = ""
 ) -> Standing:
-    """How a file that was made from ``origin`` (a SHA-256) stands.
+    """Return how a file that was made from ``origin`` (a SHA-256) stands.
 
     known
         the number of that revision, for a server that keeps no checksums. Else the checksum decides: a server
@@ -119,18 +119,20 @@ def standing(
 
 
 def newest_number(revisions: Iterable[Revision]) -> int:
-    """The number of the newest revision; 0 where there is none."""
+    """Return the number of the newest revision; 0 if there is none."""
     return max((revision.revision_number for revision in revisions), default=0)
 
 
 def is_newest(sha256: str, revisions: Iterable[Revision]) -> bool:
-    """True where the newest revision is this very file. An older one does not count: a person may go back."""
+    """Return True if the newest revision is this very file. An older one does not count: a person may go
+    back.
+    """
     newest = max(revisions, key=lambda revision: revision.revision_number, default=None)
     return newest is not None and checksum_of(newest) == sha256
 
 
 def other_name(path: str, revisions: Iterable[Revision]) -> str:
-    """The name of the item's newest file, where this one is called otherwise; "" where it is not.
+    """Return the name of the item's newest file, where this one is called otherwise; "" if it is not.
 
     "Save As" copies the identity along.
     """
@@ -148,8 +150,9 @@ REPACKED = (".kc",)
 
 
 def is_there(revisions: Iterable[Revision], file_name: str, sha256: str, number: int | None) -> bool:
-    """True where a file that became revision ``number`` is among these. The checksum decides where it is that
-    of the file as it was sent; a revision without a file decides nothing."""
+    """Return True if a file that became revision ``number`` is among these. The checksum decides where it is
+    that of the file as it was sent; a revision without a file decides nothing.
+    """
     by_number = Path(file_name).suffix.lower() in REPACKED
     revisions_here = list(revisions)
     files = [r for r in revisions_here if has_file(r)] or revisions_here  # some servers say nothing of files
@@ -214,7 +217,7 @@ def find_arrived(
     *,
     cancelled: Cancel | None = None,
 ) -> Revision | None:
-    """The revision that holds the file already; None where there is none, so that it may be sent.
+    """Return the revision that holds the file already; None if there is none, so that it may be sent.
 
     By the server's checksum; where it keeps none, by size, then by reading the revision's file. Raises
     :class:`MayHaveArrivedError` where even that says nothing: a person looks before it is sent a second time.
@@ -238,14 +241,14 @@ def find_arrived(
 
 
 def checksum_of(revision: Revision) -> str:
-    """The SHA-256 of a revision's file in lower-case hex; "" where the server names none."""
+    """Return the SHA-256 of a revision's file in lower-case hex; "" if the server names none."""
     return bare_checksum(revision.file_checksum)
 
 
 def _same_content(
     client: SiloClient, part_number: str, revision: Revision, sent: SentFile, cancelled: Cancel | None
 ) -> bool | None:
-    """None: nothing shows it."""
+    """Return None if nothing shows it."""
     repacked = Path(sent.file_name).suffix.lower() in REPACKED
     if revision.file_size is not None and revision.file_size != sent.size and not repacked:
         return False
@@ -333,7 +336,7 @@ class FileCalls(Caller):
         return gzip.decompress(body) if body.startswith(b"\x1f\x8b") else body
 
     def get_documents(self, uuids: Iterable[str], /) -> dict[str, Document]:
-        """The documents with these UUIDs, in lower case, as they are now; unknown ones are left out.
+        """Return the documents with these UUIDs, in lower case, as they are now; unknown ones are left out.
 
         Raises RouteMissingError where the server knows no documents.
         """
@@ -345,16 +348,16 @@ class FileCalls(Caller):
         return documents
 
     def get_document(self, uuid: str, /) -> Document:
-        """One document, with what it links to and what links to it."""
+        """Return one document, with what it links to and what links to it."""
         return self._get(f"the document {uuid}", "documents", uuid).model(Document)
 
     def documents_of(self, part_number: str, /) -> list[Document]:
-        """The documents that hold an item, its own first."""
+        """Return the documents that hold an item, its own first."""
         where = (f"the files of {part_number}", "items", part_number, "documents")
         return [document for page, _ in self._all(Document, *where, keys=("documents",)) for document in page]
 
     def get_release(self, part_number: str, label: str, /) -> Release:
-        """A released revision of a product, or one in review, with all files as they were frozen.
+        """Return a released revision of a product, or one in review, with all files as they were frozen.
 
         Raises NotFoundError, RouteMissingError where the server knows no releases.
         """
@@ -362,7 +365,7 @@ class FileCalls(Caller):
         return self._get(subject, "items", part_number, "releases", label).model(Release)
 
     def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
-        """The revisions of an item, newest first; those above the number ``after``.
+        """Return the revisions of an item, newest first; those above the number ``after``.
 
         ``newest``: only so many. A server that knows neither sends all, in whatever order and pages.
         """
@@ -387,7 +390,7 @@ class FileCalls(Caller):
         return [by_number[number] for number in sorted(by_number, reverse=True)][:newest]
 
     def get_revision(self, part_number: str, number: int, /) -> Revision:
-        """One revision, with the files that its file links to."""
+        """Return one revision, with the files that its file links to."""
         subject = f"revision {number} of {part_number}"
         return self._get(subject, *_path_of(part_number), "revisions", str(number)).model(Revision)
 
@@ -487,7 +490,8 @@ class FileCalls(Caller):
 def _upload_fields(
     comment: str, properties: Mapping[str, object] | None, sha256: str | None, origin: Origin | None
 ) -> dict[str, str]:
-    """The text parts of an upload: comment, properties, what must arrive, and where the file came from.
+    """Return the text parts of an upload: comment, properties, what must arrive, and where the file came
+    from.
 
     A server that does not know the last two ignores them.
     """
@@ -517,7 +521,7 @@ def _in_two_steps(
     said: Mapping[str, Any],
     on_progress: Progress | None,
 ) -> tuple[Revision, str]:
-    """First the bytes to the server's store, then the revision (silo-contract §1.4, "presign").
+    """Send the bytes to the server's store first, then the revision (silo-contract §1.4, "presign").
 
     For a server that takes no forms. The store may be another host: it gets no token.
     """
@@ -615,18 +619,18 @@ class FileForm:
 
     @property
     def sha256(self) -> str:
-        """Of the bytes read so far; of the file, once the form was read to its end."""
+        """Return the hash of the bytes read so far; of the file, once the form was read to its end."""
         return self._hash.hexdigest()
 
     def rewound(self) -> Self:
-        """The form from its beginning: a redirect wants it once more."""
+        """Return the form from its beginning: a redirect wants it once more."""
         self._head, self._tail, self._left = self._begin, self._end, self.file_size
         self._hash = hashlib.sha256()
         self._file.seek(0)
         return self
 
     def read(self, size: int = -1) -> bytes:
-        """The next bytes of the form."""
+        """Return the next bytes of the form."""
         stop_if(self._cancelled)
         if self._head:
             size = len(self._head) if size < 0 else size

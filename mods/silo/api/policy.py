@@ -107,7 +107,7 @@ class Where:
 
     @property
     def asked(self) -> str:
-        """``host`` or ``host (the BOM of ASM-001)``."""
+        """Return ``host`` or ``host (the BOM of ASM-001)``."""
         return f"{self.host} ({self.subject})" if self.subject else self.host
 
 
@@ -209,7 +209,7 @@ _WRAPPERS = (rq.ConnectionError, rq.ChunkedEncodingError, u3.MaxRetryError, u3.P
 
 
 def translate(error: Exception, where: Where) -> SiloError:
-    """Our error for a foreign one, in plain words; never quotes a header."""
+    """Return our error for a foreign one, in plain words; never quotes a header."""
     exception = _innermost(error)
     kind, text = next((TABLE[cause] for cause in type(exception).__mro__ if cause in TABLE), _GARBLED)
     return kind(text.format(host=where.host, asked=where.asked, connect=where.connect, read=where.read))
@@ -217,7 +217,7 @@ def translate(error: Exception, where: Where) -> SiloError:
 
 @contextmanager
 def translated(where: Where) -> Iterator[None]:
-    """Within, foreign errors leave as ours; ours pass."""
+    """Turn foreign errors of the block into ours."""
     try:
         yield
     except SiloError:
@@ -272,27 +272,27 @@ class Reply:
 
     @property
     def is_html(self) -> bool:
-        """True for a web page, which no route of the API answers."""
+        """Return True for a web page, which no route of the API answers."""
         kind = self.headers.get("Content-Type", "").lower()
         return "html" in kind or self.content[:200].lstrip()[:1] == b"<"
 
     @property
     def total(self) -> int:
-        """How many things there are on all pages; 0 where the server does not say."""
+        """Return how many things there are on all pages; 0 if the server does not say."""
         said = self.data() if "X-Total-Count" not in self.headers else None
         header = said.get("total") if isinstance(said, dict) else self.headers.get("X-Total-Count", "")
         return whole_number(str(header)) or 0
 
     @property
     def next(self) -> dict[str, str]:
-        """The parameters of the page that the answer names as its next one; {} for none."""
+        """Return the parameters of the page that the answer names as its next one; {} for none."""
         said = self.data()
         links = re.search(r'<([^>]*)>;[^,]*rel="?next\b', self.headers.get("Link", ""))
         address = links[1] if links else said.get("next") if isinstance(said, dict) else None
         return dict(parse_qsl(urlsplit(address).query)) if isinstance(address, str) else {}
 
     def data(self) -> Any:
-        """The JSON of a good answer; raises :class:`ServerFaultError` where it is none."""
+        """Return the JSON of a good answer; raises :class:`ServerFaultError` if it is none."""
         if self.is_html:
             raise ServerFaultError(
                 f"{self.where.asked} answered with a web page instead of data{_titled(self)}; "
@@ -302,7 +302,9 @@ class Reply:
             return json.loads(self.content)
 
     def mapping(self, accept: Sequence[int] = ()) -> dict[str, Any]:
-        """The answer as a plain object; a bad status that is not in ``accept`` raises by :func:`error_of`."""
+        """Return the answer as a plain object; a bad status that is not in ``accept`` raises by
+        :func:`error_of`.
+        """
         if not self.ok and (self.status not in accept or self.is_html):
             raise error_of(self)
         data = self.data()
@@ -311,23 +313,25 @@ class Reply:
         return data
 
     def version(self) -> str | None:
-        """The version that the answer bears: its ETag, else ``version`` in its body."""
+        """Return the version that the answer bears: its ETag, else ``version`` in its body."""
         tag = self.headers.get("ETag", "").removeprefix("W/").strip('"')
         data = self.data() if not tag else None
         return tag or (str(data["version"]) if isinstance(data, dict) and "version" in data else None)
 
     def model(self, kind: type[Model]) -> Model:
-        """The answer as one of the wire models."""
+        """Return the answer as one of the wire models."""
         data = self.data()
         with translated(self.where):
             return kind.model_validate(data)
 
     def is_null(self, *keys: str) -> bool:
-        """True where null stands for the list, by itself or under one of ``keys``."""
+        """Return True if null stands for the list, by itself or under one of ``keys``."""
         return _under(self.data(), keys) is None
 
     def models(self, kind: type[Model], *keys: str) -> list[Model]:
-        """The answer as a list of models: a bare list, or an object that holds it under one of ``keys``."""
+        """Return the answer as a list of models: a bare list, or an object that holds it under one of
+        ``keys``.
+        """
         models_read = _under(self.data(), keys)
         if models_read is None:
             models_read = []  # Go's empty list
@@ -375,7 +379,9 @@ def complaint(reply: Reply) -> Complaint:
 
 
 def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
-    """The error that a bad status stands for; 503 on ``writing`` is a read-only server, else no server."""
+    """Return the error that a bad status stands for; 503 on ``writing`` is a read-only server, else no
+    server.
+    """
     said = complaint(reply)
     detail = f": {said.text}" if said.text else ""
     asked, host, status = reply.where.asked, reply.where.host, reply.status
@@ -435,7 +441,7 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
 
 
 def retry_after(reply: Reply) -> float | None:
-    """The pause that the answer asks for, in seconds; None where it names none that can be read."""
+    """Return the pause that the answer asks for, in seconds; None if it names none that can be read."""
     text = reply.headers.get("Retry-After", "").strip()
     if (seconds := whole_number(text, 300)) is not None:
         return float(seconds)
@@ -520,7 +526,7 @@ class Verdict:
 
 
 def judge(error: SiloError, alive: Callable[[], object] | None = None) -> Verdict:
-    """Whom ``error`` concerns, and what helps.
+    """Return whom ``error`` concerns, and what helps.
 
     alive
         a plain question to the server, such as ``client.ready``; raises SiloError where it gets no answer.
@@ -551,7 +557,7 @@ def judge(error: SiloError, alive: Callable[[], object] | None = None) -> Verdic
 
 
 def is_certain(error: SiloError) -> bool:
-    """True where the server certainly did not do what was asked, and only that: the rest may be sent."""
+    """Return True if the server certainly did not do what was asked, and only that: the rest may be sent."""
     if isinstance(error, ReadOnlyError):
         return not error.named
     if isinstance(error, UnreachableError):
@@ -561,7 +567,7 @@ def is_certain(error: SiloError) -> bool:
 
 
 def ends_run(error: SiloError, api: object = None) -> bool:
-    """True where a run over many items that sends one kind of request must not try the next one.
+    """Return True if a run over many items that sends one kind of request must not try the next one.
 
     api
         the server's client; its ``ready`` says whether only this item had trouble.
@@ -570,13 +576,13 @@ def ends_run(error: SiloError, api: object = None) -> bool:
 
 
 def told_wait(error: SiloError) -> float | None:
-    """The pause that the server named with this error, in seconds, within bounds."""
+    """Return the pause that the server named with this error, in seconds, within bounds."""
     value = getattr(error, "retry_after", None)
     return None if value is None else min(float(value), LONGEST_TOLD)
 
 
 def may_repeat(error: SiloError, *, harmless: bool) -> bool:
-    """True where the same request may be sent again by itself.
+    """Return True if the same request may be sent again by itself.
 
     harmless
         the request may arrive twice: a question, or a change that names itself.
@@ -596,7 +602,7 @@ class Backoff:
     longest: float = 60.0
 
     def pause(self, attempt: int, chance: float, wanted_s: float | None = None) -> float:
-        """The pause after failed attempt ``attempt`` (from 1).
+        """Return the pause after failed attempt ``attempt`` (from 1).
 
         ``chance`` in [0, 1) takes off up to half, so that many clients do not return in one moment. ``told``
         is the server's own wish: the pause is never shorter.
@@ -641,7 +647,9 @@ class Retries:
     tell: Callable[[float, SiloError], object] = lambda _seconds, _error: None
 
     def pause(self, attempt: int, error: SiloError, *, harmless: bool) -> float | None:
-        """Seconds to wait after failed attempt ``attempt`` (from 1); None: give up and report the error."""
+        """Return seconds to wait after failed attempt ``attempt`` (from 1); None: give up and report the
+        error.
+        """
         value = getattr(error, "retry_after", None)
         tries = self.busy_tries if self.busy_tries and isinstance(error, BusyError) else self.tries
         if attempt >= tries or not may_repeat(error, harmless=harmless):

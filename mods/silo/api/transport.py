@@ -143,14 +143,14 @@ class Transport:
         return self._token is not None
 
     def where(self, subject: str) -> Where:
-        """For messages about this server."""
+        """Return where an error came from, for messages about this server."""
         return Where(self.address.host, subject, self.timeouts.connect, self.timeouts.read)
 
     def close(self) -> None:
         self._session.close()
 
     def send(self, call: Call) -> Reply:
-        """The server's good answer; raises one of :mod:`silo.bom.errors` for everything else."""
+        """Return the server's good answer; raises one of :mod:`silo.bom.errors` for everything else."""
         attempt = 0
         while True:
             attempt += 1
@@ -173,12 +173,12 @@ class Transport:
 
     @contextmanager
     def opened(self, call: Call, read_timeout: float | None = None) -> Iterator[requests.Response]:
-        """The response with its body still unread, redirects followed; closed at the end."""
+        """Yield the response with its body still unread, redirects followed; closed at the end."""
         with closing(self.open(call, read_timeout)) as response:
             yield response
 
     def open(self, call: Call, read_timeout: float | None = None) -> requests.Response:
-        """As :meth:`opened`, for the caller to close."""
+        """Do as :meth:`opened`, for the caller to close."""
         url, params, home = call.url, dict(call.params), self.address.origin
         for _ in range(MAX_REDIRECTS + 1):
             carry = may_carry_token(home, origin_of(url))
@@ -217,12 +217,14 @@ class Transport:
             )
 
     def reply(self, response: requests.Response, call: Call) -> Reply:
-        """The response, read whole within the call's bounds."""
+        """Return the response, read whole within the call's bounds."""
         content = b"".join(self.pieces(response, call))
         return Reply(response.status_code, content, self.where(call.subject), response.headers, self._token)
 
     def pieces(self, response: requests.Response, call: Call) -> Iterator[bytes]:
-        """The body as it comes, each piece at once; ends by error when it is too much or takes too long."""
+        """Yield the body as it comes, each piece at once; ends by error when it is too much or takes too
+        long.
+        """
         where = self.where(call.subject)
         deadline = self._clock() + self.timeouts.total
         size, limit = 0, call.max_bytes or self._max_bytes
@@ -251,7 +253,7 @@ class Transport:
 
 
 def as_json(data: object) -> bytes:
-    """Strict JSON; raises :class:`InputError` for what it cannot hold (NaN, bytes, a value in itself).
+    """Return strict JSON; raises :class:`InputError` for what it cannot hold (NaN, bytes, a value in itself).
 
     A character that no server takes, as in the name of a file, becomes U+FFFD.
     """
@@ -273,7 +275,7 @@ def _sendable(value: Any) -> Any:
 
 
 def read_some(response: requests.Response) -> bytes:
-    """What has arrived, decoded; waits for the first byte only; empty at the end."""
+    """Return what has arrived, decoded; waits for the first byte only; empty at the end."""
     # `iter_content` waits until a chunk is full, so a slow server could hold us up without end.
     raw: Any = response.raw
     if hasattr(raw, "read1"):
@@ -347,7 +349,7 @@ class _Adapter(HTTPAdapter):
 
 
 def _patient(pool: Any, patience: float) -> Any:
-    """The pool's class with connections that take ``patience`` once they are made."""
+    """Return the pool's class with connections that take ``patience`` once they are made."""
 
     class Connection(pool.ConnectionCls):  # type: ignore[misc]
         def connect(self) -> None:
@@ -407,12 +409,12 @@ class _Kept(Abilities):
 
 
 def abilities_path() -> Path:
-    """The user's file of what was learned about servers."""
+    """Return the user's file of what was learned about servers."""
     return cache_folder() / "servers.json"
 
 
 def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time.time) -> Abilities:
-    """What is known of a server; nothing where that is older than a day."""
+    """Return what is known of a server; nothing where that is older than a day."""
     try:
         memory = _Kept.model_validate(read_memory(path).get(server), strict=True)
     except ValidationError:
@@ -479,7 +481,8 @@ class Caller:
     def _all(
         self, kind: type[Body], subject: str, *segments: str, keys: Sequence[str] = (), **params: str | int
     ) -> Iterator[tuple[list[Body], int]]:
-        """The rows of a list, page by page, each with how many there are in all (0: not known), to the end.
+        """Yield the rows of a list, page by page, each with how many there are in all (0: not known), to the
+        end.
 
         Raises :class:`ServerFaultError` where the server has more and does not show them: a list is whole, or
         it is none.
@@ -599,7 +602,7 @@ class Caller:
 
 
 def body(kind: type[Body], values: Mapping[str, Any], thing: str) -> Body:
-    """The values as a request; raises :class:`InputError` with all that does not fit at once."""
+    """Return the values as a request; raises :class:`InputError` with all that does not fit at once."""
     unknown = sorted(set(values) - set(kind.model_fields) - {"schema"})
     if unknown:
         text = ", ".join(kind.model_fields)
@@ -627,7 +630,7 @@ def _one_by_one(keys: Sequence[K], single: Callable[[K], T | None], cancelled: C
 
 
 def _without(data: Any, keys: Sequence[str]) -> Any:
-    """The data without these keys, here and in lists of objects; what a user put into a value stays."""
+    """Return the data without these keys, here and in lists of objects; what a user put into a value stays."""
     if not keys or not isinstance(data, dict):
         return data
     return {

@@ -64,7 +64,7 @@ class _Line:
 
 
 def as_number(value: object) -> float | None:
-    """A quantity as a number: int, float, Decimal or a numeral; None where there is none."""
+    """Return a quantity as a number: int, float, Decimal or a numeral; None if there is none."""
     if value is None or isinstance(value, bool):
         return None
     try:
@@ -108,7 +108,7 @@ def _summed(lines: Iterable[_Line]) -> dict[str, float | None]:
 
 
 def local_quantities(entries: Iterable[BomEntry | Mapping[str, Any]]) -> dict[str, float | None]:
-    """The assembly's direct children by part number, summed; entries without a number are left out."""
+    """Return the assembly's direct children by part number, summed; entries without a number are left out."""
     return _summed(line for entry in entries if (line := _local(entry)) is not None)
 
 
@@ -122,7 +122,7 @@ def is_manual(line: Mapping[str, Any]) -> bool:
 
 
 def is_component(line: Mapping[str, Any]) -> bool:
-    """True for a line that counts parts; ``alternate`` and ``reference`` lines do not."""
+    """Return True for a line that counts parts; ``alternate`` and ``reference`` lines do not."""
     return (line.get("rel_type") or "component") == "component"
 
 
@@ -172,7 +172,7 @@ def diff_bom(
 def lines_of_missing(
     lines: Iterable[Mapping[str, Any]], missing: Iterable[Component], local: Container[str] = ()
 ) -> frozenset[str]:
-    """The part numbers of the lines that stand for missing components.
+    """Return the part numbers of the lines that stand for missing components.
 
     Those that stood for one of them in the last sync. Where a missing component stood for no line (a server
     that does not keep that, lines of an old version), any line that the assembly does not have now may be its
@@ -253,12 +253,12 @@ class MergePlan:
 
     @property
     def writes(self) -> bool:
-        """True where applying the plan changes a line on the server."""
+        """Return True if applying the plan changes a line on the server."""
         return bool(self.diff.added or self.diff.quantity_changed or self.flag or self.unflag)
 
     @property
     def news(self) -> bool:
-        """True where the server learns anything from this merge: else it need not be sent."""
+        """Return True if the server learns anything from this merge: else it need not be sent."""
         return self.writes or bool(self.tell)
 
 
@@ -315,7 +315,7 @@ def _untold(
 
 
 def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) -> list[dict[str, Any]]:
-    """The lines after the merge: what people wrote on a line stays, nothing is deleted.
+    """Return the lines after the merge: what people wrote on a line stays, nothing is deleted.
 
     ``lines`` has at most one assembly line per number, as every server's key demands. ``when`` is the time
     stamp written on newly unreferenced lines.
@@ -347,7 +347,7 @@ def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) 
 
 
 def summary(diff: BomDiff) -> str:
-    """The sentence of the spec's event: ``BOM updated: 1 added, 1 quantity changed, 1 unreferenced``."""
+    """Return the sentence of the spec's event: ``BOM updated: 1 added, 1 quantity changed, 1 unreferenced``."""
     parts = [
         f"{len(diff.added)} added",
         f"{len(diff.quantity_changed)} quantity changed",
@@ -359,14 +359,14 @@ def summary(diff: BomDiff) -> str:
 
 
 def resolve_url(part_number: str) -> str:
-    """Where a person decides on what a merge left open."""
+    """Return where a person decides on what a merge left open."""
     return f"/items/{quote(part_number, safe='')}/bom"
 
 
 def answer_of(
     diff: BomDiff, part_number: str, sync_id: str | None = None, left_out: Sequence[Mapping[str, Any]] = ()
 ) -> dict[str, Any]:
-    """The answer to a merge (spec §5); ``sync_id`` and ``left_out`` only where there are such."""
+    """Return the answer to a merge (spec §5); ``sync_id`` and ``left_out`` only where there are such."""
 
     def lines(changes: Iterable[BomChange]) -> list[dict[str, Any]]:
         return [
@@ -428,7 +428,7 @@ class FileRevision(Protocol):
 
 
 def would_undo(newest: FileRevision | None, base: int | None, sha256: str | None) -> bool:
-    """True where a file that was made from revision ``base`` would undo the newest one.
+    """Return True if a file that was made from revision ``base`` would undo the newest one.
 
     newest
         the item's newest revision with a file; the very file with this ``sha256`` is nobody else's.
@@ -441,7 +441,7 @@ def would_undo(newest: FileRevision | None, base: int | None, sha256: str | None
 
 
 def base_of(revision: int | None, sha256: str | None, same: int | None) -> int | None:
-    """The revision that a merge's document is, or was made from; None where nobody knows.
+    """Return the revision that a merge's document is, or was made from; None if nobody knows.
 
     revision, sha256
         what the request says: a revision, and the SHA-256 of its file. Without a revision ``sha256`` is that
@@ -467,7 +467,7 @@ T = TypeVar("T")
 
 
 def _first(*states: T | None) -> T:
-    """The first state there is; one of them always is."""
+    """Return the first state there is; one of them always is."""
     return next(state for state in states if state is not None)
 
 
@@ -488,12 +488,14 @@ class LineChange:
 
     @property
     def entry(self) -> BomEntry:
-        """The component as it is now, or as it was last."""
+        """Return the component as it is now, or as it was last."""
         return _first(self.new, self.old)
 
     @property
     def kind(self) -> str:
-        """``added``, ``removed``, ``quantity_changed`` or ``moved`` (another file or object, same part)."""
+        """Return ``added``, ``removed``, ``quantity_changed`` or ``moved`` (another file or object, same
+        part).
+        """
         if self.old is None:
             return "added"
         if self.new is None:
@@ -511,12 +513,12 @@ class AssemblyChange:
 
     @property
     def head(self) -> BomEntry:
-        """The assembly as it is now, or as it was last."""
+        """Return the assembly as it is now, or as it was last."""
         return _first(self.new, self.old).head
 
     @property
     def kind(self) -> str:
-        """``added``, ``removed``, ``changed``, or ``moved`` where only its file or object is another."""
+        """Return ``added``, ``removed``, ``changed``, or ``moved`` where only its file or object is another."""
         if self.old is None:
             return "added"
         if self.new is None:
@@ -527,7 +529,7 @@ class AssemblyChange:
 def compare_assemblies(
     old: Sequence[ComparedAssembly], new: Sequence[ComparedAssembly]
 ) -> tuple[AssemblyChange, ...]:
-    """Every assembly whose lines or place differ, in the order of the new state, removed ones last."""
+    """Return every assembly whose lines or place differ, in the order of the new state, removed ones last."""
     match = _Match(old, new)
     before = {match.of_old(assembly.head): assembly for assembly in old}
     changes = []
@@ -556,35 +558,35 @@ class ThreeLines:
 
     @property
     def entry(self) -> BomEntry:
-        """The component, by the newest state that has it."""
+        """Return the component, by the newest state that has it."""
         return _first(self.mine, self.theirs, self.base)
 
     @property
     def quantities(self) -> tuple[float, float, float]:
-        """Of base, theirs and mine; 0 where there is no line."""
+        """Return the quantities in (base, theirs, mine); 0 = no line."""
         base, theirs, mine = (entry.quantity if entry else 0 for entry in (self.base, self.theirs, self.mine))
         return base, theirs, mine
 
     @property
     def by_them(self) -> bool:
-        """They changed it."""
+        """Return True if they changed it."""
         return self.quantities[1] != self.quantities[0]
 
     @property
     def by_me(self) -> bool:
-        """I changed it."""
+        """Return True if I changed it."""
         return self.quantities[2] != self.quantities[0]
 
     @property
     def undoes(self) -> bool:
-        """True where mine in the place of theirs would undo what they did."""
+        """Return True if mine in the place of theirs would undo what they did."""
         return self.by_them and self.quantities[1] != self.quantities[2]
 
 
 def compare_three(
     base: ComparedAssembly | None, theirs: ComparedAssembly, mine: ComparedAssembly
 ) -> tuple[ThreeLines, ...]:
-    """Every line of an assembly that one of two people changed; what would be undone comes first.
+    """Return every line of an assembly that one of two people changed; what would be undone comes first.
 
     Without ``base``, every line in which the two differ; who changed it is then not known.
     """
@@ -627,11 +629,11 @@ class _Match:
                 self._new_key[key] = key
 
     def of_old(self, entry: BomEntry) -> Key:
-        """The new key of an old component; one that no new component has where it is gone."""
+        """Return the new key of an old component; one that no new component has where it is gone."""
         return self._new_key.get(entry.key, ("\0gone", "\0".join(entry.key)))
 
     def lines(self, old: Iterable[BomEntry], new: Iterable[BomEntry]) -> tuple[LineChange, ...]:
-        """The lines of one assembly that differ."""
+        """Return the lines of one assembly that differ."""
         before = {self.of_old(entry): entry for entry in old}
         changes = []
         for entry in new:
@@ -658,7 +660,7 @@ def _by_identity(components: Mapping[Key, BomEntry]) -> dict[str, Key]:
 
 
 def changes_json(changes: Iterable[AssemblyChange]) -> list[dict[str, Any]]:
-    """The comparison for machines."""
+    """Return the comparison for machines."""
     return [
         {
             **_entry(change.head),

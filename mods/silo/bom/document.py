@@ -70,7 +70,8 @@ class DocumentRoot:
 
 
 def saved_by(program: str | None) -> tuple[int, ...]:
-    """The version of the FreeCAD that saved a file, such as (1, 0), by its ``ProgramVersion``; () for none.
+    """Return the version of the FreeCAD that saved a file, such as (1, 0), by its ``ProgramVersion``; () for
+    none.
 
     The numbers of realthunder's branch are dates (2022.111), and say nothing about FreeCAD's.
     """
@@ -79,7 +80,7 @@ def saved_by(program: str | None) -> tuple[int, ...]:
 
 
 def derived(obj: Any, type_name: str) -> bool:
-    """True where ``obj`` says it is of (a type derived from) ``type_name``."""
+    """Return True if ``obj`` says it is of (a type derived from) ``type_name``."""
     try:
         return bool(obj.isDerivedFrom(type_name))
     except (AttributeError, TypeError):  # a plain object that says nothing of its type
@@ -87,7 +88,7 @@ def derived(obj: Any, type_name: str) -> bool:
 
 
 def own(obj: object, name: str, default: Any = None) -> Any:
-    """The object's own property ``name``; never that of a link's target."""
+    """Return the object's own property ``name``; never that of a link's target."""
     if (ask := getattr(type(obj), "own_property", None)) is not None:
         return ask(obj, name, default)
     value = getattr(obj, name, default)
@@ -100,18 +101,18 @@ def own(obj: object, name: str, default: Any = None) -> Any:
 
 
 def property_names(obj: object) -> frozenset[str] | tuple[str, ...] | None:
-    """The names of the object's own properties, to be used as a key; None where it does not say."""
+    """Return the names of the object's own properties, to be used as a key; None if it does not say."""
     names: Sequence[str] | frozenset[str] | None = getattr(obj, "PropertiesList", None)
     return names if names is None or isinstance(names, tuple | frozenset) else tuple(names)
 
 
 def first_of(linked: Any) -> Any:
-    """The object of a ``LinkedObject``, which is a tuple (object, sub-name) where there is a sub-name."""
+    """Return the object of a ``LinkedObject``, which is a tuple (object, sub-name) where there is a sub-name."""
     return linked[0] if isinstance(linked, tuple) else linked
 
 
 def same_document(a: object, b: object) -> bool:
-    """True where both are one document: the same object, or two objects of one file."""
+    """Return True if both are one document: the same object, or two objects of one file."""
     # Not by ==, which never ends for plain objects that hold each other; FreeCAD has one object per document.
     if a is b:
         return True
@@ -124,7 +125,7 @@ NAMELESS = "object-"
 
 
 def object_name(obj: object) -> str:
-    """The object's ``Name``; for an object that has none, something unique to it."""
+    """Return the object's ``Name``; for an object that has none, something unique to it."""
     name = getattr(obj, "Name", None)
     if isinstance(name, str) and (name or getattr(obj, "is_document_root", False)):
         return name
@@ -136,7 +137,7 @@ _LONGEST_LABEL = 300
 
 
 def label_of(obj: object) -> str:
-    """The object's ``Label``, for people only; its ``Name`` where it has none that can be read."""
+    """Return the object's ``Label``, for people only; its ``Name`` where it has none that can be read."""
     for name in ("Label", "Name"):
         try:
             text = getattr(obj, name, None)
@@ -148,7 +149,7 @@ def label_of(obj: object) -> str:
 
 
 def document_property(doc: object, name: str) -> Any:
-    """A property of the document, None where there is none (FreeCAD 0.20 has no such properties at all)."""
+    """Return a property of the document, None if there is none (FreeCAD 0.20 has no such properties at all)."""
     ask = getattr(doc, "getPropertyByName", None)
     if callable(ask):
         try:
@@ -185,7 +186,7 @@ _ABSOLUTE = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://|[A-Za-z]:[\\/]|\\\\|//")
 
 
 def located(recorded: str, owner: str) -> str:
-    """The path that a link records, relative to its owner's folder, in full; one spelling per file.
+    """Return the path that a link records, relative to its owner's folder, in full; one spelling per file.
 
     Paths that stand for themselves (absolute ones, ``https://…``), and those of unsaved documents, stay.
     """
@@ -195,7 +196,8 @@ def located(recorded: str, owner: str) -> str:
 
 
 def relative(path: str, base: str, rules: ModuleType = os.path) -> str:
-    """``path`` as seen from the folder ``base``, with ``/``; whole where it lies on another Windows drive.
+    """Return ``path`` as seen from the folder ``base``, with ``/``; whole where it lies on another Windows
+    drive.
 
     ``rules``: ``ntpath`` or ``posixpath``, whatever the platform.
     """
@@ -207,12 +209,13 @@ def relative(path: str, base: str, rules: ModuleType = os.path) -> str:
 
 
 def is_element_name(name: str) -> bool:
-    """True for geometry (``Face1``), false for what may be an object's name."""
+    """Return True for geometry (``Face1``), false for what may be an object's name."""
     return bool(_ELEMENT.fullmatch(name)) or name.startswith(_MAPPED)
 
 
 def split_sub_name(sub: Any) -> tuple[list[str], str]:
-    """The objects that a sub-name passes through, and the geometry it ends at ("" for the whole object).
+    """Return the objects that a sub-name passes through, and the geometry it ends at ("" for the whole
+    object).
 
     Object names end in a dot, geometry names do not: ``"Sub.Bolt."``, ``"Inner.Face1"``. Of several sub-names
     the first counts; FreeCAD links one object only, so all of them share the way to it.

@@ -54,14 +54,14 @@ class Exit(IntEnum):
 
 
 def exit_of(error: BaseException) -> Exit:
-    """Whose fault an error is, as an exit code."""
+    """Return whose fault an error is, as an exit code."""
     if isinstance(error, KeyboardInterrupt | CancelledError):
         return Exit.CANCELLED
     return Exit.REMOTE if isinstance(error, RemoteError | ConflictError) else Exit.BAD_INPUT
 
 
 def did_you_mean(given: str, candidates: Iterable[str]) -> str:
-    """The end of a sentence about an unknown name: the known ones that look like it; "" where none does."""
+    """Return the end of a sentence about an unknown name: the known ones that look like it; "" if none does."""
     near = difflib.get_close_matches(given, list(candidates), 2, 0.7)
     return f"; did you mean {' or '.join(near)}?" if near else ""
 

@@ -378,10 +378,10 @@ class Finding:
 
     @property
     def blocks(self) -> bool:
-        """True where the BOM is not to be synced unless the user says so."""
+        """Return True if the BOM is not to be synced unless the user says so."""
         return self.severity is Severity.ERROR
 
 
 def respelt_findings(notes: Iterable[str], top: str) -> tuple[Finding, ...]:
-    """What was taken though it is recorded in other case: right here, missing on another system."""
+    """Return what was taken though it is recorded in other case: right here, missing on another system."""
     return tuple(Finding(FindingCode.RESPELT, Severity.WARNING, f"{note}.", (Place(top),)) for note in notes)

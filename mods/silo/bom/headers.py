@@ -137,7 +137,7 @@ BRACKET = re.compile(r"[\(\[（【<]\s*([^)\]）】>]*)\s*[\)\]）】>]")
 
 
 def normal(header: str) -> str:
-    """A header without case, punctuation, what stands in brackets, and double spaces."""
+    """Return a header without case, punctuation, what stands in brackets, and double spaces."""
     text = unicodedata.normalize("NFKC", header).casefold()
     text = BRACKET.sub(" ", text)
     return " ".join(re.sub(r"[\W_]+", " ", text).split())
@@ -151,12 +151,12 @@ _ROLE_OF: dict[str, tuple[Role, int]] = {
 
 
 def alias(text: str) -> tuple[Role, int] | None:
-    """Role of a :func:`normal` header, and how well it fits: 0 is best ("Name" beats "Component")."""
+    """Return role of a :func:`normal` header, and how well it fits: 0 is best ("Name" beats "Component")."""
     return _ROLE_OF.get(text)
 
 
 def find_roles(header: Sequence[str], roles: Collection[Role]) -> dict[Role, int]:
-    """Column index of each role. Of two columns the one whose name fits better, then the first."""
+    """Return column index of each role. Of two columns the one whose name fits better, then the first."""
     best: dict[Role, tuple[int, int]] = {}
     for index, cell in enumerate(header):
         role_of_cell = alias(normal(cell))
@@ -170,7 +170,7 @@ def find_roles(header: Sequence[str], roles: Collection[Role]) -> dict[Role, int
 def second_columns(
     header: Sequence[str], roles: Collection[Role], at: Mapping[Role, int]
 ) -> list[tuple[Role, int]]:
-    """The columns that mean what another one is used for (``at``)."""
+    """Return the columns that mean what another one is used for (``at``)."""
     columns_by_role = ((alias(normal(cell)), index) for index, cell in enumerate(header))
     return [(of[0], i) for of, i in columns_by_role if of and of[0] in roles and at.get(of[0], i) != i]
 
@@ -194,7 +194,7 @@ def find_clashes(
     seconds: Iterable[tuple[Role, int]],
     is_empty: Callable[[str], bool] = lambda text: not text,
 ) -> list[Clash]:
-    """One for each of the ``seconds`` that says something else than the used column (``at``)."""
+    """Return one for each of the ``seconds`` that says something else than the used column (``at``)."""
     return [
         Clash(role, header[at[role]].strip(), header[index].strip(), number, used, unused)
         for role, index in seconds
@@ -205,7 +205,7 @@ def find_clashes(
 def _differences(
     rows: Sequence[Sequence[str]], used: int, other: int, is_empty: Callable[[str], bool]
 ) -> list[tuple[int, str, str]]:
-    """The first row in which the columns differ, if any."""
+    """Return the first row in which the columns differ, if any."""
     for number, cells in enumerate(rows):
         ours, theirs = (plain_cell(cells[i].strip()) if i < len(cells) else "" for i in (used, other))
         if not is_empty(theirs) and theirs != ours:
@@ -214,7 +214,7 @@ def _differences(
 
 
 def missing_columns(header: Sequence[str], at: Mapping[Role, int], needed: Sequence[Role]) -> str:
-    """Which of the ``needed`` columns a header lacks, and what was seen; "" where none is missing."""
+    """Return which of the ``needed`` columns a header lacks, and what was seen; "" if none is missing."""
     lacking = [role for role in needed if role not in at]
     if not lacking:
         return ""
@@ -233,18 +233,18 @@ def _others(role: Role) -> str:
 
 
 def designators(cell: str) -> tuple[str, ...]:
-    """``R1, R2 R3`` as three reference designators."""
+    """Return ``R1, R2 R3`` as three reference designators."""
     return tuple(cell.replace(",", " ").split())
 
 
 def safe_cell(value: Any) -> Any:
-    """A cell for CSV: what would be run as a formula is made text; numbers stay numbers."""
+    """Return a cell for CSV: what would be run as a formula is made text; numbers stay numbers."""
     if isinstance(value, str) and value.lstrip("'").startswith(FORMULA_STARTS):
         return "'" + value
     return value
 
 
 def plain_cell(text: str) -> str:
-    """What :func:`safe_cell` was given."""
+    """Return what :func:`safe_cell` was given."""
     made_text = text.startswith("'") and text.lstrip("'").startswith(FORMULA_STARTS)
     return text[1:] if made_text else text

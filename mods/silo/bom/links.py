@@ -45,7 +45,7 @@ MAX_LEVELS = 64
 
 
 def extract_bom_links(assembly_obj: Any, level: int = 1) -> list[BomEntry]:
-    """The cross-document components of an assembly, with quantities per one parent (spec §1).
+    """Return the cross-document components of an assembly, with quantities per one parent (spec §1).
 
     ``level`` is given to the direct children; deeper ones count up from it. For the findings too, call
     :func:`extract`.
@@ -183,7 +183,7 @@ def why(
 
 
 def same_articles_of(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, BomEntry]]:
-    """Standard parts that are one article under two standards."""
+    """Find standard parts that are one article under two standards."""
     bom_entries = {entry.standard: entry for entry in entries if entry.standard}
     return [
         (bom_entries[designation], bom_entries[other]) for designation, other in same_articles(bom_entries)
@@ -218,7 +218,7 @@ class _Walker:
         self._held: dict[Key, set[str]] = {}
 
     def component(self, obj: Any) -> Key:
-        """What a component is; the same as its key where it has a name.
+        """Return what a component is; the same as its key where it has a name.
 
         Nameless ones are distinguished by the order in which their document showed them, so that two
         documents made of one file agree.
@@ -242,7 +242,7 @@ class _Walker:
         return (path, f"{NAMELESS}{place + 1}" if place else "")
 
     def entry_for(self, obj: Any) -> BomEntry:
-        """What an object says of itself, wherever it is used."""
+        """Return what an object says of itself, wherever it is used."""
         path, name = key = self.component(obj)
         if isinstance(obj, Lost):
             stem = os.path.splitext(os.path.basename(path.replace("\\", "/")))[0]
@@ -263,7 +263,7 @@ class _Walker:
         return self._heads[key]
 
     def tree(self, top: Any, level: int) -> tuple[BomEntry, ...]:
-        """The direct children of the top, with all that is below them."""
+        """Return the direct children of the top, with all that is below them."""
         if self._goes_below:
             self._rings = Rings(self._read_all(top))
         else:
@@ -295,7 +295,7 @@ class _Walker:
         return self._containers[key]
 
     def _assembly(self, container: Any, level: int, depth: int, entry: Key) -> tuple[BomEntry, ...]:
-        """The direct children of an assembly, put together once per nesting level at which it occurs.
+        """Return the direct children of an assembly, put together once per nesting level at which it occurs.
 
         entry
             where the walk came into the ring that the assembly is in; itself where it is in none.
@@ -339,7 +339,7 @@ class _Walker:
         self.notes.beside(beside(top, roles), empty=empty)
 
     def own_lines(self, container: Any, level: int) -> tuple[BomEntry, ...]:
-        """What an assembly shows of its own file and is no item yet."""
+        """Return what an assembly shows of its own file and is no item yet."""
         contents = self.reader.contents(container)
         if not contents.is_assembly(container):
             return ()
@@ -351,7 +351,7 @@ class _Walker:
         return tuple(entries)
 
     def _free(self, links: list[Count], container: Any) -> list[Count]:
-        """The links that no joint holds, so that an array would do."""
+        """Return the links that no joint holds, so that an array would do."""
         if len(links) < 2:
             return []
         if (key := self.component(container)) not in self._held:
@@ -388,7 +388,7 @@ class _Walker:
         return not self._goes_below or self.reader.contents(target).holds_components
 
     def holds(self, top: Any) -> bool:
-        """True where the top holds components, also such as do not count."""
+        """Return True if the top holds components, also such as do not count."""
         return self.reader.contents(top).holds_components
 
 
@@ -410,18 +410,18 @@ class Rings:
         self._ways: dict[Key, dict[Key, tuple[Key, int]]] = {}
 
     def same_ring(self, key: Key, other: Key) -> bool:
-        """True where each of the two contains the other, however deep."""
+        """Return True if each of the two contains the other, however deep."""
         return other in self._members.get(key, ())
 
     def closes(self, entry: Key, here: Key, there: Key) -> bool:
-        """True where the link from ``here`` to ``there`` is cut, in a ring that was entered at ``entry``."""
+        """Return True if the link from ``here`` to ``there`` is cut, in a ring that was entered at ``entry``."""
         if not self.same_ring(here, there):
             return False
         ways = self._outwards(entry)
         return ways[there][1] <= ways[here][1]
 
     def example(self, node: Key) -> tuple[Key, ...]:
-        """A ring to report: the shortest through the first of those in a ring with ``node``."""
+        """Return a ring to report: the shortest through the first of those in a ring with ``node``."""
         first = min(self._members[node])
         ways = self._outwards(first)
         ring = [next(reached for reached in ways if first in self._graph[reached])]
@@ -430,7 +430,7 @@ class Rings:
         return tuple(reversed(ring))
 
     def _outwards(self, entry: Key) -> dict[Key, tuple[Key, int]]:
-        """All in a ring with the entry, nearest first: the assembly before each, and the distance."""
+        """Return all in a ring with the entry, nearest first: the assembly before each, and the distance."""
         if entry not in self._ways:
             ways, further = {entry: (entry, 0)}, [entry]
             for node in further:
@@ -443,7 +443,7 @@ class Rings:
 
 
 def strongly_connected(graph: Graph) -> list[frozenset[Key]]:
-    """The strongly connected parts of a graph (Gabow's algorithm, without recursion)."""
+    """Return the strongly connected parts of a graph (Gabow's algorithm, without recursion)."""
     at: dict[Key, int] = {}
     path, starts, parts = list[Key](), list[int](), list[frozenset[Key]]()
     left = [(node, False) for node in graph]

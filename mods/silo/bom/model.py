@@ -57,7 +57,7 @@ class Frozen(tuple[T, ...]):
 
 
 def _freeze(value: object, *names: str) -> None:
-    """Tuples of what was given: a caller may hand over any iterable, a frozen value holds a tuple."""
+    """Make tuples of the fields: a caller may hand over any iterable, a frozen value holds a tuple."""
     for name in names:
         if type(given := getattr(value, name)) is not Frozen:
             object.__setattr__(value, name, Frozen(given))
@@ -131,14 +131,14 @@ class BomEntry:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What a component is: (file, object), or the designation of a standard part. Never a label."""
+        """Return what a component is: (file, object), or the designation of a standard part. Never a label."""
         if self.is_standard:
             return (STANDARD_PARTS, self.standard or "")
         return (self.doc_path, self.object_name)
 
     @property
     def is_standard(self) -> bool:
-        """True for an article that its designation identifies; no file is stamped for it.
+        """Return True for an article that its designation identifies; no file is stamped for it.
 
         False for a fastener that somebody registered as an item of its own: its object carries that identity.
         """
@@ -158,11 +158,11 @@ class Extraction:
 
     @property
     def blocked(self) -> bool:
-        """True where a finding keeps this BOM from being synced."""
+        """Return True if a finding keeps this BOM from being synced."""
         return any(f.severity is Severity.ERROR for f in self.findings)
 
     def findings_of(self, *codes: FindingCode) -> tuple[Finding, ...]:
-        """The findings with one of these codes, in order."""
+        """Return the findings with one of these codes, in order."""
         return tuple(f for f in self.findings if f.code in codes)
 
 
@@ -245,16 +245,16 @@ class BomDiff:
 
     @property
     def drifted(self) -> bool:
-        """True where CAD and server differ in any way a check should report."""
+        """Return True if CAD and server differ in any way a check should report."""
         return bool(self.added or self.removed or self.quantity_changed or self.conflicts)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What the comparison leaves to a person; :meth:`findings_at` adds the place."""
+        """Return what the comparison leaves to a person; :meth:`findings_at` adds the place."""
         return self.findings_at()
 
     def findings_at(self, parent: BomEntry | None = None) -> tuple[Finding, ...]:
-        """Unreferenced lines in one finding, each conflict in one. ``parent``: the assembly compared."""
+        """Report unreferenced lines in one finding, each conflict in one. ``parent``: the assembly compared."""
         places = (Place(parent.doc_path, parent.object_name),) if parent is not None else ()
         findings = []
         if self.removed:
@@ -276,7 +276,7 @@ class BomDiff:
 
 
 def rows_as_dicts(rows: Iterable[Row]) -> list[dict[str, Any]]:
-    """Plain dicts, for JSON."""
+    """Return plain dicts, for JSON."""
     return [dict(row) for row in rows]
 
 
@@ -284,7 +284,7 @@ META_KEY = "SiloUUID"
 
 
 def meta_key(obj_name: str = "") -> str:
-    """The key in ``Meta`` for the whole document, or for one of its objects."""
+    """Return the key in ``Meta`` for the whole document, or for one of its objects."""
     return f"{META_KEY}/{obj_name}" if obj_name else META_KEY
 
 
@@ -293,7 +293,9 @@ def _text(value: object) -> str | None:
 
 
 def identity_of(obj: object) -> str | None:
-    """The Silo UUID of a component (the real part or assembly, not a link to it); None while unregistered."""
+    """Return the Silo UUID of a component (the real part or assembly, not a link to it); None while
+    unregistered.
+    """
     return own_identity(obj) or document_identity(getattr(obj, "Document", None))
 
 
@@ -306,7 +308,7 @@ def as_uuid(text: str) -> str:
 
 
 def own_identity(obj: object) -> str | None:
-    """The identity that is written for this very object, not for its document."""
+    """Return the identity that is written for this very object, not for its document."""
     for name in ("SiloItemId", "SiloUUID"):
         if result := _text(own(obj, name)):
             return result
@@ -315,7 +317,7 @@ def own_identity(obj: object) -> str | None:
 
 
 def document_identity(doc: object) -> str | None:
-    """The identity that is written for a whole document."""
+    """Return the identity that is written for a whole document."""
     if doc is None:
         return None
     return _text(document_property(doc, "SiloUUID")) or _text(_meta(doc).get(META_KEY))
@@ -345,7 +347,7 @@ def _meta(doc: object) -> Mapping[str, str]:
 
 
 def walk_entries(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:
-    """Every distinct component below, each once, parents before children.
+    """Yield every distinct component below, each once, parents before children.
 
     What lies below is looked at for each distinct value of a component: where a walk was cut (a ring, too
     deep), one component may have fewer children in one place than in another.
@@ -365,7 +367,7 @@ def walk_entries(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:
 
 
 def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
-    """One UUID in two files ("copied identity"), or on two parts of one file ("shared identity")."""
+    """Return one UUID in two files ("copied identity"), or on two parts of one file ("shared identity")."""
     users: dict[str, dict[tuple[str, str], BomEntry]] = {}
     for entry in sorted(walk_entries(entries), key=lambda entry: entry.key):
         if entry.silo_uuid:
@@ -442,11 +444,11 @@ class Notes:
         self._notes: dict[_Slot, _Note] = {}
 
     def findings(self) -> tuple[Finding, ...]:
-        """All findings, in the order in which they were first met."""
+        """Return all findings, in the order in which they were first met."""
         return tuple(note.finding(code) for (code, _), note in self._notes.items())
 
     def any_blocking(self) -> bool:
-        """True where a finding keeps the BOM from being synced."""
+        """Return True if a finding keeps the BOM from being synced."""
         return any(note.severity is Severity.ERROR for note in self._notes.values())
 
     def place(self, obj: Any) -> Place:
@@ -483,7 +485,7 @@ class Notes:
         return note
 
     def broken(self, link: Any, problem: LinkProblem | None) -> None:
-        """One finding per missing file or object, naming what uses it."""
+        """Report each missing file or object, naming what uses it."""
         problem = problem or LinkProblem(FindingCode.BROKEN_LINK)
         code = problem.code if problem.code in _OF_LINKS else FindingCode.BROKEN_LINK
         text = code.sentence
@@ -508,7 +510,7 @@ class Notes:
             note.file = problem.file
 
     def unreadable(self, obj: Any, error: DocumentError) -> None:
-        """The file that ``obj`` lies in is damaged at this very place."""
+        """Report that the file of ``obj`` is damaged at this very place."""
         text, tail = "The file {file} cannot be read in full ({reason})", "not counted: {users}"
         self.add(
             FindingCode.UNREADABLE_FILE,
@@ -521,7 +523,7 @@ class Notes:
         )
 
     def cycle(self, link: Any, ring: Sequence[tuple[str, str]]) -> None:
-        """``ring``: the assemblies that contain each other, the first not repeated."""
+        """Report a cycle. ``ring``: the assemblies that contain each other, the first not repeated."""
         path = " → ".join(str(Place(*key)) for key in (*ring, ring[0]))
         self.add(FindingCode.CYCLE, link, path, path=path)
 
@@ -531,7 +533,7 @@ class Notes:
         self.add(FindingCode.CYCLE, obj, file, sentence=text, tail=tail, file=file or label_of(obj))
 
     def in_document(self, link: Any, target: Any, *, leads_back: bool = False) -> None:
-        """A link within the file that brings nothing.
+        """Report a link within the file that brings nothing.
 
         leads_back
             to what holds the link, which FreeCAD cannot show.
@@ -544,7 +546,7 @@ class Notes:
             self.add(code, link, self._path_of(link))
 
     def same_article(self, bom_entry: BomEntry, other: BomEntry) -> None:
-        """One article under two standards."""
+        """Report one article under two standards."""
         places = {Place(*(entry.doc_path, entry.object_name)): entry.label for entry in (bom_entry, other)}
         self._notes[FindingCode.SAME_ARTICLE, f"{bom_entry.standard} {other.standard}"] = _Note(
             FindingCode.SAME_ARTICLE.severity,
@@ -553,13 +555,13 @@ class Notes:
         )
 
     def link_type(self, link: Any) -> None:
-        """A type of link that no tested FreeCAD knows."""
+        """Report a type of link that no tested FreeCAD knows."""
         kind = getattr(link, "TypeId", "")
         if kind and kind not in _KNOWN_LINKS:
             self.add(FindingCode.UNKNOWN_LINK_TYPE, link, kind, kind=kind)
 
     def newer(self, document: Any) -> None:
-        """A file that a FreeCAD saved which nothing here was tested with."""
+        """Report a file that a FreeCAD newer than the tested ones saved."""
         version = saved_by(getattr(document, "ProgramVersion", ""))
         if version > NEWEST_TESTED:
             texts = [".".join(map(str, version_parts)) for version_parts in (version, NEWEST_TESTED)]
@@ -572,7 +574,7 @@ class Notes:
         self.add(FindingCode.STALE_ASSEMBLY_LINK, link, target=target, parts="; ".join(parts))
 
     def own_parts(self, container: Any, lines: Sequence[BomEntry]) -> None:
-        """One finding per assembly: what it shows of its own file is no item yet."""
+        """Report, once per assembly, what it shows of its own file and is no item yet."""
         if not lines:
             return
         self.add(
@@ -590,7 +592,7 @@ class Notes:
         self._notes[FindingCode.EMPTY_BOM, ""] = note
 
     def beside(self, objects: Sequence[Any], *, empty: bool = False) -> None:
-        """What lies in the top document, but not in the assembly, and holds components.
+        """Report what lies in the top document, but not in the assembly, and holds components.
 
         empty
             the assembly holds none at all, so it may be the wrong one.

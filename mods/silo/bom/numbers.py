@@ -48,7 +48,7 @@ class Mark(StrEnum):
 
     @property
     def other(self) -> Mark:
-        """The mark that groups thousands where this one is the decimal mark."""
+        """Return the mark that groups thousands where this one is the decimal mark."""
         return Mark.COMMA if self is Mark.POINT else Mark.POINT
 
 
@@ -73,17 +73,17 @@ class Number:
 
     @property
     def value(self) -> float:
-        """The value as a float; infinite where no float is as large."""
+        """Return the value as a float; infinite where no float is as large."""
         return float(self.exact)
 
     @property
     def step(self) -> float:
-        """The weight of the last written digit; the number is rounded to ± step / 2."""
+        """Return the weight of the last written digit; the number is rounded to ± step / 2."""
         return float(f"1e{self.places}")
 
     @property
     def ambiguous(self) -> bool:
-        """True where the text can be read two ways: as one thousand and more, or as one and a bit."""
+        """Return True if the text can be read two ways: as one thousand and more, or as one and a bit."""
         return self.other is not None
 
 
@@ -104,7 +104,7 @@ _COUNT_WORD = re.compile(rf"(?P<number>.*?[0-9¼-¾⅐-⅞.,])\s*(?:x|×|{_PIECE
 
 
 def parse_number(text: str, mark: Mark | None = None) -> Number | None:
-    """``text`` as a number; None where it is none. ``mark`` decides what is ambiguous.
+    """Return ``text`` as a number; None if it is none. ``mark`` decides what is ambiguous.
 
     A mark that contradicts the text ("1,234.5" under COMMA) gives None: it is not the number it seems.
     """
@@ -128,7 +128,7 @@ def parse_number(text: str, mark: Mark | None = None) -> Number | None:
 
 
 def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
-    """``text`` as a number for somebody who can be asked: refused where it is none, or is ambiguous.
+    """Return ``text`` as a number for somebody who can be asked: refused where it is none, or is ambiguous.
 
     points_are_decimal
         for files and requests that programs write: "1.234" is 1.234. "1,234" stays ambiguous.
@@ -147,7 +147,7 @@ def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool
 
 
 def read_count(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
-    """As :func:`read_number`; the text may name what it counts: "4 pcs", "4x", "4 Stk."."""
+    """Read a number as :func:`read_number` does; the text may name what it counts: "4 pcs", "4x", "4 Stk."."""
     counted = _COUNT_WORD.fullmatch(text.strip())
     return read_number(counted["number"] if counted else text, mark, points_are_decimal=points_are_decimal)
 
@@ -158,7 +158,7 @@ def counts_pieces(unit: str | None) -> bool:
 
 
 def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
-    """The quantity of a BOM line: a count above 0 and at most 1e9."""
+    """Return the quantity of a BOM line: a count above 0 and at most 1e9."""
     reading = read_count(text, mark, points_are_decimal=points_are_decimal)
     if reading.value is not None and not 0 < reading.value <= Decimal(LARGEST_QUANTITY):
         return NumberReading(None, f"wanted a number above 0 and at most 1e9, got “{text.strip()[:LONGEST]}”")
@@ -166,13 +166,14 @@ def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bo
 
 
 def common_mark(marks: Iterable[Mark | None]) -> Mark | None:
-    """The decimal mark that the numbers of a column agree on; None where they show none, or both."""
+    """Return the decimal mark that the numbers of a column agree on; None if they show none, or both."""
     shown = {mark for mark in marks if mark is not None}
     return shown.pop() if len(shown) == 1 else None
 
 
 def plain_text(text: str) -> str:
-    """``text``, stripped, with full-width letters as narrow ones and the digits of any script as 0 to 9.
+    """Return ``text``, stripped, with full-width letters as narrow ones and the digits of any script as 0 to
+    9.
 
     Superscripts, fractions and circled numbers stay what they are: "5²" is not 52, nor "1½" 11/2.
     """
@@ -188,7 +189,7 @@ def _plain_character(character: str) -> str:
 
 
 def as_decimal(value: float | int | Decimal) -> Decimal:
-    """The number that ``value`` shows: 0.1 is one tenth. ValueError where it is not finite."""
+    """Return the number that ``value`` shows: 0.1 is one tenth. ValueError if it is not finite."""
     if isinstance(value, float):
         if not isfinite(value):
             raise ValueError(f"wanted a finite number, got {value}")
@@ -197,7 +198,7 @@ def as_decimal(value: float | int | Decimal) -> Decimal:
 
 
 def exact_sum(values: Iterable[float | int | Decimal]) -> Decimal:
-    """The sum of what the values show: 0.1 + 0.2 is 0.3. Exact to 80 digits."""
+    """Return the sum of what the values show: 0.1 + 0.2 is 0.3. Exact to 80 digits."""
     total = Decimal(0)
     for value in values:
         total = _WIDE.add(total, as_decimal(value))
@@ -205,7 +206,7 @@ def exact_sum(values: Iterable[float | int | Decimal]) -> Decimal:
 
 
 def exact_product(values: Iterable[float | int | Decimal]) -> Decimal:
-    """The product of what the values show: 3 × 0.1 is 0.3. Exact to 80 digits."""
+    """Return the product of what the values show: 3 × 0.1 is 0.3. Exact to 80 digits."""
     product = Decimal(1)
     for value in values:
         product = _WIDE.multiply(product, as_decimal(value))
@@ -217,7 +218,7 @@ def plain(value: None) -> None: ...
 @overload
 def plain(value: float | Decimal) -> int | float: ...
 def plain(value: float | Decimal | None) -> int | float | None:
-    """``value`` as JSON and people should see it: a count as a count (12, not 12.0); None stays None."""
+    """Return ``value`` as JSON and people should see it: a count as a count (12, not 12.0); None stays None."""
     if isinstance(value, float):
         return int(value) if value.is_integer() and abs(value) < 1e16 else value
     if isinstance(value, Decimal):
@@ -226,7 +227,7 @@ def plain(value: float | Decimal | None) -> int | float | None:
 
 
 def whole_number(text: str, digits: int = 15) -> int | None:
-    """The whole number that a program wrote: so many ASCII digits at most; None for anything else.
+    """Return the whole number that a program wrote: so many ASCII digits at most; None for anything else.
 
     For headers, form fields and addresses. ``str.isdigit`` alone is also true for "²", which ``int`` refuses.
     """
@@ -237,7 +238,9 @@ _YES, _NO = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
 
 
 def yes_or_no(text: str) -> bool | None:
-    """What a setting says: ``1``, ``true``, ``yes``, ``on`` or their opposites; None for anything else."""
+    """Return what a setting says: ``1``, ``true``, ``yes``, ``on`` or their opposites; None for anything
+    else.
+    """
     word = text.strip().lower()
     return True if word in _YES else False if word in _NO else None
 
@@ -250,7 +253,7 @@ class _Split(NamedTuple):
 
 
 def _split(body: str, mark: Mark | None) -> _Split | None:
-    """Whole digits, fraction digits, and the mark this proves; None where it is no number."""
+    """Return whole digits, fraction digits, and the mark this proves; None if it is no number."""
     points, commas = body.count("."), body.count(",")
     if not points and not commas:
         return _Split(body, "", None)

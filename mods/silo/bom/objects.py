@@ -95,13 +95,13 @@ _NO_COMPONENTS = {
 
 
 def has_own(obj: object, *names: str) -> bool:
-    """True where the object itself (no link target) has all these properties."""
+    """Return True if the object itself (no link target) has all these properties."""
     listed: Sequence[str] | None = getattr(obj, "PropertiesList", None)
     return all(name in listed if listed is not None else hasattr(obj, name) for name in names)
 
 
 def kind_of(obj: object) -> Kind:
-    """The role of a member of a container."""
+    """Return the role of a member of a container."""
     ancestry = getattr(obj, "ancestry", None)
     if isinstance(ancestry, frozenset):
         kind = kind_by_type(ancestry)
@@ -116,7 +116,7 @@ def kind_of(obj: object) -> Kind:
 
 @lru_cache(maxsize=4096)
 def kind_by_type(ancestry: frozenset[str]) -> Kind | None:
-    """The role of an object of a type that is derived from these; None where its properties decide."""
+    """Return the role of an object of a type that is derived from these; None if its properties decide."""
     return _kind_by_type(ancestry.__contains__)
 
 
@@ -157,7 +157,7 @@ def _python_kind(obj: object) -> Kind:
 
 @lru_cache(maxsize=1024)
 def _kind_by_names(names: frozenset[str] | tuple[str, ...]) -> Kind | None:
-    """What a Python object with these properties is; None for one that they do not identify."""
+    """Return what a Python object with these properties is; None for one that they do not identify."""
     has = frozenset(names).issuperset
     if has(("Base",)) and not frozenset(names).isdisjoint(_ARRAY_MARKS):
         return Kind.DRAFT_ARRAY
@@ -178,7 +178,7 @@ def _standard_kind(obj: object) -> Kind | None:
 
 
 def sources(repeater: object) -> list[Any]:
-    """The objects that an array, a compound or a copy shows."""
+    """Return the objects that an array, a compound or a copy shows."""
     # A mirror image has a Base too: the point that its plane goes through.
     names = ("Source",) if derived(repeater, "Part::Mirroring") else ("Base", "Links", "Objects", "Source")
     for name in names:
@@ -189,12 +189,14 @@ def sources(repeater: object) -> list[Any]:
 
 
 def is_assembly3(obj: object) -> bool:
-    """An Assembly3 container: ``Group`` = [constraints, elements, parts]; only its parts are components."""
+    """Return an Assembly3 container: ``Group`` = [constraints, elements, parts]; only its parts are
+    components.
+    """
     return derived(obj, "Part::FeaturePython") and has_own(obj, *_ASSEMBLY3)
 
 
 def no_component(obj: object) -> str:
-    """What a link's target is instead of a component ("a spreadsheet"); "" where it may well be one."""
+    """Return what a link's target is instead of a component ("a spreadsheet"); "" if it may well be one."""
     if derived(obj, "PartDesign::Body") or derived(obj, "App::Part"):  # most are, so no long list for them
         return ""
     if derived(obj, "Part::Feature") and not (
@@ -207,7 +209,7 @@ def no_component(obj: object) -> str:
 
 
 def members(container: object) -> Iterable[Any]:
-    """The objects that lie in a container, in document order."""
+    """Return the objects that lie in a container, in document order."""
     if derived(container, "App::LinkGroup"):
         return getattr(container, "ElementList", None) or ()
     group: Sequence[Any] = getattr(container, "Group", None) or ()
@@ -221,7 +223,7 @@ _JOINED = ("Reference1", "Reference2", "ObjectToGround", "Part1", "Part2")
 
 
 def held_by_joints(holders: Iterable[Any]) -> set[str]:
-    """Names of what the joints or constraints in some containers hold, each at a place of its own.
+    """Return names of what the joints or constraints in some containers hold, each at a place of its own.
 
     FreeCAD's joints name a part, or the assembly and a path to a part. Assembly3's constraints lead through
     elements; if there are any, all parts are held. Assembly4's links say so (:func:`is_attached`).
@@ -239,7 +241,7 @@ def held_by_joints(holders: Iterable[Any]) -> set[str]:
 
 
 def is_attached(link: object) -> bool:
-    """True for a link that Assembly4 holds at a place of its own."""
+    """Return True for a link that Assembly4 holds at a place of its own."""
     return bool(own(link, "AttachedTo"))
 
 
@@ -247,25 +249,25 @@ def is_attached(link: object) -> bool:
 
 
 def left_out_by(obj: Any) -> str:
-    """The object's own property that leaves it out of every BOM; "" where none does."""
+    """Return the object's own property that leaves it out of every BOM; "" if none does."""
     if own(obj, "Suppressed") is True:
         return "Suppressed"
     return "SiloBomExclude" if own(obj, "SiloBomExclude") is True else ""
 
 
 def is_array(link: object) -> bool:
-    """True for a link array, also one with a single element."""
+    """Return True for a link array, also one with a single element."""
     count = own(link, "ElementCount", 0)
     return isinstance(count, int) and count > 0
 
 
 def elements(link: object) -> tuple[Any, ...]:
-    """The elements of a link array that has them as objects; none where the array only has a count."""
+    """Return the elements of a link array that has them as objects; none where the array only has a count."""
     return tuple(own(link, "ElementList") or ()) if is_array(link) else ()
 
 
 def array_count(link: object) -> int:
-    """Instances of one link object: 1, or the elements of its array that are not left out one by one."""
+    """Return instances of one link object: 1, or the elements of its array that are not left out one by one."""
     if not is_array(link):
         return 1
     count: int = own(link, "ElementCount")
@@ -273,7 +275,7 @@ def array_count(link: object) -> int:
 
 
 def draft_count(array: object) -> int | None:
-    """Instances of a Draft array; None where neither its count nor its pattern says."""
+    """Return instances of a Draft array; None if neither its count nor its pattern says."""
     count = own(array, "Count")
     if isinstance(count, int) and count > 0:
         return count
@@ -320,7 +322,7 @@ _BY_PYTHON = ("Tool", "Subtractions", "Sources", "Bodies", "Shape1", "Shape2", "
 
 
 def consumed(objects: Iterable[Any], key: Callable[[Any], T]) -> dict[T, Any]:
-    """What these features (of kind LOCAL) consume: key → the feature."""
+    """Return what these features (of kind LOCAL) consume: key → the feature."""
     eaten: dict[T, Any] = {}
     for feature in _features(objects):
         for operand in _operands(feature):
@@ -368,26 +370,26 @@ class Survey:
         self._objects = [(obj, kind_of(obj)) for obj in getattr(document, "Objects", None) or ()]
 
     def of(self, kinds: Set[Kind], but: Set[str] = frozenset()) -> list[tuple[Any, Kind]]:
-        """The objects of these kinds in document order, without those of these names."""
+        """Return the objects of these kinds in document order, without those of these names."""
         return [(obj, kind) for obj, kind in self._objects if kind in kinds and object_name(obj) not in but]
 
     def grouped(self, kinds: Set[Kind]) -> set[str]:
-        """Names of what objects of these kinds list in their ``Group``."""
+        """Return names of what objects of these kinds list in their ``Group``."""
         return {object_name(member) for obj, _ in self.of(kinds) for member in own(obj, "Group") or ()}
 
     def has_python(self) -> bool:
-        """True where an object is of a Python type, as standard parts are."""
+        """Return True if an object is of a Python type, as standard parts are."""
         return any(getattr(obj, "TypeId", "").endswith("FeaturePython") for obj, _ in self._objects)
 
 
 def survey_of(document: Any) -> Survey:
-    """The survey of a document, its own where it has one."""
+    """Return the survey of a document, its own where it has one."""
     survey = getattr(document, "survey", None)
     return survey if isinstance(survey, Survey) else Survey(document)
 
 
 def is_container(obj: object) -> bool:
-    """True where an object (the real one, no link) may hold components."""
+    """Return True if an object (the real one, no link) may hold components."""
     if derived(obj, "App::Part") or derived(obj, "App::LinkGroup") or is_assembly3(obj):
         return True
     if derived(obj, "Part::Feature") and kind_of(obj) in REPEATERS:
@@ -397,7 +399,7 @@ def is_container(obj: object) -> bool:
 
 
 def is_named_assembly(obj: object) -> bool:
-    """True where an object says of itself that it is an assembly, whatever it holds."""
+    """Return True if an object says of itself that it is an assembly, whatever it holds."""
     if derived(obj, "Assembly::AssemblyObject") or is_assembly3(obj):
         return True
     return derived(obj, "App::Part") and own(obj, "Type") == "Assembly"
@@ -441,7 +443,7 @@ class Lost:
 
     @property
     def key(self) -> Key:
-        """The key that the component would have, were it there."""
+        """Return the key that the component would have, were it there."""
         return (self.file, self.name)
 
 
@@ -488,7 +490,7 @@ class Count:
 
     @property
     def target(self) -> Any:
-        """The component: a document object, or :class:`Lost`."""
+        """Return the component: a document object, or :class:`Lost`."""
         return self.shown.worth[self.key][0]
 
 
@@ -517,7 +519,7 @@ class Contents:
     tree: Tree | None = None
 
     def is_assembly(self, container: Any) -> bool:
-        """True if what it shows of its own file are parts of it: a part made of bodies has none."""
+        """Return True if what it shows of its own file are parts of it: a part made of bodies has none."""
         if self.is_part:
             return False
         if self.holds_components or is_named_assembly(container):
@@ -536,7 +538,7 @@ def add(total: CountedObjects, more: CountedObjects, times: int = 1) -> None:
 
 
 def climbed(start: T, above: Callable[[T], Iterable[T]]) -> Iterator[T]:
-    """All that lies above something, at any distance, each once, the nearest first."""
+    """Yield all that lies above something, at any distance, each once, the nearest first."""
     seen, further = {start}, [start]
     for key in further:
         for upper in above(key):
@@ -547,7 +549,7 @@ def climbed(start: T, above: Callable[[T], Iterable[T]]) -> Iterator[T]:
 
 
 def is_switched_on(obj: Any) -> bool:
-    """True for what its own ``Visibility`` does not hide, nor what lies in it.
+    """Return True for what its own ``Visibility`` does not hide, nor what lies in it.
 
     A plain folder hides nothing: FreeCAD's window hides each object in it, and each object keeps that.
     """
@@ -605,27 +607,29 @@ class Tree:
         return (min([holder for holder in holders if holder not in around] or holders),)
 
     def above(self, name: Key) -> list[Key]:
-        """The containers around a member, the innermost first; of several link groups the first."""
+        """Return the containers around a member, the innermost first; of several link groups the first."""
         if self.holders.get(name) == self._in_top:  # as most are
             return [self.top]
         return list(climbed(name, lambda key: self.holders.get(key, ())[:1]))
 
     def around(self, name: Key) -> list[Key]:
-        """The containers around a member but for the top."""
+        """Return the containers around a member but for the top."""
         if self.holders.get(name) == self._in_top:
             return []
         return [key for key in self.above(name) if key != self.top]
 
     def times(self, name: Key) -> int:
-        """How often the container shows a member; 0 for what is left out, or lies in what is."""
+        """Return how often the container shows a member; 0 for what is left out, or lies in what is."""
         return self._climbed(name, self._times, lambda obj, above: 0 if left_out_by(obj) else sum(above))
 
     def visible(self, name: Key) -> bool:
-        """True for what is visible and lies in visible containers."""
+        """Return True for what is visible and lies in visible containers."""
         return self._climbed(name, self._visible, lambda obj, above: is_switched_on(obj) and any(above))
 
     def _climbed(self, name: Key, reached: dict[Key, T], of: Callable[[Any, list[T]], T]) -> T:
-        """A fact of a member that follows from the member and the containers around it; without recursion."""
+        """Return a fact of a member that follows from the member and the containers around it; without
+        recursion.
+        """
         if name not in reached and self.holders[name] == self._in_top:
             reached[name] = of(self.members[name][0], [reached[self.top]])
         way = [name] if name not in reached else []
@@ -641,7 +645,7 @@ class Tree:
         return reached[name]
 
     def paths(self, name: Key) -> Iterator[tuple[Any, ...]]:
-        """The containers around a member, outermost first, once for each way to it."""
+        """Yield the containers around a member, outermost first, once for each way to it."""
         for holder in self.holders[name]:
             if holder == self.top:
                 yield ()
@@ -656,7 +660,9 @@ class Tree:
 
 
 def chains(count: Count, tree: Tree | None) -> Iterator[tuple[tuple[Any, int], ...]]:
-    """Each way from the assembly to the component: the objects on it, and how often each shows the next."""
+    """Yield each way from the assembly to the component: the objects on it, and how often each shows the
+    next.
+    """
     starts: Iterable[tuple[Any, ...]] = [()]
     if tree is not None and not count.beside:
         starts = tree.paths(count.shown.key)

@@ -40,7 +40,7 @@ MOST_LINES = 500_000
 
 
 def project_folder(path: str, top: str = "", rules: ModuleType = os.path) -> str:
-    """The folder of a file as people call it, the same on every machine: ``robot``, ``robot/arm``.
+    """Return the folder of a file as people call it, the same on every machine: ``robot``, ``robot/arm``.
 
     It begins with the folder of ``top``, the assembly of the whole run; elsewhere it is the file's own.
     """
@@ -55,12 +55,12 @@ def project_folder(path: str, top: str = "", rules: ModuleType = os.path) -> str
 
 
 def base_of(extraction: Extraction) -> str:
-    """The folder that printed paths are relative to: that of the top file."""
+    """Return the folder that printed paths are relative to: that of the top file."""
     return os.path.dirname(extraction.assembly.doc_path)
 
 
 def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
-    """One entry with its children; quantities per one parent."""
+    """Return one entry with its children; quantities per one parent."""
     return {
         "doc_path": relative(entry.doc_path, base),
         "object": entry.object_name,
@@ -79,7 +79,7 @@ def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
 
 
 def finding_json(finding: Finding, base: str) -> dict[str, Any]:
-    """One finding; places are ``file`` and ``object``, files relative to the top file's folder.
+    """Return one finding; places are ``file`` and ``object``, files relative to the top file's folder.
 
     A broken link also has the ``file`` that it records, and the one that was probably meant, if there is one.
     """
@@ -94,14 +94,14 @@ def finding_json(finding: Finding, base: str) -> dict[str, Any]:
 
 
 def shorten(message: str, base: str) -> str:
-    """A message without the long folder that all its paths share."""
+    """Return a message without the long folder that all its paths share."""
     folder = base.rstrip("/\\")
     # The root of the disk is no folder that could be left out: all separators would go.
     return message.replace(folder + os.sep, "") if folder else message
 
 
 def tree_size(entries: Iterable[BomEntry]) -> int:
-    """Lines of the tree written out in full. Nested assemblies share their values, so it may be huge."""
+    """Return lines of the tree written out in full. Nested assemblies share their values, so it may be huge."""
     sizes: dict[int, int] = {}
 
     def size(entry: BomEntry) -> int:
@@ -113,7 +113,7 @@ def tree_size(entries: Iterable[BomEntry]) -> int:
 
 
 def check_tree_size(extraction: Extraction, most: int = MOST_LINES) -> None:
-    """Raises InputError where the tree has more lines than anybody could read, or memory could hold."""
+    """Raise InputError if the tree has more lines than anybody could read, or memory could hold."""
     lines = tree_size(extraction.entries)
     if lines > most:
         raise InputError(
@@ -146,7 +146,7 @@ def bom_json(extraction: Extraction, base: str = "") -> dict[str, Any]:
 
 
 def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
-    """Instances of each component in the whole assembly, sub-assemblies included."""
+    """Return instances of each component in the whole assembly, sub-assemblies included."""
     below: dict[int, dict[tuple[str, str], int]] = {}
 
     def subtree(entry: BomEntry) -> dict[tuple[str, str], int]:
@@ -168,14 +168,14 @@ def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
 
 
 def flat_lines(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, int]]:
-    """Each component once, with its instances in the whole assembly."""
+    """Return each component once, with its instances in the whole assembly."""
     direct = tuple(entries)
     bom_entries = {entry.key: entry for entry in walk_entries(direct)}
     return [(bom_entries[key], count) for key, count in flat_counts(direct).items()]
 
 
 def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
-    """Each component once, with its total: what a purchaser orders from.
+    """Return each component once, with its total: what a purchaser orders from.
 
     ``part_number`` and ``name`` as far as they are known, ``quantity`` multiplied down the tree, ``unit``,
     the ``standard`` or the file (``doc_path``, ``object``), and whether it is ``missing``.
@@ -197,7 +197,7 @@ def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
 
 
 def diff_json(diff: BomDiff) -> dict[str, Any]:
-    """A comparison with the server."""
+    """Return a comparison with the server."""
     return {field.name: rows_as_dicts(getattr(diff, field.name)) for field in fields(diff)}
 
 
@@ -205,7 +205,7 @@ _TOLD = ("added", "quantity_changed", "conflicts", "removed", "kept", "manual")
 
 
 def diff_rows(diff: BomDiff) -> Iterator[tuple[str, str, str]]:
-    """Each line that differs or is a person's own: (field of the diff, part number, quantity in words)."""
+    """Yield each line that differs or is a person's own: (field of the diff, part number, quantity in words)."""
     disputed = {change.part_number for change in diff.conflicts}
     for kind in _TOLD:
         for change in getattr(diff, kind):
@@ -234,7 +234,7 @@ _USUAL = {f.name: f.default for f in fields(BomEntry) if f.name in _PLAIN_FIELDS
 
 
 def to_plain(extraction: Extraction) -> dict[str, Any]:
-    """JSON-ready data that :func:`from_plain` makes an equal extraction of."""
+    """Return JSON-ready data that :func:`from_plain` makes an equal extraction of."""
     table = _Table()
     return {
         "format": FORMAT,
@@ -246,7 +246,7 @@ def to_plain(extraction: Extraction) -> dict[str, Any]:
 
 
 def from_plain(data: Mapping[str, Any]) -> Extraction:
-    """The extraction that :func:`to_plain` wrote. Raises InputError for anything else."""
+    """Return the extraction that :func:`to_plain` wrote. Raises InputError for anything else."""
     if data.get("format") != FORMAT:
         raise InputError(f"expected a BOM snapshot of format {FORMAT}, got {data.get('format')!r}")
     try:
@@ -263,7 +263,7 @@ def from_plain(data: Mapping[str, Any]) -> Extraction:
 
 
 def whole_row(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row of the table with all its plain fields, also those that are not written."""
+    """Return a row of the table with all its plain fields, also those that are not written."""
     return {**_USUAL, **row}
 
 
@@ -345,12 +345,12 @@ class LeftOut:
     message: str = ""
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON; only what is set."""
+        """Return plain data for JSON; only what is set."""
         return {key: value for key, value in asdict(self).items() if value}
 
 
 def components_of(entry: BomEntry, base: str) -> list[dict[str, str]]:
-    """The components of a line: what the server remembers it by. ``base``: the assembly's folder.
+    """Return the components of a line: what the server remembers it by. ``base``: the assembly's folder.
 
     Standard parts have no file of their own that could be missing.
     """
@@ -364,7 +364,7 @@ def components_of(entry: BomEntry, base: str) -> list[dict[str, str]]:
 def left_out_of(
     entries: Iterable[BomEntry], unregistered: Iterable[BomEntry], errors: Iterable[Finding], base: str
 ) -> tuple[LeftOut, ...]:
-    """All that a BOM of these direct children leaves out.
+    """Return all that a BOM of these direct children leaves out.
 
     errors
         the findings that block this assembly. Those that missing entries explain are not repeated.
@@ -391,7 +391,7 @@ def remembered(
     entries: Iterable[Mapping[str, Any]],
     kept: Iterable[str],
 ) -> dict[str, list[dict[str, str]]]:
-    """Part number → components, to be kept after a merge.
+    """Return part number → components, to be kept after a merge.
 
     Lines that were kept because a component is missing keep what they were known by, so that the component
     is known again in the next sync.
@@ -408,7 +408,7 @@ def remembered(
 
 
 def in_words(left: Sequence[LeftOut] | Sequence[Mapping[str, Any]]) -> str:
-    """``2 missing, 1 unregistered``; "" for nothing."""
+    """Return ``2 missing, 1 unregistered``; "" for nothing."""
     reasons = Counter(str(out["reason"] if isinstance(out, Mapping) else out.reason) for out in left)
     parts = [f"{reasons.pop(reason)} {reason}" for reason in Reason if reason in reasons]
     return ", ".join([*parts, *(f"{count} {reason}" for reason, count in reasons.items())])

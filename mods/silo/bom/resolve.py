@@ -75,7 +75,7 @@ class Proposal:
 
 
 def is_generic(label: str) -> bool:
-    """True for a label that FreeCAD gave by itself, and for none."""
+    """Return True for a label that FreeCAD gave by itself, and for none."""
     return not label or _GENERIC.match(label) is not None
 
 
@@ -96,7 +96,7 @@ def with_allowed_characters(text: str, instead: str = "\ufffd") -> str:
 
 
 def clean_name(text: str) -> str:
-    """A label as a name for people: no file suffix, no control characters, single spaces."""
+    """Return a label as a name for people: no file suffix, no control characters, single spaces."""
     # A label may be megabytes long, and no more than the beginning of it is used.
     text = _SUFFIX.sub("", unicodedata.normalize("NFC", with_allowed_characters(text[:_MOST_READ], " ")))
     printable = "".join(" " if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c for c in text)
@@ -127,18 +127,18 @@ def glued(text: str) -> str:
 
 
 def name_key(text: str) -> str:
-    """What two names have in common that read as one: cleaned, folded, glued."""
+    """Return what two names have in common that read as one: cleaned, folded, glued."""
     return glued(folded(clean_name(text)))
 
 
 def crowded_files(entries: Iterable[BomEntry]) -> frozenset[str]:
-    """Files that give more than one component of this tree; standard parts need no place in a file."""
+    """Return files that give more than one component of this tree; standard parts need no place in a file."""
     files = Counter(entry.doc_path for entry in walk_entries(entries) if not entry.is_standard)
     return frozenset(path for path, count in files.items() if count > 1)
 
 
 def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
-    """The document's label (spec §2), the object's where that says more, or the file's.
+    """Return the document's label (spec §2), the object's where that says more, or the file's.
 
     FreeCAD makes a document's label from its file's name; only one that a person chose (it differs) stands
     before an object's own label. Where a file gives several components, the object's label decides.
@@ -155,7 +155,8 @@ def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
 
 
 def display_name(entry: BomEntry) -> str:
-    """What to call a component before people: its own label, or its document's where that says nothing.
+    """Return what to call a component before people: its own label, or its document's where that says
+    nothing.
 
     A standard part is called by its designation.
     """
@@ -166,7 +167,7 @@ def display_name(entry: BomEntry) -> str:
 
 
 def propose(entry: BomEntry, categories: Mapping[str, str], *, shares_file: bool = False) -> Proposal:
-    """Type from the document, name from the label, category from the schema."""
+    """Return type from the document, name from the label, category from the schema."""
     name = proposed_name(entry, shares_file=shares_file)
     guess = proposed_category(entry, name, categories)
     return Proposal(
@@ -183,7 +184,7 @@ def propose(entry: BomEntry, categories: Mapping[str, str], *, shares_file: bool
 def propose_all(
     entries: Iterable[BomEntry], tree: Iterable[BomEntry], categories: Mapping[str, str]
 ) -> list[Proposal]:
-    """A proposal for each; ``tree`` is all that the assembly holds, and says which files are shared."""
+    """Return a proposal for each; ``tree`` is all that the assembly holds, and says which files are shared."""
     crowded = crowded_files(tree)
     return [propose(entry, categories, shares_file=entry.doc_path in crowded) for entry in entries]
 
@@ -242,7 +243,7 @@ class CategoryRule:
 
     @classmethod
     def read(cls, raw: object) -> CategoryRule:
-        """From TOML or JSON: ``{words = ["motor", "frame"], category = "M06"}``. InputError."""
+        """Read a rule from TOML or JSON: ``{words = ["motor", "frame"], category = "M06"}``. InputError."""
         if not isinstance(raw, Mapping):
             raise InputError(f"category rule: wanted a table with words and category, got {raw!r}")
         if unknown := sorted(set(raw) - {"category", "words", "without"}):
@@ -253,7 +254,7 @@ class CategoryRule:
         return cls(category, words, _texts(raw, "without"))
 
     def fits(self, words: frozenset[str]) -> bool:
-        """True for the words of a name."""
+        """Return True for the words of a name."""
         return self.words <= words and not self.without & words
 
 
@@ -280,7 +281,7 @@ class Categories(dict[str, str]):
 
 
 def categories_of(schema: Mapping[str, Any]) -> dict[str, str]:
-    """The categories of a schema: ``{"F01": "Screws and Bolts"}``, in the schema's own order.
+    """Return the categories of a schema: ``{"F01": "Screws and Bolts"}``, in the schema's own order.
 
     Accepts ``categories`` or the ``category`` segment's ``values``, each as a mapping code → text or as a
     list of objects or bare codes. An unknown form gives an empty mapping.
@@ -295,7 +296,7 @@ def categories_of(schema: Mapping[str, Any]) -> dict[str, str]:
 
 
 def schema_names(said: Any) -> list[str]:
-    """The names in a list of schemas: objects or bare names, bare or under ``schemas``, or by name."""
+    """Return the names in a list of schemas: objects or bare names, bare or under ``schemas``, or by name."""
     if isinstance(said, Mapping):
         said = said.get("schemas", said.get("items", said.get("data", said)))
     if isinstance(said, Mapping):
@@ -327,7 +328,7 @@ def _read(values: Any) -> Iterator[tuple[str, str]]:
 
 
 def rules_of(schema: Mapping[str, Any]) -> tuple[CategoryRule, ...]:
-    """The site's rules for categories (``category_rules``); a rule that cannot be read is left out.
+    """Return the site's rules for categories (``category_rules``); a rule that cannot be read is left out.
 
     They only propose, so that a server with other rules, or none, costs a question and no more.
     """
@@ -352,7 +353,7 @@ class Guess:
 
 
 def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str]) -> Guess:
-    """The category that fits best; the code is "" where there is none to choose from.
+    """Return the category that fits best; the code is "" if there is none to choose from.
 
     categories
         code → description, in the schema's order; :class:`Categories` brings rules along.
@@ -399,7 +400,7 @@ def standard_kind(designation: str) -> str:
 
 
 def _standard_category(designation: str, fitting: Mapping[str, str], categories: Mapping[str, str]) -> Guess:
-    """By the site's rules, else the one category of the kind, else one for standard parts of any kind."""
+    """Guess by the site's rules, else the one category of the kind, else one for standard parts of any kind."""
     kind = standard_kind(designation)
     for named in filter(None, (kind, _ALSO.get(kind))):
         words = frozenset(stems(f"{designation} {named}"))
@@ -419,7 +420,7 @@ def _standard_category(designation: str, fitting: Mapping[str, str], categories:
 
 
 def assembly_categories(categories: Mapping[str, str]) -> frozenset[str]:
-    """The codes that are for assemblies: by their names, or because most of their group are.
+    """Return the codes that are for assemblies: by their names, or because most of their group are.
 
     A group is what begins with the same letter: "Top-level product" stands among the assemblies.
     """
@@ -432,7 +433,7 @@ def assembly_categories(categories: Mapping[str, str]) -> frozenset[str]:
 
 
 def _score(name: list[str], category: list[str]) -> float:
-    """How well a name fits a category: its last word counts, the others say what it is for."""
+    """Return how well a name fits a category: its last word counts, the others say what it is for."""
     if not name:
         return 0.0
     common = len(set(name) & set(category)) / len(set(name))
@@ -465,7 +466,7 @@ _UUID_KEYS = ("id", "uuid", "silo_uuid")
 
 
 def look_up(uuids: Iterable[str], api_client: ItemLookup) -> Known:
-    """The items of these UUIDs, each asked for once; None (or absent) where the server has none."""
+    """Return the items of these UUIDs, each asked for once; None (or absent) where the server has none."""
     wanted = list(dict.fromkeys(uuids))
     batch = getattr(api_client, "get_items_by_uuid", None)
     if callable(batch) and wanted:
@@ -496,7 +497,7 @@ def resolve_part_numbers(
 
 
 def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEntry], list[BomEntry]]:
-    """:func:`resolve_part_numbers` against items fetched before; pure."""
+    """Return :func:`resolve_part_numbers` against items fetched before; pure."""
     missing: dict[tuple[str, str], BomEntry] = {}
     done: dict[int, tuple[BomEntry, bool]] = {}
 
@@ -533,7 +534,7 @@ def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEnt
 
 
 def numbered_findings(findings: Iterable[Finding], items: Known) -> tuple[Finding, ...]:
-    """The findings, those about an identity with the part number that people know it by."""
+    """Return the findings, those about an identity with the part number that people know it by."""
     numbers = {
         uuid: str(item["part_number"]) for uuid, item in items.items() if item and item.get("part_number")
     }
@@ -553,7 +554,7 @@ def _numbered(message: str, numbers: Mapping[str, str]) -> str:
 
 
 def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
-    """Entries of one parent with one part number become one line with the summed quantity.
+    """Return entries of one parent with one part number become one line with the summed quantity.
 
     Entries without a number stay apart.
     """
@@ -579,7 +580,7 @@ def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
 
 
 def consolidation_message(entry: BomEntry) -> str:
-    """The spec's console warning (§6), with the count of individual links."""
+    """Return the spec's console warning (§6), with the count of individual links."""
     who = entry.part_number or display_name(entry) or entry.object_name or entry.doc_path
     count = entry.individual_links
     if count:
@@ -595,7 +596,9 @@ _ADVICE = ". Consider using a link array (ElementCount) for cleaner assembly man
 
 
 def one_hint_each(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings with one consolidation warning for each BOM, in the place of one for each of its parts."""
+    """Return the findings with one consolidation warning for each BOM, in the place of one for each of its
+    parts.
+    """
     hints: dict[object, list[Finding]] = {}
     for finding in findings:
         hints.setdefault(
@@ -610,7 +613,7 @@ def _several_hints(hints: Sequence[Finding]) -> Finding:
 
 
 def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
-    """The consolidation warnings of a tree: of each assembly once, those of the top first.
+    """Return the consolidation warnings of a tree: of each assembly once, those of the top first.
 
     ``where`` names the component and, below the top, the assembly that links it several times.
     """
@@ -631,7 +634,7 @@ def _consolidation(entry: BomEntry, assembly: BomEntry | None = None) -> Finding
 
 
 def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]:
-    """Components without a Silo part number: left out of the BOM, never in silence."""
+    """Return components without a Silo part number: left out of the BOM, never in silence."""
     return tuple(
         Finding(
             FindingCode.UNREGISTERED,

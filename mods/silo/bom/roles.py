@@ -130,7 +130,7 @@ class Reader:
         self._eaten: dict[str, dict[Key, Any]] = {}
 
     def contents(self, container: Any) -> Contents:
-        """What an assembly holds; read once however often it is used."""
+        """Return what an assembly holds; read once however often it is used."""
         key = self.key(container)
         if key not in self._known:
             self.notes.reading = key[0]
@@ -142,18 +142,18 @@ class Reader:
         return self._known[key]
 
     def brings(self, obj: Any) -> list[Any]:
-        """The components that one object shows, each once; no own parts."""
+        """Return the components that one object shows, each once; no own parts."""
         try:
             return Reading(self, obj).brought_by(obj)
         except DocumentError:
             return []
 
     def resolve(self, link: Any) -> Target:
-        """The end of a link."""
+        """Return the end of a link."""
         return resolve_target(link, self._inspect)
 
     def eaten(self, document: Any, features: Iterable[Any]) -> dict[Key, Any]:
-        """What the features of a document consume: key → the feature.
+        """Return what the features of a document consume: key → the feature.
 
         features
             of a document that does not say which objects it has.
@@ -165,13 +165,14 @@ class Reader:
         return self._eaten[path]
 
     def no_component(self, key: Key, target: Any) -> str:
-        """What the target is instead of a component; "" where it may be one."""
+        """Return what the target is instead of a component; "" if it may be one."""
         if key not in self._not_components:
             self._not_components[key] = no_component(target)
         return self._not_components[key]
 
     def standard(self, obj: Any, key: Key | None = None) -> tuple[str, bool]:
-        """The designation of a standard part, "" for anything else; and whether it is an item of its own.
+        """Return the designation of a standard part, "" for anything else; and whether it is an item of its
+        own.
 
         It is where somebody registered that very object. What identifies the document it lies in is that of
         the part beside it, except where there is none.
@@ -184,7 +185,7 @@ class Reader:
         return result
 
     def component(self, obj: Any) -> Key:
-        """What identifies a component: of standard parts their designation, of others the key."""
+        """Return what identifies a component: of standard parts their designation, of others the key."""
         key = self.key(obj)
         text, registered = self.standard(obj, key)
         return (STANDARD_PARTS, text) if text and not registered else key
@@ -231,7 +232,7 @@ class Reading:
         self._rings: list[dict[Key, Any]] = []
 
     def contents(self, container: Any) -> Contents:
-        """The contents of an assembly."""
+        """Return the contents of an assembly."""
         top, kind = self._key(container), kind_of(container)
         if kind in REPEATERS:
             node = self._node(top, container, kind)
@@ -270,7 +271,9 @@ class Reading:
         return Contents(counts, mine, self._roles, holds, is_part, self._hidden, tree)
 
     def _is_one_part(self, counts: list[Count]) -> bool:
-        """True for a file whose one component is its own only part: it is that part, no assembly of it."""
+        """Return True for a file whose one component is its own only part: it is that part, no assembly of
+        it.
+        """
         only = counts[0] if len(counts) == 1 else None
         return (
             only is not None
@@ -280,7 +283,7 @@ class Reading:
         )
 
     def brought_by(self, obj: Any) -> list[Any]:
-        """The components that one object of the document shows."""
+        """Return the components that one object of the document shows."""
         node = self._node(self._key(obj), obj, kind_of(obj))
         return [count.target for count in self._split([(node, 1)])[0]] if node is not None else []
 
@@ -294,16 +297,18 @@ class Reading:
         return tree
 
     def _is_closed(self, obj: Any, kind: Kind) -> bool:
-        """True for an inline container that a person declared a component of its own."""
+        """Return True for an inline container that a person declared a component of its own."""
         return kind in DECLARABLE and self._is_declared(obj)
 
     def _is_declared(self, obj: Any) -> bool:
-        """True for an object with an identity of its own."""
+        """Return True for an object with an identity of its own."""
         identity = own_identity(obj)
         return bool(identity) and identity is not None and identity.lower() != self._identity
 
     def _is_mine(self, target: Any) -> bool:
-        """True for an object of this file; FreeCAD makes two documents of one that it opened by two paths."""
+        """Return True for an object of this file; FreeCAD makes two documents of one that it opened by two
+        paths.
+        """
         if isinstance(target, Lost):
             return False
         document = target.Document
@@ -317,13 +322,13 @@ class Reading:
         return is_mine[1]
 
     def _is_own(self, target: Any) -> bool:
-        """True for geometry of this file that nobody declared."""
+        """Return True for geometry of this file that nobody declared."""
         if not self._is_mine(target) or self._is_declared(target):
             return False
         return not self._reader.standard(target)[0]
 
     def _find_wholes(self, tree: Tree, container: Any) -> None:
-        """Parts that hold nothing but geometry: each is one own part, not piece by piece."""
+        """Find parts that hold nothing but geometry: each is one own part, not piece by piece."""
         mixed, full = set[Key](), set[Key]()
         for name, (obj, kind) in tree.members.items():
             if kind in _GEOMETRY and not self._is_declared(obj) and self._is_geometry(obj, kind):
@@ -346,7 +351,7 @@ class Reading:
                 self._wholes.add(name)
 
     def _is_geometry(self, obj: Any, kind: Kind, depth: int = 0) -> bool:
-        """True if an object shows geometry only."""
+        """Return True if an object shows geometry only."""
         if kind not in REPEATERS:
             return kind is Kind.LOCAL
         return depth < _MAX_NESTING and all(
@@ -354,7 +359,7 @@ class Reading:
         )
 
     def _find_repeated(self, tree: Tree) -> None:
-        """What arrays and compounds show never counts where it lies; nor do elements of link arrays."""
+        """Find what arrays and compounds show: it never counts where it lies, nor do elements of link arrays."""
         has_elements = any(kind is Kind.ELEMENT for _, kind in tree.members.values())
         for name, (obj, kind) in tree.members.items():
             if kind is Kind.LINK and has_elements:
@@ -365,7 +370,7 @@ class Reading:
                 covered.update(map(self._key, sources(obj)))
 
     def shown_by(self, objects: list[tuple[Any, Kind]]) -> set[Key]:
-        """The objects of the document that these show, directly or not."""
+        """Return the objects of the document that these show, directly or not."""
         keys: set[Key] = set()
         while objects:
             for show in self._shows(*objects.pop()):
@@ -393,7 +398,7 @@ class Reading:
         return [linked, first_of(own(obj, "LinkCopyOnChangeSource"))]
 
     def _leaves(self, tree: Tree) -> list[tuple[Contribution, int]]:
-        """What counts in a container, and how often; and the role of each object that lies in it."""
+        """Return what counts in a container, and how often; and the role of each object that lies in it."""
         leaves: list[tuple[Contribution, int]] = []
         for name, (obj, kind) in tree.members.items():
             try:
@@ -434,7 +439,7 @@ class Reading:
         return self._unconsumed(tree, name, node)
 
     def _report_left_out(self, obj: Any, kind: Kind) -> None:
-        """What goes with its container needs no word of its own, nor does what is nothing to buy."""
+        """Report what is left out by itself; not what goes with its container, nor what nobody buys."""
         if kind in _COUNTABLE or kind in INLINE or kind in DECLARABLE:
             self._is_left_out(obj)
             self._holds_components |= kind is Kind.DRAFT_ARRAY or kind in COMPONENTS
@@ -442,7 +447,7 @@ class Reading:
     def _unconsumed(
         self, tree: Tree, name: Key, node: Contribution
     ) -> tuple[ObjectRole, Contribution | None]:
-        """Without standard parts and geometry that a feature consumes; a part of another file stays."""
+        """Leave out standard parts and geometry that a feature consumes; a part of another file stays."""
         if all(key[0] != STANDARD_PARTS and key[0] != self._path for key in node.worth):
             return ObjectRole.COMPONENT, node
         if len(tree.members) < 2 and not self._is_hardware(node):  # to ask every feature takes long
@@ -470,7 +475,7 @@ class Reading:
     def _without_hidden_geometry(
         self, tree: Tree, leaves: list[tuple[Contribution, int]]
     ) -> list[tuple[Contribution, int]]:
-        """Of geometry modelled in the file only what is visible is shown, except where nothing else is."""
+        """Drop hidden geometry modelled in the file, unless there is nothing else."""
 
         hidden = set()
         for node, _ in leaves:
@@ -487,7 +492,7 @@ class Reading:
     def _split(
         self, leaves: Iterable[tuple[Contribution, int]], *, beside: bool = False
     ) -> tuple[list[Count], list[Count]]:
-        """The components, and the parts of this file that are no items yet."""
+        """Return the components, and the parts of this file that are no items yet."""
         counts: list[Count] = []
         mine: list[Count] = []
         for node, times in leaves:
@@ -499,7 +504,7 @@ class Reading:
         return counts, mine
 
     def _report_rings(self) -> None:
-        """Links that lead back to what holds them block, except where they bring nothing anyway."""
+        """Report links that lead back to what holds them, unless they bring nothing anyway."""
         for ring in self._rings:
             links = [obj for obj in ring.values() if is_link(obj)]
             if not links or any(key in self._nodes and self._nodes[key].worth for key in ring):
@@ -512,7 +517,8 @@ class Reading:
     # --- what each of them brings ---
 
     def _node(self, key: Key, obj: Any, kind: Kind) -> Contribution | None:
-        """What one object brings; each is looked at once, so groups of groups cost no more than they hold.
+        """Return what one object brings; each is looked at once, so groups of groups cost no more than they
+        hold.
 
         None for a ring, for what is nested too deep, and for what is damaged.
         """
@@ -574,7 +580,7 @@ class Reading:
         return {self._reader.component(fastener): (fastener, 1)}
 
     def _imported(self, key: Key, obj: Any) -> CountedObjects:
-        """What A2plus imported is the part in the file that it came from."""
+        """Return, for a part that A2plus imported, the part in the file that it came from."""
         file = own(obj, "sourceFile")
         is_file = isinstance(file, str) and file.lower().endswith(".fcstd")
         ask = getattr(obj.Document, "imported", None) if is_file else None
@@ -613,7 +619,7 @@ class Reading:
         return Contribution(key, obj, kind, self._sum(below), tuple(below))
 
     def _is_left_out(self, obj: Any) -> bool:
-        """True for an object that is left out; says so."""
+        """Return True for an object that is left out; says so."""
         mark = left_out_by(obj)
         if mark == "Suppressed":
             self._notes.add(FindingCode.SUPPRESSED, obj)
@@ -646,7 +652,7 @@ class Reading:
 
     @staticmethod
     def _lost_by(link: Any, target: Target) -> CountedObjects:
-        """A broken link counts like any other where it says what it stood for; else its finding must do."""
+        """Return what a broken link stood for, if it says so; else its finding must do."""
         problem = target.problem
         if problem is None or not problem.file or problem.code in _NO_COMPONENT_LOST or not target.instances:
             return {}
@@ -684,7 +690,7 @@ class Reading:
         return Contribution(key, link, kind, worth, tuple(below))
 
     def _in_document(self, key: Key, link: Any, kind: Kind, target: Target) -> Contribution:
-        """A link within the file brings what its target brings, which may be nothing."""
+        """Return a link within the file brings what its target brings, which may be nothing."""
         obj = target.obj
         node = self._node(self._key(obj), obj, kind_of(obj))
         below = ((node, target.instances),) if node is not None and node.worth else ()

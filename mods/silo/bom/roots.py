@@ -57,7 +57,7 @@ _SPARES = ("Parts", "Source_shapes")
 
 
 def as_it_is(document: Any) -> Any:
-    """A document that is there with all its objects."""
+    """Return a document that is there with all its objects."""
     return document
 
 
@@ -79,37 +79,41 @@ class _Lying:
         self._holders, self._above, self._inner = kept["lying"]
 
     def around(self, name: str) -> Iterator[tuple[Any, Kind]]:
-        """All containers and folders around an object, at any distance, the nearest first."""
+        """Return all containers and folders around an object, at any distance, the nearest first."""
         return (
             self._holders[upper] for upper in climbed(name, lambda each_name: self._above.get(each_name, ()))
         )
 
     def is_inner(self, name: str) -> bool:
-        """True for what lies in a container, also through folders, and for the copies that one made."""
+        """Return True for what lies in a container, also through folders, and for the copies that one made."""
         if name not in self._inner:
             self._inner[name] = any(kind in _CONTAINERS for _, kind in self.around(name))
         return self._inner[name]
 
     def is_spare(self, obj: Any) -> bool:
-        """True for what a folder keeps for later; of visible standard parts only Assembly4's folders do."""
+        """Return True for what a folder keeps for later; of visible standard parts only Assembly4's folders
+        do.
+        """
         around = {object_name(each_obj).rstrip("0123456789") for each_obj, _ in self.around(object_name(obj))}
         bought = kind_of(obj) is Kind.STANDARD and self.is_visible(obj)
         return bool(around.intersection(_SPARES) if bought else around)
 
     def is_visible(self, obj: Any) -> bool:
-        """True for what is visible itself and lies in visible containers."""
+        """Return True for what is visible itself and lies in visible containers."""
         return all(
             is_switched_on(each_obj)
             for each_obj in (obj, *(outer for outer, _ in self.around(object_name(obj))))
         )
 
     def loose(self, kinds: frozenset[Kind]) -> list[Any]:
-        """The objects of these kinds that lie in no container."""
+        """Return the objects of these kinds that lie in no container."""
         return [obj for obj, _ in self.survey.of(kinds) if not self.is_inner(object_name(obj))]
 
 
 def _holders(survey: Survey) -> tuple[dict[str, tuple[Any, Kind]], dict[str, tuple[str, ...]]]:
-    """The containers and folders of a document by name; and what lists an object, by the object's name."""
+    """Return the containers and folders of a document by name; and what lists an object, by the object's
+    name.
+    """
     holders: dict[str, tuple[Any, Kind]] = {}
     above: dict[str, tuple[str, ...]] = {}
     for obj, kind in survey.of(_CONTAINERS | {Kind.FOLDER}):
@@ -136,7 +140,7 @@ def _rank(obj: Any, reader: Reader) -> int | None:
 
 
 def _holds(container: Any, reader: Reader) -> int:
-    """2 for components of other files, 1 for standard or declared parts only, 0 for neither."""
+    """Return 2 for components of other files, 1 for standard or declared parts only, 0 for neither."""
     hardware, shows_others = False, False
     for obj in climbed(
         container, lambda each_obj: members(each_obj) if each_obj is container or _is_walked(each_obj) else ()
@@ -161,12 +165,14 @@ def _is_walked(obj: Any) -> bool:
 
 
 def _is_far(target: Any, container: Any) -> bool:
-    """True for a component of another file, also for one that is missing there."""
+    """Return True for a component of another file, also for one that is missing there."""
     return isinstance(target, Lost) or not same_document(target.Document, container.Document)
 
 
 def find_assemblies(document: Any) -> list[Any]:
-    """The top-level containers of a document, the likeliest assembly first (document order within a rank)."""
+    """Return the top-level containers of a document, the likeliest assembly first (document order within a
+    rank).
+    """
     return [obj for _, obj in _candidates(_Lying(survey_of(document)))]
 
 
@@ -194,7 +200,7 @@ def silent_reader(
     inspect: Inspect | None = None,
     whole: Whole = as_it_is,
 ) -> Reader:
-    """For a look at documents whose findings nobody needs twice.
+    """Return a reader that records no findings.
 
     counts_beside
         visible standard parts beside the one assembly of a file count with it.
@@ -207,7 +213,7 @@ def silent_reader(
 
 
 def choose_assembly(document: Any, name: str | None = None) -> Any:
-    """The assembly of a document.
+    """Return the assembly of a document.
 
     name
         ``Name`` or ``Label`` of the wanted one, where a document holds several.
@@ -226,7 +232,7 @@ def choose_assembly(document: Any, name: str | None = None) -> Any:
 
 
 def _likely(candidates: _Candidates) -> list[Any]:
-    """The containers that may be the assembly: real assemblies, and parts that hold components."""
+    """Return the containers that may be the assembly: real assemblies, and parts that hold components."""
     if not candidates or candidates[0][0][0] > _HOLDS_NOTHING - 2:
         return []
     reader = silent_reader()
@@ -235,7 +241,7 @@ def _likely(candidates: _Candidates) -> list[Any]:
 
 
 def _root_or_part(document: Any, lying: _Lying, candidates: _Candidates) -> Any:
-    """The one part of a file that has nothing else to count, or the document with all that lies in it."""
+    """Return the one part of a file that has nothing else to count, or the document with all that lies in it."""
     best = [obj for standing, obj in candidates if standing == candidates[0][0]]
     loose = lying.loose(_LOOSE)
     bodies = _loose_bodies(lying)
@@ -268,7 +274,9 @@ def _named(document: Any, name: str) -> Any:
 
 
 def _loose_bodies(lying: _Lying) -> list[Any]:
-    """The geometry that lies in no container, no Body and no feature; of that the visible, where any is."""
+    """Return the geometry that lies in no container, no Body and no feature; of that the visible, where any
+    is.
+    """
     loose = lying.loose(_LOCAL)
     if len(loose) > 1:  # to ask every feature costs more than all the rest
         inner = lying.survey.grouped(_LOCAL)
@@ -280,7 +288,8 @@ def _loose_bodies(lying: _Lying) -> list[Any]:
 
 
 def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> list[Any]:
-    """Visible standard parts beside an assembly, which can only belong to it: it is the one of its file.
+    """Return visible standard parts beside an assembly, which can only belong to it: it is the one of its
+    file.
 
     What other objects of the document show are sources, what a feature consumes are operands, and what lies
     in Assembly4's folders are spares.
@@ -302,7 +311,7 @@ def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> l
 def _roles_beside(
     top: Any, reader: Reader, lying: _Lying, objects: Iterable[Any], roles: Mapping[str, ObjectRole | None]
 ) -> Iterator[tuple[Any, ObjectRole]]:
-    """The role of each of some objects that lie in no container, for the assembly ``top``."""
+    """Yield the role of each of some objects that lie in no container, for the assembly ``top``."""
     survey = lying.survey
     shown = {name for _, name in Reading(reader, top).shown_by(survey.of(SHOWING))}
     eaten = consumed([obj for obj, _ in survey.of(_LOCAL)], object_name)
@@ -325,7 +334,7 @@ def _roles_beside(
 
 
 def beside(top: Any, fates: Mapping[str, ObjectRole | None]) -> list[Any]:
-    """What lies in the document of ``top``, but in no container and no folder, and holds components.
+    """Return what lies in the document of ``top``, but in no container and no folder, and holds components.
 
     It is not counted, and nobody may have noticed. Another assembly has a BOM of its own.
     """
@@ -339,8 +348,9 @@ def beside(top: Any, fates: Mapping[str, ObjectRole | None]) -> list[Any]:
 
 
 def seen_beside(top: Any, reader: Reader) -> list[Any]:
-    """What FreeCAD shows of the document of ``top``, but no part of it: geometry too, which holds no
-    component."""
+    """Return what FreeCAD shows of the document of ``top``, but no part of it: geometry too, which holds no
+    component.
+    """
     lying = _Lying(survey_of(top.Document))
     mine = {object_name(top), *(object_name(obj) for obj, _ in lying.around(object_name(top)))}
     loose = [
@@ -353,7 +363,8 @@ def seen_beside(top: Any, reader: Reader) -> list[Any]:
 
 
 def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, ObjectRole | None]:
-    """The role of each object with a shape, a link or a fastener's properties, for the assembly ``top``.
+    """Return the role of each object with a shape, a link or a fastener's properties, for the assembly
+    ``top``.
 
     None breaks the law: a container of the assembly holds the object, and the count does not know it.
 
@@ -386,7 +397,7 @@ def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, ObjectRole 
 
 
 def _inside(lying: _Lying, name: str, roles: Mapping[str, ObjectRole | None]) -> ObjectRole | None:
-    """The role of what lies in a container and is no member of the assembly."""
+    """Return the role of what lies in a container and is no member of the assembly."""
     around = list(lying.around(name))
     if any(is_assembly3(obj) for obj, _ in around):  # its elements and constraints
         return ObjectRole.CONSTRUCTION

@@ -64,17 +64,19 @@ _INCHES = re.compile(r"(?:(\d+)[ -])?(?:(\d+)/(\d+)|(\d+(?:\.\d+)?)) ?in")
 
 @lru_cache(maxsize=4096)
 def standard_uuid(designation: str) -> str:
-    """The identity of the article with this designation, the same in every project."""
+    """Return the identity of the article with this designation, the same in every project."""
     return str(uuid.uuid5(NAMESPACE, designation))
 
 
 def is_tool(designated_type: str) -> bool:
-    """True for taps and dies: they cut threads and are no parts."""
+    """Return True for taps and dies: they cut threads and are no parts."""
     return designated_type.startswith(_TOOLS)
 
 
 def fastener_type(obj: Any) -> str:
-    """The type of a fastener (``ISO4762``, ``ScrewTap``, …) as it is called today; "" for anything else."""
+    """Return the type of a fastener (``ISO4762``, ``ScrewTap``, …) as it is called today; "" for anything
+    else.
+    """
     if not (derived(obj, _TYPES[0]) or derived(obj, _TYPES[1])):
         return ""
     diameter = _property(obj, "Diameter")
@@ -95,7 +97,7 @@ def _is_known(kind: str) -> bool:
 
 
 def _type_of_old(obj: Any) -> str:
-    """What an object without a type is, by its class or, where no add-on is there, by what it has."""
+    """Return what an object without a type is, by its class or, where no add-on is there, by what it has."""
     module, name = _class_of(obj)
     if module in _MODULES and name in _CLASSES:
         return _CLASSES[name]
@@ -122,7 +124,9 @@ def _class_of(obj: Any) -> tuple[str, str]:
 
 
 def designation(obj: Any) -> str:
-    """The designation of a fastener in trade form, such as "ISO 4762 M4×16"; "" for tools and all others."""
+    """Return the designation of a fastener in trade form, such as "ISO 4762 M4×16"; "" for tools and all
+    others.
+    """
     kind = fastener_type(obj)
     if not kind or is_tool(kind):
         return ""
@@ -145,7 +149,7 @@ _MAKING = (
 
 
 def designated(kind: str, properties: Mapping[str, Any]) -> str:
-    """The designation of a type with these properties (names of today; lengths in mm)."""
+    """Return the designation of a type with these properties (names of today; lengths in mm)."""
     kind = _RENAMED.get(kind, kind)
     inches = kind.startswith("ASME") or kind.endswith("Inch")
     get = properties.get
@@ -183,7 +187,7 @@ def _standard_name(kind: str) -> str:
 
 
 def _property(obj: Any, name: str) -> Any:
-    """A property in either spelling; None where the object has neither."""
+    """Return a property in either spelling; None if the object has neither."""
     names = property_names(obj)
     if names is not None:
         spelt = _spelling(names).get(name)
@@ -195,7 +199,7 @@ def _property(obj: Any, name: str) -> Any:
 # Thousands of screws have the same few lists of properties.
 @lru_cache(maxsize=1024)
 def _spelling(names: frozenset[str] | tuple[str, ...]) -> dict[str, str]:
-    """How an object with these properties spells those of a fastener: name of today → its own."""
+    """Return how an object with these properties spells those of a fastener: name of today → its own."""
     listed = frozenset(names)
     result = {}
     for name in ("Type", *_MAKING, *_TRAITS):
@@ -207,7 +211,7 @@ def _spelling(names: frozenset[str] | tuple[str, ...]) -> dict[str, str]:
 
 
 def _size(value: Any) -> str:
-    """A size as text: no brackets of not preferred ones, no zeros at the end, inches written "in"."""
+    """Return a size as text: no brackets of not preferred ones, no zeros at the end, inches written "in"."""
     if value is None:
         return ""
     if not isinstance(value, str):
@@ -219,7 +223,9 @@ def _size(value: Any) -> str:
 
 
 def _length(value: Any, inches: bool) -> str:
-    """A length as text; of inch sizes in inches where it is a fraction of them, otherwise with its unit."""
+    """Return a length as text; of inch sizes in inches where it is a fraction of them, otherwise with its
+    unit.
+    """
     text = _size(value)
     if not inches or not text:
         return text
@@ -242,7 +248,7 @@ def _fraction(length: Fraction) -> str:
 
 
 def millimetres(value: Any) -> float | None:
-    """A number; of a quantity of FreeCAD its value, which is in mm."""
+    """Return a number; of a quantity of FreeCAD its value, which is in mm."""
     value = getattr(value, "Value", value)
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
@@ -257,7 +263,7 @@ def _is_above(value: Any, least: float = 0) -> bool:
 
 
 def same_articles(designations: Iterable[str]) -> list[tuple[str, str]]:
-    """Pairs of designations that are one article under two standards, such as DIN 934 and ISO 4032."""
+    """Return pairs of designations that are one article under two standards, such as DIN 934 and ISO 4032."""
     unique = set(designations)
     pairs = []
     for old in sorted(unique):

@@ -97,17 +97,17 @@ class _Hop:
 
 
 def is_link(obj: object) -> bool:
-    """An ``App::Link`` (or ``App::LinkPython``); elements of arrays and groups are none."""
+    """Return an ``App::Link`` (or ``App::LinkPython``); elements of arrays and groups are none."""
     return derived(obj, "App::Link")
 
 
 def is_assembly_link(obj: object) -> bool:
-    """An instance of an assembly (FreeCAD >= 1.0); derived from App::Part, so ask this first."""
+    """Return an instance of an assembly (FreeCAD >= 1.0); derived from App::Part, so ask this first."""
     return derived(obj, "Assembly::AssemblyLink")
 
 
 def is_excluded(obj: object) -> bool:
-    """True where the object itself is marked as no part of any BOM."""
+    """Return True if the object itself is marked as no part of any BOM."""
     return own(obj, "SiloBomExclude") is True
 
 
@@ -127,7 +127,7 @@ def _negative(vector: Any) -> bool:
 
 
 def is_mirrored(link: object, index: int | None = None) -> bool:
-    """True for a negative scale: an odd number of negative axes makes the other hand of a part.
+    """Return True for a negative scale: an odd number of negative axes makes the other hand of a part.
 
     index
         of one element of an array; else any mirrored element decides.
@@ -165,7 +165,7 @@ def resolve_target(link: object, inspect: Inspect | None = None) -> Target:
 
 
 def _is_elsewhere(target: Any, link: Any) -> bool:
-    """True for an object of another file, and for the assembly that was asked for."""
+    """Return True for an object of another file, and for the assembly that was asked for."""
     return target is link or not same_document(target.Document, link.Document)
 
 
@@ -200,7 +200,7 @@ def _resolve(link: object, trail: _Trail) -> Target:
 
 
 def _next_hop(link: Any, trail: _Trail) -> tuple[_Hop, Any]:
-    """Where a link leads, and the changed copy of that which it shows instead."""
+    """Return where a link leads, and the changed copy of that which it shows instead."""
     linked = getattr(link, "LinkedObject", None)
     source, copy = first_of(own(link, "LinkCopyOnChangeSource")), first_of(linked)
     if source is not None:
@@ -275,7 +275,7 @@ def _follow_sub(start: Any, sub: Any, trail: _Trail) -> _Hop:
 
 
 def _child(parent: Any, name: str, trail: _Trail) -> _Hop:
-    """The object ``name`` below ``parent``, as FreeCAD's ``getSubObject`` finds it."""
+    """Return the object ``name`` below ``parent``, as FreeCAD's ``getSubObject`` finds it."""
     child = _member(parent, name)
     if child is not None:
         return _Hop(child)
@@ -318,7 +318,7 @@ def _member(holder: Any, name: str) -> Any:
 
 
 def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tuple[list[str], list[str]]:
-    """Labels of what the copies still show though it is gone, and of what they lack; sorted.
+    """Return labels of what the copies still show though it is gone, and of what they lack; sorted.
 
     link
         the AssemblyLink.
@@ -351,7 +351,8 @@ def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tu
 
 
 def own_parts(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> list[Any]:
-    """What somebody put into a flexible AssemblyLink himself: standard parts, and links that are no copies.
+    """Return what somebody put into a flexible AssemblyLink himself: standard parts, and links that are no
+    copies.
 
     A copy leads to an object of the assembly's file, most often a link. A link array of FreeCAD 1.1 leads to
     the part itself, so an array is taken for a copy.

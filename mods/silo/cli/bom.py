@@ -147,7 +147,7 @@ def _exit_of(extraction: Extraction, args: argparse.Namespace) -> int:
 
 
 def _show_each(args: argparse.Namespace) -> int:
-    """Each assembly of a file; of a folder with its own lines, children first. 1 where one is not whole."""
+    """Show each assembly of a file; of a folder with its own lines, children first. 1 where one is not whole."""
     if args.flat or args.resolve or args.csv or args.xlsx:
         raise InputError("--flat, --resolve, --csv and --xlsx are for one assembly; name its file.")
     from silo.cli import show
@@ -223,7 +223,7 @@ def _write_xlsx(path: str, rows: list[list[str | int]]) -> None:
 
 
 def _verify(args: argparse.Namespace) -> int:
-    """The geometry as witness: the BOM as live FreeCAD has it, against the solids shown.
+    """Return the geometry as witness: the BOM as live FreeCAD has it, against the solids shown.
 
     Asked is a FreeCAD that can open all files of the assembly, each with the version that saved it.
     """
@@ -263,7 +263,7 @@ def _verify(args: argparse.Namespace) -> int:
 
 
 def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> BomEntry:
-    """The entry with all its children again, those without a part number too."""
+    """Return the entry with all its children again, those without a part number too."""
     entries = (*entry.children, *(unresolved.get(child.key, child) for child in entry.unregistered))
     children = (
         replace(_whole(bom_entry, unresolved), quantity=child.quantity, level=child.level)
@@ -329,7 +329,7 @@ def run_where_used(args: argparse.Namespace) -> int:
 
 
 def _above(part: str, users: Mapping[str, set[str]]) -> set[str]:
-    """All files that use one, directly or not."""
+    """Return all files that use one, directly or not."""
     result: set[str] = set()
     left = [part]
     while left:
@@ -409,7 +409,7 @@ def _closed(path: str) -> None:
 
 
 def _documents(top: str) -> list[str]:
-    """The files of the tree, as far as they can be read."""
+    """Return the files of the tree, as far as they can be read."""
     try:
         extraction = common.read_assembly(top)
     except SiloError:  # such as no assembly in the file: its own links can be mended anyway
@@ -467,7 +467,7 @@ def run_diff(args: argparse.Namespace) -> int:
 
 
 def _folder_diff(args: argparse.Namespace) -> int:
-    """Every assembly of a folder against the server; only those that differ are shown."""
+    """Show every assembly of a folder against the server; only those that differ."""
     from silo.batch import Summary, SyncOptions, is_news
     from silo.bom_sync import blocking
     from silo.cli import show
@@ -599,7 +599,7 @@ def run_bom_diff(args: argparse.Namespace) -> int:
 
 
 def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
-    """What is to be compared. Raises InputError."""
+    """Return what is to be compared. Raises InputError."""
     from silo.vault.plan import read_folder
 
     if args.git is None:
@@ -618,7 +618,7 @@ def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
     with scratch_folder("silo-bom-diff-") as scratch:
 
         def state(name: str, revision: str | None) -> tuple[Path, list[tuple[str, str]]]:
-            """The whole repository as it was: the folder may use what lies beside it."""
+            """Return the whole repository as it was: the folder may use what lies beside it."""
             folder = Path(top) if revision is None else Path(scratch, name)
             return folder, [] if revision is None else lay_out(top, revision, folder, laid)
 
@@ -652,7 +652,7 @@ def _quantities(line: LineChange) -> str:
 
 
 def _where(line: LineChange, change: AssemblyChange) -> str:
-    """The file, and the object if the assembly has another one of it."""
+    """Return the file, and the object if the assembly has another one of it."""
     heads = [
         bom_entry for state in (change.old, change.new) if state for bom_entry in (state.head, *state.lines)
     ]

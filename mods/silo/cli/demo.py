@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
 @contextmanager
 def _private_data(folder: Path) -> Iterator[None]:
-    """The journal of registrations of the demo is not the user's."""
+    """Keep the demo's registrations out of the user's journal."""
     before = os.environ.get("SILO_HOME")
     os.environ["SILO_HOME"] = str(folder)
     try:
@@ -103,7 +103,7 @@ def _demo(folder: Path, port: int) -> Iterator[Demo]:
 
 @contextmanager
 def _merge_events(client: SiloClient) -> Iterator[queue.Queue[MergeEvent]]:
-    """The merges that the server announces, as they come."""
+    """Yield the merges that the server announces, as they come."""
     from silo.api.events import EventListener
 
     merges: queue.Queue[MergeEvent] = queue.Queue()
@@ -131,7 +131,7 @@ class Demo:
         self.out.rule(f"[bold]{self.step}  {spoken(text)}", align="left")
 
     def play(self) -> None:
-        """All steps."""
+        """Play all steps."""
         self.out.print(f"Silo server on {self.client.base_url}, database in a temporary folder.")
         extraction = self._read("Read the assembly from its files")
         self._register(extraction)
@@ -177,7 +177,7 @@ class Demo:
         return outcomes
 
     def _activity(self, outcomes: list[Outcome], unregistered: int) -> None:
-        """The boxes of the Activity pane, from the events that the server sent."""
+        """Print the boxes of the Activity pane, from the events that the server sent."""
         for outcome in outcomes:
             if outcome.status is not Status.MERGED:
                 continue

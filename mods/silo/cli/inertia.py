@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def add_geometry_options(parser: argparse.ArgumentParser) -> None:
-    """How files are read."""
+    """Add the options for how files are read."""
     group = parser.add_argument_group("geometry")
     common.options(group, {"--mesh-unit UNIT": "length unit of meshes that state none (mm, cm, m, in)"})
     group.add_argument(
@@ -55,7 +55,7 @@ def add_geometry_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_material_options(parser: argparse.ArgumentParser) -> None:
-    """Where densities come from."""
+    """Add the options for where densities come from."""
     group = parser.add_argument_group("materials")
     common.options(
         group,
@@ -67,7 +67,7 @@ def add_material_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_bom_options(parser: argparse.ArgumentParser) -> None:
-    """How the BOM is read, where what is detected is wrong."""
+    """Add the options for how the BOM is read if it is detected wrongly."""
     group = parser.add_argument_group("BOM")
     common.options(
         group,
@@ -87,7 +87,7 @@ def add_bom_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_result_options(parser: argparse.ArgumentParser) -> None:
-    """Where results go, and when a warning is a failure."""
+    """Add the options for where results go, and when a warning is a failure."""
     group = parser.add_argument_group("results")
     common.options(
         group,
@@ -103,7 +103,7 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_push_options(parser: argparse.ArgumentParser) -> None:
-    """Back to Silo."""
+    """Add the options for sending results to Silo."""
     group = parser.add_argument_group("back to Silo")
     common.options(
         group,
@@ -126,7 +126,7 @@ def need_inertia_extra() -> None:
 
 
 def bom_table(args: argparse.Namespace) -> BomTable | None:
-    """The BOM by the user's options."""
+    """Return the BOM by the user's options."""
     from silo.inertia.bom.parser import BOMParser
 
     columns = _pairs(args.column, "--column", "ROLE=HEADER, for example mass=Gewicht")
@@ -148,14 +148,14 @@ def _pairs(texts: Sequence[str], option: str, wanted: str) -> dict[str, str]:
 
 
 def material_table(args: argparse.Namespace) -> MaterialTable:
-    """The table by the user's options."""
+    """Return the table by the user's options."""
     from silo.inertia.materials import load_materials
 
     return load_materials(args.materials, freecad=not args.no_freecad_materials)
 
 
 def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
-    """Bad numbers, output files and a missing server are reported before minutes of reading, not after."""
+    """Report bad numbers, output files and a missing server before minutes of reading, not after."""
     from silo.inertia.materials import checked_density
 
     if args.default_density is not None:
@@ -170,7 +170,9 @@ def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
 
 
 def check_outputs(args: argparse.Namespace) -> None:
-    """InputError for files that cannot be written, or that must not: what is read, and one file twice."""
+    """Raise InputError for files that cannot be written, or that must not be: what is read, and one file
+    twice.
+    """
     from silo.inertia.geometry.graph import is_model_name
 
     report: list[str] = getattr(args, "report", [])
@@ -193,7 +195,7 @@ def check_outputs(args: argparse.Namespace) -> None:
 
 
 def read_options(args: argparse.Namespace, **more: Any) -> ReadOptions:
-    """What the arguments say about reading geometry."""
+    """Return what the arguments say about reading geometry."""
     from silo.inertia.geometry import ReadOptions
 
     return ReadOptions(
@@ -286,7 +288,9 @@ def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Asse
 
 
 def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
-    """The exit code: 1 where something could not be read, with --strict where a warning is not allowed."""
+    """Return the exit code: 1 where something could not be read, with --strict where a warning is not
+    allowed.
+    """
     from silo.inertia.model import GeometryCode
 
     left = [
@@ -613,7 +617,9 @@ def run_mass(args: argparse.Namespace) -> int:
 
 
 def _push(args: argparse.Namespace, report: InertiaReport) -> int:
-    """The documents' identities give the part numbers; the top assembly's own, unless --item says another."""
+    """Return the documents' identities give the part numbers; the top assembly's own, unless --item says
+    another.
+    """
     from silo.bom.report import base_of
     from silo.bom_sync import resolve
     from silo.inertia.geometry.freecad import product_key

@@ -395,7 +395,7 @@ def _failed(error: SiloError, words: Sequence[str]) -> int:
 
 
 def _refuse_empty(args: argparse.Namespace) -> None:
-    """A variable of a script that is not set must not mean the current folder."""
+    """Refuse empty arguments: an unset variable of a script must not mean the current folder."""
     for name, value in vars(args).items():
         empty = value == "" or (isinstance(value, list) and "" in value)
         if empty and name not in ("server", "token"):  # those have a sentence of their own
@@ -403,7 +403,7 @@ def _refuse_empty(args: argparse.Namespace) -> None:
 
 
 def _open_streams() -> None:
-    """Standard streams that take any text; a job may have been started without them."""
+    """Open standard streams that take any text; a job may have been started without them."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
@@ -446,7 +446,7 @@ class _Output(io.TextIOBase):
         return otherwise
 
     def _forget(self) -> None:
-        """Python writes what is left at its end, which would fail again."""
+        """Drop what is left in a stream: at its end Python would write it and fail again."""
         with suppress(OSError, ValueError):
             null = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null, self._stream.fileno())
@@ -460,12 +460,12 @@ class _Output(io.TextIOBase):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """That of the stream."""
+        """Return the encoding of the stream."""
         return getattr(self._stream, "encoding", None) or "utf-8"
 
 
 def _system_said_no(error: OSError) -> InputError:
-    """A file that we were asked to write, or the output itself: no such folder, no right, a full disk."""
+    """Return a file that we were asked to write, or the output itself: no such folder, no right, a full disk."""
     what = error.filename or "the output cannot be written"
     return InputError(f"{what}: {error.strerror or error}")
 

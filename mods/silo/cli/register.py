@@ -75,7 +75,9 @@ Nothing is registered before the last question. Ctrl-C leaves everything as it w
 
 
 def read_line(prompt: str) -> str | None:
-    """What a person types; None at the end of the input. Standard output may be JSON, so they read stderr."""
+    """Return what a person types; None at the end of the input. Standard output may be JSON, so they read
+    stderr.
+    """
     common.at("")
     print(prompt, end="", file=sys.stderr, flush=True)
     try:
@@ -106,7 +108,7 @@ class Dialog:
         self._earlier = CandidateFiles()
 
     def ask(self) -> tuple[list[Order], list[Candidate]]:
-        """The orders, and the components that are left without a number."""
+        """Return the orders, and the components that are left without a number."""
         orders: list[Order] = []
         left: list[Candidate] = []
         for number, candidate in enumerate(self._candidates):
@@ -311,7 +313,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
-    """The components, the files that no assembly uses, and whether there is a file that cannot be read."""
+    """Return the components, the files that no assembly uses, and whether there is a file that cannot be
+    read.
+    """
     if not os.path.isdir(args.top):
         extraction = common.read_tops(args)[0]
         return extraction, frozenset(), _tell_missing(extraction, base_of(extraction))
@@ -363,7 +367,7 @@ def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argpar
 
 
 def _tell_rules(categories: Mapping[str, str]) -> None:
-    """A mistake in the site's rules costs proposals, no more; it is reported on standard error."""
+    """Report a mistake in the site's rules on standard error; it only costs proposals."""
     from silo.bom_sync import rules_text
     from silo.cli.show import plain
 
@@ -397,7 +401,7 @@ class _Run:
         self.done: list[Registration] = []
 
     def as_asked(self, rows: Sequence[TableRow], unused: frozenset[str]) -> int:
-        """With a table, with --yes, or with the answers of a person."""
+        """Register with a table, with --yes, or with the answers of a person."""
         if self.args.plan:
             return self.write_plan(unused)
         if self.args.apply:
@@ -410,7 +414,7 @@ class _Run:
         return self.register(*Dialog(offered, self.found, self.client, self.base, is_own).ask())
 
     def write_plan(self, unused: frozenset[str]) -> int:
-        """The table; nothing is registered."""
+        """Return the table; nothing is registered."""
         from silo.platform import replacing
 
         earlier = CandidateFiles()
@@ -435,7 +439,7 @@ class _Run:
         return Exit.DONE
 
     def all_but_duplicates(self, unused: frozenset[str]) -> tuple[list[Order], list[Candidate]]:
-        """Every proposal; what seems to be an item already is treated as ``--duplicates`` says."""
+        """Return every proposal; what seems to be an item already is treated as ``--duplicates`` says."""
         orders, left = [], []
         earlier = CandidateFiles()
         for candidate in self.found.candidates:
@@ -575,7 +579,7 @@ def _orphans(args: argparse.Namespace) -> int:
 
 
 def _asker(how: str) -> Ask:
-    """Which of the items that fit is the component's: as ``--unclear`` says."""
+    """Return which of the items that fit is the component's: as ``--unclear`` says."""
 
     def ask(proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
         if how == "new":

@@ -56,7 +56,7 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
 
 
 def need_server_extra() -> None:
-    """One plain sentence where the server's packages are not installed."""
+    """Raise an error in one plain sentence if the server's packages are not installed."""
     missing = [
         name for name in ("fastapi", "sqlalchemy", "alembic", "uvicorn") if not importlib.util.find_spec(name)
     ]
@@ -109,7 +109,7 @@ def add_summaries(parser: argparse.ArgumentParser) -> None:
 
 
 def run_summaries(args: argparse.Namespace) -> int:
-    """0 once all is summed up; the server keeps it from then on by itself."""
+    """Return 0 once all is summed up; the server keeps it from then on by itself."""
     need_server_extra()
     from silo_server.db.engine import Database
     from silo_server.db.migrate import upgrade
@@ -140,7 +140,7 @@ def _add_place(parser: argparse.ArgumentParser) -> None:
 
 
 def run_backup(args: argparse.Namespace) -> int:
-    """0; 1 where files are missing that the server itself has lost."""
+    """Return 0; 1 where files are missing that the server itself has lost."""
     need_server_extra()
     from silo_server.backup import back_up
     from silo_server.settings import settings_from_environment
@@ -155,7 +155,7 @@ def run_backup(args: argparse.Namespace) -> int:
 
 
 def run_restore(args: argparse.Namespace) -> int:
-    """0 where the backup was whole and is now the server's state."""
+    """Return 0 if the backup was whole and is now the server's state."""
     need_server_extra()
     from silo_server.backup import restore, verify
     from silo_server.settings import settings_from_environment
@@ -360,7 +360,7 @@ def run_doctor(args: argparse.Namespace) -> int:
 
 
 def _machine() -> Rows:
-    """This machine: versions, folders, extras, FreeCAD and the add-on in it."""
+    """Describe this machine: versions, folders, extras, FreeCAD and the add-on in it."""
     from silo.freecads import material_folders
     from silo.platform import cache_folder, data_folder
 
@@ -378,7 +378,7 @@ def _machine() -> Rows:
 
 
 def _program() -> str:
-    """The version; ConfigError if another distribution has files in the same package."""
+    """Return the version; ConfigError if another distribution has files in the same package."""
     names = {name.replace("_", "-") for name in importlib.metadata.packages_distributions().get("silo", ())}
     if others := sorted(names - {"silo-mod"}):
         raise ConfigError(
@@ -397,7 +397,7 @@ def _configuration() -> str:
 
 
 def _folder(path: os.PathLike[str]) -> str | SiloError:
-    """The folder, which need not be there yet; an error where nothing can be written to it."""
+    """Return the folder, which need not be there yet; an error where nothing can be written to it."""
     there = os.fspath(path)
     while not os.path.lexists(there) and os.path.dirname(there) != there:
         there = os.path.dirname(there)

@@ -55,7 +55,7 @@ _ENDLESS = 1_000_000
 
 class _Terminal(Console):
     def on_broken_pipe(self) -> None:
-        """The reader has seen enough; rich would end with exit code 1, the command line says what that is."""
+        """Raise the error when the reader closes the pipe; rich would end with exit code 1."""
         raise BrokenPipeError
 
     def print(self, *shown: Any, **how: Any) -> None:
@@ -70,13 +70,15 @@ def console(stream: TextIO | None = None) -> Console:
 
 
 def plain(text: str) -> str:
-    """Text of a file or a server without control characters: it may not steer the terminal, nor fill it."""
+    """Return text of a file or a server without control characters: it may not steer the terminal, nor fill
+    it.
+    """
     shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
     return "".join(c if c.isprintable() else "�" for c in shown)
 
 
 def entry_text(entry: BomEntry, base: str) -> Text:
-    """One line of the tree."""
+    """Return one line of the tree."""
     text = Text().append(f"{entry.quantity} × ", "bold")
     if entry.part_number:
         text.append(plain(entry.part_number), "cyan").append("  ").append(plain(entry.name or ""))
@@ -122,7 +124,7 @@ def bom_tree(extraction: Extraction, base: str = "") -> Tree:
 
 
 def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """The flat BOM: a purchaser's table of totals."""
+    """Return the flat BOM: a purchaser's table of totals."""
     table = Table(box=None, pad_edge=False)
     for title in ("Part number", "Name", "Quantity", "Unit", "Standard or file", ""):
         table.add_column(spoken(title), justify="right" if title == "Quantity" else "left", overflow="fold")
@@ -140,7 +142,7 @@ def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
-    """Findings, the worst first."""
+    """Return findings, the worst first."""
     order = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
     lines = []
     for finding in sorted(findings, key=lambda f: order[f.severity]):
@@ -164,7 +166,7 @@ def summary_text(summary: ProductSummary) -> Text:
 
 
 def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -> RenderableType:
-    """CAD against server, one row per line that differs or is a person's own.
+    """Show CAD against server, one row per line that differs or is a person's own.
 
     whole
         False where components are missing or have no number: then nobody knows that nothing differs.
@@ -227,7 +229,7 @@ def outcome_text(outcome: Outcome, base: str) -> Text:
 
 
 def activity_box(activity: ActivityText) -> Panel:
-    """The Activity pane's box (spec §6)."""
+    """Return the Activity pane's box (spec §6)."""
     body = Text()
     body.append(f"📋 {plain(spoken(activity.headline))}\n", "bold")
     body.append(plain(spoken(activity.counts)))
@@ -243,7 +245,7 @@ def activity_box(activity: ActivityText) -> Panel:
 
 
 def article_json(article: Modelled, base: str) -> Mapping[str, Any]:
-    """What is modelled in the file and not counted."""
+    """Return what is modelled in the file and not counted."""
     return {
         "doc_path": relative(article.entry.doc_path, base),
         "objects": list(article.objects),
@@ -255,7 +257,7 @@ def article_json(article: Modelled, base: str) -> Mapping[str, Any]:
 
 
 def articles_text(articles: Sequence[Modelled], base: str) -> list[str]:
-    """The section of what is modelled in the file, line by line."""
+    """Return the section of what is modelled in the file, line by line."""
     lines = ["Modelled in this file, not counted:"]
     most = _MOST_MODELLED if sys.stdout.isatty() else len(articles)
     for article in articles[:most]:
@@ -296,7 +298,7 @@ def registrations(
     left: Sequence[tuple[Proposal, str]],
     articles: Sequence[Modelled],
 ) -> None:
-    """What became of each; ``left``: proposals that were not registered, and why."""
+    """Show the outcome of each; ``left``: proposals that were not registered, and why."""
     if args.json:
         common.print_json(
             {

@@ -165,7 +165,9 @@ class _Shown:
 
 
 def _show(result: TopResult, *, whole: bool) -> None:
-    """``whole``: everything about the one file; of many only what changed, for the summary says the rest."""
+    """Show results. ``whole``: everything about the one file; of many only what changed, for the summary says
+    the rest.
+    """
     from silo.batch import is_news
     from silo.bom_sync import Status
     from silo.cli import show
@@ -204,7 +206,9 @@ _STYLES = {"New since the last run": "bold", "Moved": "cyan", "Warnings": "yello
 
 
 def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> list[tuple[str, str, str]]:
-    """Files that carry on the identity of one that is gone or another item's by now: (name, before, now)."""
+    """Return files that carry on the identity of one that is gone or another item's by now: (name, before,
+    now).
+    """
     from silo.bom.document import relative
 
     here: dict[str, set[str]] = {}
@@ -283,7 +287,7 @@ def add_queue(parser: argparse.ArgumentParser) -> None:
 
 
 def run_queue(args: argparse.Namespace) -> int:
-    """1 where something waits or is held after all; 2 or 3 where the server stops a retry."""
+    """Return 1 where something waits or is held after all; 2 or 3 where the server stops a retry."""
     from silo.api.config import canonical, resolve_server
     from silo.outbox.store import Store
 
@@ -377,7 +381,7 @@ def _show_queue(
 
 
 def run_pull(args: argparse.Namespace) -> int:
-    """1 where a file was left alone, or is not in Silo."""
+    """Return 1 where a file was left alone, or is not in Silo."""
     from silo.freecads import open_in_any
     from silo.outbox.store import Store
     from silo.vault.pull import Rules, fetched, place, pulled_json
@@ -533,7 +537,7 @@ def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
 def _revision_on_disk(
     store: Store, sha256: str, identity: str, server: str, revisions: list[Revision]
 ) -> tuple[int | None, bool]:
-    """The revision that the file is, or was made from, and whether it has edits since."""
+    """Return the revision that the file is, or was made from, and whether it has edits since."""
     from silo.api.files import standing
 
     for content, edited in ((sha256, False), (store.origin_of(sha256), True)):

@@ -205,7 +205,9 @@ class FileWalk(Walk):
         return self._way_to(file_of(end)), object_name(end)
 
     def _way_to(self, file: str) -> str:
-        """The path of a file as the links record it: of this file's, then of that file's own, with ``|``."""
+        """Return the path of a file as the links record it: of this file's, then of that file's own, with
+        ``|``.
+        """
         if self._hops is None:
             self._hops = _hops(self.file, self.documents)
         return self._hops.get(os.path.realpath(file), file)[-1000:]
@@ -227,7 +229,7 @@ class FileWalk(Walk):
         return key
 
     def _colours(self, node: Contribution, key: Key, count: int) -> list[list[float] | None]:
-        """What links put over each instance; the outermost one counts."""
+        """Return what links put over each instance; the outermost one counts."""
         obj = node.obj
         here = [self.looks.override(obj)] * count
         each = elements(obj) if node.kind is Kind.LINK else []
@@ -255,7 +257,7 @@ def file_of_path(path: str) -> str:
 
 
 def _hops(file: str, documents: Iterable[str]) -> dict[str, str]:
-    """Real path → how the links lead there from ``file``."""
+    """Return real path → how the links lead there from ``file``."""
     hops: dict[str, str] = {}
     waiting = [(file, "")]
     wanted = {os.path.realpath(document) for document in documents}
@@ -343,7 +345,7 @@ def _unpacked(packed: int, clear: float) -> Rgba:
 
 
 def _materials(data: bytes) -> list[Rgba]:
-    """The diffuse colours of a ``PropertyMaterialList``: 24 bytes each, then texts."""
+    """Return the diffuse colours of a ``PropertyMaterialList``: 24 bytes each, then texts."""
     count = struct.unpack_from("<I", data)[0] if len(data) >= 4 else 0
     if len(data) < 4 + 24 * count:
         return []
@@ -449,7 +451,9 @@ def _stated(
 
 
 def _glb(pictures: Mapping[str, Picture], drawer: Drawer) -> bytes:
-    """All products as one file. Numbers are bounded by the largest product; the file's box needs no walk."""
+    """Return all products as one file. Numbers are bounded by the largest product; the file's box needs no
+    walk.
+    """
     boxes = {
         key: joined(list(each_picture.groups.values()))
         for key, each_picture in pictures.items()

@@ -127,12 +127,12 @@ class FileState(NamedTuple):
 
     @classmethod
     def of(cls, status: os.stat_result) -> FileState:
-        """From ``os.stat`` or ``os.fstat``."""
+        """Make a state from ``os.stat`` or ``os.fstat``."""
         return cls(status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
 
     @classmethod
     def now(cls, path: str) -> FileState | None:
-        """That of a file as it is now; None where it cannot be looked at."""
+        """Return the state of a file as it is now; None if it cannot be read."""
         try:
             return cls.of(os.stat(path))
         except OSError:
@@ -162,8 +162,9 @@ class Directory(NamedTuple):
     tail: bytes  # end record, comment, and whatever follows
 
     def entries(self, wanted: bytes | None = None) -> Iterator[ZipEntry]:
-        """The entries in directory order, or only those of one name. Raises ValueError where it is
-        damaged."""
+        """Yield the entries in directory order, or only those of one name. Raises ValueError if it is
+        damaged.
+        """
         raw, position = self.raw, 0
         for _ in range(self.entry_count):
             if raw[position : position + 4] != _CENTRAL_MARK or position + CENTRAL.size > len(raw):
@@ -208,11 +209,11 @@ class ContainerFile:
         os.close(self._descriptor)
 
     def changed(self) -> bool:
-        """True where somebody wrote into this very file since it was opened."""
+        """Return True if somebody wrote into this very file since it was opened."""
         return FileState.of(os.fstat(self._descriptor)) != self.state
 
     def entry(self, name: bytes) -> ZipEntry | None:
-        """The entry of this name, None where there is none; two of one name are refused."""
+        """Return the entry of this name, None if there is none; two of one name are refused."""
         try:
             entries = list(self.directory.entries(name))
         except ValueError as error:
@@ -222,7 +223,7 @@ class ContainerFile:
         return entries[0] if entries else None
 
     def packed(self, entry: ZipEntry, most: int) -> bytes:
-        """The packed bytes of an entry, at most ``most``."""
+        """Return the packed bytes of an entry, at most ``most``."""
         self._check(entry, most)
         # With the local header in one go: its extra field is seldom longer than the directory's.
         length = LOCAL.size + len(entry.name) + entry.packed + 64
@@ -232,11 +233,11 @@ class ContainerFile:
         return data if len(data) == entry.packed else self._read(entry.offset + begin, entry.packed)
 
     def data_offset(self, entry: ZipEntry) -> int:
-        """Where an entry's packed bytes begin in the file."""
+        """Return where an entry's packed bytes begin in the file."""
         return entry.offset + self._data_at(entry, self._read(entry.offset, LOCAL.size + len(entry.name)))
 
     def _data_at(self, entry: ZipEntry, local: bytes) -> int:
-        """Where the data begins, from the local header; which must be that of the same entry."""
+        """Return where the data begins, from the local header; which must be that of the same entry."""
         if len(local) < LOCAL.size or not local.startswith(_LOCAL_MARK):
             raise self._error("it is damaged: an entry lies outside its place")
         fields = LOCAL.unpack_from(local)
@@ -248,7 +249,7 @@ class ContainerFile:
         return begin
 
     def read(self, offset: int, length: int) -> bytes:
-        """Bytes of the file as it stands."""
+        """Return bytes of the file as it stands."""
         return self._read(offset, length)
 
     def _check(self, entry: ZipEntry, most: int) -> None:
@@ -280,7 +281,7 @@ class ContainerFile:
         raise self._no_container()
 
     def _end_record(self) -> tuple[int, tuple[int, ...]] | None:
-        """The last end record that fits with its comment: where it is, and its fields."""
+        """Return the last end record that fits with its comment: where it is, and its fields."""
         window = self._window
         position = window.rfind(_END_MARK)
         while position >= 0:
@@ -368,7 +369,7 @@ class Inflater:
             raise self._error(f"is too large: {entry.size} bytes unpacked, at most {most}")
 
     def step(self, length: int) -> bytes:
-        """Up to ``length`` (> 0) more bytes; b"" and ``finished`` at the end. Raises FcstdError."""
+        """Return up to ``length`` (> 0) more bytes; b"" and ``finished`` at the end. Raises FcstdError."""
         if self.finished:
             return b""
         data = self._stored(length) if self._entry.method == STORED else self._inflated(length)
@@ -376,7 +377,7 @@ class Inflater:
         return data
 
     def whole(self) -> bytes:
-        """All of an entry that was not begun; in one go where it cannot become too large."""
+        """Return all of an entry that was not begun; in one go where it cannot become too large."""
         highest = len(self._packed) * _HIGHEST_RATIO + 1
         if self._entry.method == STORED or highest > self._most:
             return self.rest()
@@ -391,7 +392,7 @@ class Inflater:
         return data
 
     def rest(self, end: int | None = None) -> bytes:
-        """All that is left, or what is left before a position."""
+        """Return all that is left, or what is left before a position."""
         most = len(self._packed) + 1 if self._entry.method == STORED else _LONGEST_STEP
         parts = BytesIO()
         while not self.finished and (end is None or self.produced < end):

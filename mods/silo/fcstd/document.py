@@ -170,13 +170,13 @@ PARENTS = _parents()
 
 
 def is_listed(type_name: str) -> bool:
-    """True for a type of the table, and for the Python form of one."""
+    """Return True for a type of the table, and for the Python form of one."""
     return type_name in PARENTS or type_name.removesuffix("Python") in PARENTS
 
 
 @lru_cache(maxsize=4096)
 def ancestors(type_name: str) -> frozenset[str]:
-    """The type itself and all that it is derived from; unknown types are plain document objects."""
+    """Return the type itself and all that it is derived from; unknown types are plain document objects."""
     types = {type_name, _ROOT}
     parents = PARENTS.get(type_name)
     if parents is None:
@@ -190,7 +190,7 @@ def ancestors(type_name: str) -> frozenset[str]:
 
 @cache
 def _answer_of(ancestry: frozenset[str]) -> Callable[[str], bool]:
-    """One bound method for all objects of a type: a file may have hundreds of thousands."""
+    """Return one bound method for all objects of a type: a file may have hundreds of thousands."""
     return ancestry.__contains__
 
 
@@ -227,7 +227,7 @@ class FcstdObject:
         self.isDerivedFrom = _answer_of(self.ancestry)
 
     def _looks_like_a_link(self) -> bool:
-        """A type that a later FreeCAD added, with the properties of a link array."""
+        """Return a type that a later FreeCAD added, with the properties of a link array."""
         try:
             self._load()
         except DocumentError:  # a caller that asks for a property of it gets the error
@@ -237,13 +237,13 @@ class FcstdObject:
 
     @cached_property
     def Label(self) -> str:
-        """What people call the object; its ``Name`` where the file has no label."""
+        """Return what people call the object; its ``Name`` where the file has no label."""
         label = self.properties.value("Label")
         return label if isinstance(label, str) else self.Name
 
     @property
     def LinkProblem(self) -> Problem | None:
-        """Why ``LinkedObject`` is None; where it is not, why the original of a changed copy is.
+        """Return why ``LinkedObject`` is None; where it is not, why the original of a changed copy is.
 
         None for a link that has what it records, and where there are no such properties.
         """
@@ -257,7 +257,7 @@ class FcstdObject:
         return self.Document.problem_of(ref)
 
     def getPropertyByName(self, name: str) -> Any:
-        """The value of a property. AttributeError where there is none, or none that is plain."""
+        """Return the value of a property. AttributeError if there is none, or none that is plain."""
         if name not in self.properties.numbers:  # a plain attribute, such as Name, is no property
             raise AttributeError(f"{self.TypeId} {self.Name} has no property {name!r}")
         return getattr(self, name)
@@ -279,7 +279,7 @@ class FcstdObject:
         return value
 
     def own_property(self, name: str, default: Any) -> Any:
-        """The value of a property, the default where there is none or it is not plain."""
+        """Return the value of a property, the default where there is none or it is not plain."""
         mine = self.__dict__
         if "properties" not in mine:
             self._load()
@@ -292,7 +292,7 @@ class FcstdObject:
         del self.__dict__
 
     def shape_key(self) -> str:
-        """Something equal for equal shapes, wherever they are placed; "" where the object has no shape."""
+        """Return something equal for equal shapes, wherever they are placed; "" if the object has no shape."""
         value = self.properties.value("Shape") if "Shape" in self.properties.numbers else None
         return self.Document.shape_key(value.name) if isinstance(value, ShapeFile) else ""
 
@@ -405,7 +405,7 @@ class FileSurvey(Survey):
         return {name for kind, names in self._groups if kind in kinds for name in names}
 
     def only(self, kinds: Set[Kind]) -> bool:
-        """True where there are no objects but of these kinds."""
+        """Return True if there are no objects but of these kinds."""
         return self._there <= kinds
 
     def has_python(self) -> bool:
@@ -439,23 +439,23 @@ class FcstdDocument:
 
     @cached_property
     def Label(self) -> str:
-        """The file's name without its ending; FreeCAD ignores the saved label (``Document::Restore``)."""
+        """Return the file's name without its ending; FreeCAD ignores the saved label (``Document::Restore``)."""
         return os.path.splitext(os.path.basename(self.FileName))[0]
 
     @cached_property
     def Name(self) -> str:
-        """The internal name that FreeCAD would give: the file's, in ASCII letters, digits and ``_``."""
+        """Return the internal name that FreeCAD would give: the file's, in ASCII letters, digits and ``_``."""
         name = re.sub(r"[^A-Za-z0-9_]", "_", self.Label)
         return f"_{name}" if name[:1].isdigit() else name or "Unnamed"
 
     @cached_property
     def ProgramVersion(self) -> str:
-        """The FreeCAD that wrote the file, such as ``1.0R39319 (Git)``."""
+        """Return the FreeCAD that wrote the file, such as ``1.0R39319 (Git)``."""
         return self._xml.attribute("ProgramVersion")
 
     @cached_property
     def Uid(self) -> str:
-        """FreeCAD's id of the document; a copy of the file has the same."""
+        """Return FreeCAD's id of the document; a copy of the file has the same."""
         return self._text("Uid")
 
     @property
@@ -469,23 +469,23 @@ class FcstdDocument:
 
     @cached_property
     def Objects(self) -> tuple[FcstdObject, ...]:
-        """All objects, in document order."""
+        """Return all objects, in document order."""
         self.complete()
         return self.members(self._xml.head.types)
 
     @cached_property
     def survey(self) -> FileSurvey:
-        """The objects by what they are; only those that somebody asks for are made."""
+        """Return the objects by what they are; only those that somebody asks for are made."""
         self.complete()
         return FileSurvey(self, self._xml)
 
     @property
     def PropertiesList(self) -> tuple[str, ...]:
-        """The names of the document's own properties, as far as the file holds them."""
+        """Return the names of the document's own properties, as far as the file holds them."""
         return self.properties.names
 
     def getObject(self, name: str) -> FcstdObject | None:
-        """The object of this ``Name`` (never a label), None where there is none."""
+        """Return the object of this ``Name`` (never a label), None if there is none."""
         fcstd_object = self._objects.get(name)
         if fcstd_object is None and (kind := self._type_of(name)) is not None:
             fcstd_object = self.object_of(name, kind)
@@ -497,7 +497,7 @@ class FcstdDocument:
         return kind or self._xml.head.types.get(name)
 
     def getPropertyByName(self, name: str) -> Any:
-        """A document property. AttributeError where there is none, or none with a plain value."""
+        """Return a document property. AttributeError if there is none, or none with a plain value."""
         value = self.Label if name == "Label" else self._value(name)
         if value is ABSENT:
             raise AttributeError(f"the document {self.FileName} has no readable property {name!r}")
@@ -513,7 +513,7 @@ class FcstdDocument:
         return f"<document {self.FileName}>"
 
     def linked(self) -> set[str]:
-        """The recorded paths of linked files, about, where it holds more than geometry."""
+        """Return the recorded paths of linked files, about, where it holds more than geometry."""
         return set() if self.survey.only(_GEOMETRY) else self._xml.linked()
 
     def mentioning(self, name: str) -> Iterable[str]:
@@ -524,7 +524,7 @@ class FcstdDocument:
 
     @cached_property
     def is_large(self) -> bool:
-        """True where memory counts more than time."""
+        """Return True if memory counts more than time."""
         return self.content.known is None and len(self._xml.head.types) > _MANY_OBJECTS
 
     def was_read(self, obj: FcstdObject, size: int) -> None:
@@ -540,8 +540,9 @@ class FcstdDocument:
 
     @cached_property
     def folders(self) -> tuple[str, ...]:
-        """Where the paths of links begin: the folder as the file was opened, then the one without
-        symlinks."""
+        """Return where the paths of links begin: the folder as the file was opened, then the one without
+        symlinks.
+        """
         location = self._found
         return tuple(dict.fromkeys((os.path.dirname(location.opened), os.path.dirname(location.real))))
 
@@ -563,7 +564,7 @@ class FcstdDocument:
 
     @property
     def properties(self) -> Properties:
-        """The property table of the document itself."""
+        """Return the property table of the document itself."""
         if self._table is None:
             remembered = self.content.known
             if remembered is None:
@@ -573,13 +574,13 @@ class FcstdDocument:
         return self._table
 
     def properties_of(self, obj: FcstdObject) -> Properties:
-        """The property table of an object of this document."""
+        """Return the property table of an object of this document."""
         remembered = self.content.known
         table = remembered.table(obj.Name) if remembered is not None else None
         return table or table_of(self._xml, obj.Name, obj.TypeId)
 
     def members(self, names: Collection[str]) -> tuple[FcstdObject, ...]:
-        """The objects of these names, without those that are not there."""
+        """Return the objects of these names, without those that are not there."""
         types = self._xml.head.types
         if len(names) > _MANY_OBJECTS:  # no second copy of each name
             listed = {name: name for name in types}
@@ -587,23 +588,23 @@ class FcstdDocument:
         return tuple(self.object_of(name, types[name]) for name in names if name in types)
 
     def resolve(self, ref: Ref) -> FcstdObject | None:
-        """The object that a link means, None where it is unset or broken."""
+        """Return the object that a link means, None if it is unset or broken."""
         if not ref.file and (local := self._objects.get(ref.name)) is not None:
             return local
         fcstd_object = self._target(ref)
         return fcstd_object if isinstance(fcstd_object, FcstdObject) else None
 
     def problem_of(self, ref: Ref) -> Problem | None:
-        """Why ``resolve`` gives None."""
+        """Return why ``resolve`` gives None."""
         problem = self._target(ref)
         return problem if isinstance(problem, Problem) else None
 
     def imported(self, file: str) -> Any:
-        """The part that A2plus imported from a file, or why there is none (a LinkProblem)."""
+        """Return the part that A2plus imported from a file, or why there is none (a LinkProblem)."""
         return self._library.imported(self, file)
 
     def vectors(self, entry_name: str) -> tuple[Vector, ...]:
-        """A list of vectors from its side entry (``PropertyVectorList::RestoreDocFile``)."""
+        """Return a list of vectors from its side entry (``PropertyVectorList::RestoreDocFile``)."""
         if not entry_name:
             return ()
         entry = self._entries.get(entry_name.encode())
@@ -620,7 +621,8 @@ class FcstdDocument:
         return tuple(Vector(*numbers) for numbers in form.iter_unpack(data[_SIZE.size :]))
 
     def shape_key(self, entry_name: str) -> str:
-        """A hash of a shape from its side entry, the same wherever the shape is placed; "" without one.
+        """Return a hash of a shape from its side entry, the same wherever the shape is placed; "" without
+        one.
 
         The text form has all placements in a list of their own (``BRepTools_ShapeSet``).
         """
@@ -649,7 +651,7 @@ class FcstdDocument:
         return value if isinstance(value, str) else ""
 
     def object_of(self, name: str, kind: str) -> FcstdObject:
-        """The object of this name and type."""
+        """Return the object of this name and type."""
         fcstd_object = self._objects.get(name)
         if fcstd_object is None:
             fcstd_object = self._objects[name] = FcstdObject(self, name, kind)

@@ -56,7 +56,7 @@ class FileFacts(NamedTuple):
 
 
 def facts_of(document: FcstdDocument) -> str:
-    """The facts of a document that was read to its end, as JSON; "" where none can be given."""
+    """Return the facts of a document that was read to its end, as JSON; "" if none can be given."""
     content = document.content
     if isinstance(content, Remembered) or content.xml.is_careful:
         return ""
@@ -116,16 +116,16 @@ class Remembered:
 
     @property
     def known(self) -> Remembered:
-        """What spares reading the file."""
+        """Return what spares reading the file."""
         return self
 
     def type_of(self, name: str) -> str | None:
-        """The type of an object, None where nothing is known of it."""
+        """Return the type of an object, None if nothing is known of it."""
         table = self.table(name)
         return None if table is None else table.kind
 
     def table(self, name: str) -> _Kept | None:
-        """The table of an object, made once; None where nothing is known of it."""
+        """Return the table of an object, made once; None if nothing is known of it."""
         table = self._tables.get(name)
         if table is None and (rows_of_object := self._objects.pop(name, None)) is not None:
             table = self._tables[name] = _Kept(self, name, *rows_of_object)
@@ -139,12 +139,12 @@ class Remembered:
 
     @property
     def xml(self) -> XmlText:
-        """The text."""
+        """Return the text."""
         return self._content().xml
 
     @property
     def directory(self) -> Directory:
-        """The directory of the container."""
+        """Return the directory of the container."""
         return self._content().directory
 
 
@@ -201,7 +201,7 @@ class _Kept(Properties):
 
 @lru_cache(maxsize=4096)
 def _shared(names: tuple[str, ...]) -> tuple[tuple[str, ...], dict[str, int]]:
-    """Objects of one type mostly have the same properties."""
+    """Return one shared value for the properties of a type, which most of its objects have."""
     return names, dict.fromkeys(names, 0)
 
 
@@ -231,14 +231,14 @@ class Content:
 
     @property
     def digest(self) -> str:
-        """What tells this content from any other."""
+        """Return what tells this content from any other."""
         return self.xml.digest(self.directory.raw)
 
     known: ClassVar[None] = None  # nothing that could spare reading it
 
     @property
     def size(self) -> int:
-        """Bytes that stay in memory, about; unpacked text is counted elsewhere."""
+        """Return bytes that stay in memory, about; unpacked text is counted elsewhere."""
         return self.xml.packed_size + 2 * len(self.directory.raw) + 300 * self.directory.entry_count
 
 
@@ -269,7 +269,7 @@ class FileContents:
         self._size = 0
 
     def read(self, path: str) -> Content:
-        """The content of a file. Raises FcstdError."""
+        """Return the content of a file. Raises FcstdError."""
         if (result := self._known.get(path)) is not None:
             self._known.move_to_end(path)
             return result
@@ -288,7 +288,7 @@ class FileContents:
             self._size -= oldest.size
 
     def remembered(self, path: str, facts: str) -> Remembered:
-        """The content of a file of which facts are known."""
+        """Return the content of a file of which facts are known."""
         result = self._remembered.get((path, facts))
         if result is None:
             result = self._remembered[path, facts] = Remembered(path, facts, self)
@@ -373,7 +373,7 @@ class Library:
         self.documents.clear()
 
     def open(self, path: Path | str) -> FcstdDocument:
-        """The document in a file, read to its end and checked. Raises DocumentError."""
+        """Return the document in a file, read to its end and checked. Raises DocumentError."""
         opened = os.path.abspath(path)
         real = self._locator.real(opened)
         if opened != real:  # a symlink may lead elsewhere tomorrow
@@ -389,12 +389,14 @@ class Library:
         return document
 
     def glance(self, path: Path | str) -> FcstdDocument:
-        """The document in a file, of which only as much is read as is asked for. Raises DocumentError."""
+        """Return the document in a file, of which only as much is read as is asked for. Raises DocumentError."""
         opened = os.path.abspath(path)
         return self._document(FoundFile(opened, self._locator.real(opened)))
 
     def follow(self, owner: FcstdDocument, ref: Ref) -> FcstdObject | LinkProblem:
-        """The object that a link in ``owner`` means, or why there is none. Never raises for a broken link."""
+        """Return the object that a link in ``owner`` means, or why there is none. Never raises for a broken
+        link.
+        """
         location = self._locator.find(ref.file, owner.folders)
         self.lookups[owner.folders, ref.file] = location
         if isinstance(location, NotFound):
@@ -412,7 +414,7 @@ class Library:
         return target
 
     def imported(self, owner: FcstdDocument, file: str) -> object:
-        """The part or assembly in a file that A2plus imported into ``owner``, or a LinkProblem.
+        """Return the part or assembly in a file that A2plus imported into ``owner``, or a LinkProblem.
 
         As A2plus does, a file that is not where it was is looked for in the folder of the owner.
         """

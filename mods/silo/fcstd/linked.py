@@ -69,12 +69,12 @@ class ProjectPlace:
     links: tuple[Linked, ...]
 
     def as_dicts(self) -> list[dict[str, str]]:
-        """The links for JSON."""
+        """Return the links for JSON."""
         return [asdict(link) for link in self.links]
 
 
 def recorded_paths(path: Path | str) -> tuple[str, ...]:
-    """The paths of all files that a file links to, as recorded, each once. Raises DocumentError."""
+    """Return the paths of all files that a file links to, as recorded, each once. Raises DocumentError."""
     name = os.fspath(path)
     limits = Limits()
     with ContainerFile(name, limits) as container:
@@ -88,7 +88,7 @@ def recorded_paths(path: Path | str) -> tuple[str, ...]:
 
 
 def place_of(content: Path | str, path: str) -> ProjectPlace:
-    """What is to be known of a file for fetching its tree again. Raises DocumentError.
+    """Return what is to be known of a file for fetching its tree again. Raises DocumentError.
 
     content
         the file to read; it may lie elsewhere than ``path``, where it belongs.
@@ -120,7 +120,7 @@ def place_of(content: Path | str, path: str) -> ProjectPlace:
 
 
 def identity_in(library: Library, path: str) -> str:
-    """The identity of the item that a file belongs to; "" where it has none or several, or is unreadable."""
+    """Return the identity of the item that a file belongs to; "" if it has none or several, or is unreadable."""
     try:
         return file_item(library.glance(path)) or ""
     except DocumentError:
@@ -135,7 +135,7 @@ def _hash(path: str) -> str:
 
 
 def _below(paths: list[str]) -> str:
-    """The first path, relative to the folder that holds all of them."""
+    """Return the first path, relative to the folder that holds all of them."""
     try:
         common = os.path.commonpath([os.path.dirname(path) for path in paths])
     except ValueError:  # on Windows: files on several drives
@@ -205,7 +205,7 @@ def _look(path: str, old: str, limits: Limits) -> Relinked | None:
 
 
 def _records(text: bytes, path: str, file: str, limits: Limits) -> Iterator[_Record]:
-    """The elements that record ``file``, as seen from the document at ``path``."""
+    """Yield the elements that record ``file``, as seen from the document at ``path``."""
     if as_utf8(text) is not text:
         raise Malformed("is not in UTF-8")
     folder, wanted = os.path.dirname(path), {file, os.path.realpath(file)}
@@ -291,7 +291,7 @@ class _Lost:
 def with_suggestions(
     extraction: Extraction, identities: Identities | None = None, files: Iterable[str] | None = None
 ) -> Extraction:
-    """The extraction, its findings of missing files with the file that was probably meant.
+    """Return the extraction, its findings of missing files with the file that was probably meant.
 
     Reads the project's files, or those of ``files``; costs nothing where no file is missing.
     """
@@ -331,7 +331,7 @@ def _lost(extraction: Extraction) -> dict[str, _Lost]:
 
 
 def _project_files(extraction: Extraction) -> Iterator[str]:
-    """The FreeCAD files of the folder that all files of the tree share."""
+    """Yield the FreeCAD files of the folder that all files of the tree share."""
     paths = [entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))]
     folders = [os.path.dirname(path) for path in paths if path]
     top = os.path.dirname(extraction.assembly.doc_path)
@@ -362,7 +362,7 @@ class _Project:
         self._opened: dict[str, FcstdDocument | None] = {}
 
     def meant(self, lost: _Lost) -> tuple[str, str] | None:
-        """The file, and why it is the one."""
+        """Return the file, and why it is the one."""
         holding = [path for path in self._files if path != lost.file and self._holds(path, lost.objects)]
         rules: list[tuple[str, list[str]]] = [
             ("it carries the Silo identity", [path for path in holding if self._identified(path, lost)]),

@@ -67,14 +67,14 @@ Piece = bytes | KeptBytes
 
 
 def in_attribute(text: str) -> str:
-    """A text as the value of an XML attribute, to stand between quotes."""
+    """Return a text as the value of an XML attribute, to stand between quotes."""
     from xml.sax.saxutils import escape  # late, as it imports HTTP and TLS
 
     return escape(text, _REFERENCES)
 
 
 def replaced_entry(container: ContainerFile, entry: ZipEntry, content: bytes) -> tuple[Piece, ...]:
-    """The container with ``content`` in ``entry``, in pieces: a big file is never held in memory.
+    """Return the container with ``content`` in ``entry``, in pieces: a big file is never held in memory.
 
     Raises FcstdError where entries overlap, or the result were too large for a plain zip.
     """
@@ -103,7 +103,7 @@ def _entries(container: ContainerFile) -> list[ZipEntry]:
 
 
 def _local(container: ContainerFile, entry: ZipEntry, content: bytes) -> tuple[bytes, int]:
-    """Local header and data, and the packed length; times, name and extra field as they were."""
+    """Return local header and data, and the packed length; times, name and extra field as they were."""
     engine = zlib.compressobj(wbits=-zlib.MAX_WBITS)
     data = engine.compress(content) + engine.flush()
     header = list(LOCAL.unpack(container.read(entry.offset, LOCAL.size)))
@@ -143,7 +143,7 @@ Edit = Callable[[bytes], bytes]
 
 
 def changed(path: str) -> FcstdError:
-    """Somebody else wrote the file meanwhile."""
+    """Return the error that somebody else wrote the file meanwhile."""
     return FcstdError(path, "it was changed by somebody else meanwhile; nothing was written")
 
 
@@ -165,7 +165,7 @@ def check_writable(path: str) -> None:
 
 
 def document_xml(container: ContainerFile, limits: Limits) -> tuple[ZipEntry, bytes]:
-    """The entry Document.xml and its text. Raises DocumentError."""
+    """Return the entry Document.xml and its text. Raises DocumentError."""
     entry = container.entry(DOCUMENT_XML)
     if entry is None:
         raise FcstdError(container.path, "it is not a FreeCAD document (there is no Document.xml in it)")
@@ -174,7 +174,7 @@ def document_xml(container: ContainerFile, limits: Limits) -> tuple[ZipEntry, by
 
 
 def edited_xml(container: ContainerFile, edit: Edit, limits: Limits) -> tuple[ZipEntry, bytes]:
-    """The entry Document.xml, and its text as it is to become. Raises DocumentError."""
+    """Return the entry Document.xml, and its text as it is to become. Raises DocumentError."""
     entry, text = document_xml(container, limits)
     try:
         return entry, edit(text)
@@ -350,7 +350,7 @@ def _present(
     limits: Limits,
     item_object: str | None,
 ) -> bool:
-    """True where the identity is in each of its places. Raises DocumentError where another one is."""
+    """Return True if the identity is in each of its places. Raises DocumentError if another one is."""
     with Library(limits=limits) as library:
         document = library.open(path)
         if document.state != state:
@@ -384,7 +384,7 @@ def _text_of(owner: object, name: str) -> str:
 def _stamped_xml(
     container: ContainerFile, key: str, identity: str, limits: Limits, item_object: str | None, replace: bool
 ) -> tuple[ZipEntry, bytes]:
-    """The entry Document.xml, and its content as it is to become."""
+    """Return the entry Document.xml, and its content as it is to become."""
 
     def edit(text: bytes) -> bytes:
         gone = ("SiloUUID",) if replace else ()
@@ -427,8 +427,8 @@ def _edited(
     depth_limit: int,
     whole: Iterable[str] = (),
 ) -> bytes:
-    """The text with these keys in ``Meta``, and these properties on the object; without those of the
-    ``whole`` document. None takes one away. Raises ValueError where it cannot be edited (says why).
+    """Return the text with these keys in ``Meta``, and these properties on the object; without those of the
+    ``whole`` document. None takes one away. Raises ValueError if it cannot be edited (says why).
     """
     if xmltext.as_utf8(text) is not text:
         raise Malformed("is not in UTF-8")
@@ -470,7 +470,9 @@ def _with_all(element: bytes, properties: Mapping[str, bytes | None], depth_limi
 
 
 def _with_property(element: bytes, name: str, prop: bytes | None, indent: bytes, depth_limit: int) -> bytes:
-    """A ``<Properties>`` element, or the ``<Object>`` around it, with a property or, for None, without it."""
+    """Return a ``<Properties>`` element, or the ``<Object>`` around it, with a property or, for None, without
+    it.
+    """
     spans = xmltext.index_properties(element, depth_limit)
     here = spans.get(name)
     if here is not None and prop is not None:
@@ -503,7 +505,7 @@ def _items(prop: XmlElement) -> dict[str, str]:
 
 
 def _start_tag(element: bytes) -> bytes:
-    """The first tag; a ``>`` may stand inside its quotes."""
+    """Return the first tag; a ``>`` may stand inside its quotes."""
     match = re.match(rb"""<(?:[^<>"']|"[^"]*"|'[^']*')*>""", element)
     if match is None:
         raise Malformed("has a property that cannot be edited")

@@ -97,7 +97,7 @@ def _refuse_doctype(*_: object) -> None:
 
 
 def as_utf8(raw: bytes) -> bytes:
-    """The text in UTF-8 without a declaration of another encoding."""
+    """Return the text in UTF-8 without a declaration of another encoding."""
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         encoding = "utf-16"
     else:
@@ -156,14 +156,14 @@ class _DocumentIndex:
 
 
 def index_document(text: bytes, depth_limit: int) -> tuple[Head, dict[str, Span]]:
-    """The head, and where each object's data stands. Raises Malformed."""
+    """Return the head, and where each object's data stands. Raises Malformed."""
     index = _DocumentIndex()
     _Walk(text, depth_limit, index.open_at, index.close_at).run()
     return index.head, index.data
 
 
 def index_properties(text: bytes, depth_limit: int) -> dict[str, Span]:
-    """Where each property of one ``<Object>`` or ``<Properties>`` element stands. Raises Malformed."""
+    """Return where each property of one ``<Object>`` or ``<Properties>`` element stands. Raises Malformed."""
     spans: dict[str, Span] = {}
     level = 2 if text.startswith(b"<Properties") else 3
     path: list[str] = []
@@ -187,7 +187,9 @@ def index_properties(text: bytes, depth_limit: int) -> dict[str, Span]:
 
 
 def start_tags(text: bytes, depth_limit: int, tags: Collection[str]) -> list[tuple[int, dict[str, str]]]:
-    """Where each element of these tags begins, and its attributes, in document order. Raises Malformed."""
+    """Return where each element of these tags begins, and its attributes, in document order. Raises
+    Malformed.
+    """
     result: list[tuple[int, dict[str, str]]] = []
 
     def open_at(depth: int, tag: str, attributes: dict[str, str], at: int) -> None:
@@ -208,7 +210,7 @@ class XmlElement:
 
 
 def parse_value(snippet: bytes, depth_limit: int) -> XmlElement:
-    """One ``<Property>`` element as a tree. Raises Malformed."""
+    """Return one ``<Property>`` element as a tree. Raises Malformed."""
     root = XmlElement("", {})
     stack = [root]
 
@@ -304,22 +306,23 @@ class XmlText:
         self.is_careful = False
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """To another process goes what was read, not what was made of it."""
+        """Send to another process what was read, not what was made of it."""
         return XmlText, (self.path, self._entry, self._packed, self.limits)
 
     @property
     def text(self) -> bytes:
-        """What is unpacked so far; spans count from its begin."""
+        """Return what is unpacked so far; spans count from its begin."""
         return self._text if self._text is not None else self._unpack_again()
 
     @property
     def packed_size(self) -> int:
-        """Bytes that stay in memory, about: the packed text, and where each object of it stands."""
+        """Return bytes that stay in memory, about: the packed text, and where each object of it stands."""
         return len(self._packed) + self._entry.size // 4
 
     def digest(self, directory: bytes) -> str:
-        """What tells this content from any other: of the packed text, and of the container's directory, which
-        holds a checksum of each other entry."""
+        """Return what tells this content from any other: of the packed text, and of the container's
+        directory, which holds a checksum of each other entry.
+        """
         return sha256(b"%d %b%b" % (len(directory), directory, self._packed)).hexdigest()
 
     def release(self) -> None:
@@ -328,14 +331,14 @@ class XmlText:
 
     @property
     def head(self) -> Head:
-        """Attributes, types of all objects, document properties."""
+        """Return attributes, types of all objects, document properties."""
         if self._head is None:
             self._settle(self._find_head)
         assert self._head is not None
         return self._head
 
     def attribute(self, name: str, default: str = "") -> str:
-        """An attribute of the ``<Document>`` element."""
+        """Return an attribute of the ``<Document>`` element."""
         head = self.head
         if isinstance(head.attributes, bytes):
             matches = _ATTRIBUTE.findall(head.attributes)
@@ -343,7 +346,7 @@ class XmlText:
         return head.attributes.get(name, default)
 
     def span(self, name: str) -> Span | None:
-        """Where the data of an object of ``head.types`` stands."""
+        """Return where the data of an object of ``head.types`` stands."""
         if (span_here := self._data.get(name)) is None:
             if name not in self.head.types:
                 return None
@@ -358,11 +361,11 @@ class XmlText:
             self._settle(self._index_objects)
 
     def error(self, reason: str) -> FcstdError:
-        """An error about this text."""
+        """Return an error about this text."""
         return FcstdError(self.path, f"its Document.xml {reason}")
 
     def malformed(self, problem: Malformed) -> FcstdError:
-        """An error about a piece of this text, with expat's word on the whole: it knows the line."""
+        """Return an error about a piece of this text, with expat's word on the whole: it knows the line."""
         if self._sound is None and not self.is_careful:
             try:
                 whole = self._new_inflater().rest()
@@ -373,14 +376,14 @@ class XmlText:
         return self.error(str(self._sound if isinstance(self._sound, Malformed) else problem))
 
     def decode(self, raw: bytes) -> str:
-        """UTF-8, or an error."""
+        """Decode UTF-8, or raise an error."""
         try:
             return raw.decode()
         except UnicodeDecodeError as error:
             raise self.error("is not in UTF-8") from error
 
     def _settle(self, quick: Callable[[], None]) -> None:
-        """The quick way, else the careful one; what failed once fails again without being read again."""
+        """Try the quick way, then the careful one; what failed once fails again without being read again."""
         if self._failure is not None:
             raise FcstdError(self.path, self._failure.reason)
         try:
@@ -396,14 +399,14 @@ class XmlText:
         return Inflater(self.path, self._entry, self._packed, self.limits.document_xml, self.limits)
 
     def _begin(self, whole: bool) -> bytes:
-        """The first step; all of a small text, since it costs no more than a part of it."""
+        """Return the first step; all of a small text, since it costs no more than a part of it."""
         self._inflater = self._new_inflater()
         if whole or self._entry.size <= _FIRST_STEP * _GROWTH:
             return self._hold(self._inflater.whole())
         return self._hold(self._inflater.step(_FIRST_STEP))
 
     def _extend(self) -> bytes:
-        """The text with one more step of it. Raises _Unexpected at the end."""
+        """Return the text with one more step of it. Raises _Unexpected at the end."""
         text = self.text
         if self._inflater.finished:
             raise _Unexpected
@@ -519,8 +522,9 @@ class XmlText:
         return True
 
     def mentioning(self, word: str) -> Iterable[str]:
-        """Names of the objects in whose data a word may stand, of a text that was read to its end; in the
-        order of the text."""
+        """Return names of the objects in whose data a word may stand, of a text that was read to its end; in
+        the order of the text.
+        """
         # A search is quicker than find() where the first letter is rare.
         text, wanted = self.text, re.compile(re.escape(word.encode()))
         if b"&" in text and b"&#" in text:  # which may be a letter
@@ -539,7 +543,7 @@ class XmlText:
         return result
 
     def linked(self) -> set[str]:
-        """The recorded paths of linked files, about; of a text that was read to its end."""
+        """Return the recorded paths of linked files, about; of a text that was read to its end."""
         matches = {self.decode(path) for path in _LINKED.findall(self.text)}
         if any("&" in path for path in matches):
             from xml.sax.saxutils import unescape  # it imports HTTP and TLS
@@ -572,7 +576,7 @@ class XmlText:
 
 
 def _refuse_markup(text: bytes, start: int) -> None:
-    """Comments, CDATA, document types, processing instructions: not for the quick way."""
+    """Refuse comments, CDATA, document types and processing instructions in the quick way."""
     # One byte is looked for much faster than two, and FreeCAD's texts seldom have either.
     if (text.find(b"!", start) >= 0 and text.find(b"<!", start) >= 0) or (
         text.find(b"?", start) >= 0 and text.find(b"<?", start) >= 0

@@ -220,7 +220,7 @@ def _run(
 
 
 def _weights(task: Task, assembly: Assembly, claims: Claims) -> list[tuple[str, Sequence[int], float]]:
-    """What was weighed, components before the links around them. InputError for what is no mass."""
+    """Return what was weighed, components before the links around them. InputError for what is no mass."""
     links = as_link_map(task.links)
     given = {link.name: link.mass for link in (links.links if links else ()) if link.mass} | dict(
         task.weights

@@ -547,7 +547,9 @@ def _lloyd(points: Floats, count: int) -> Labels:
 
 
 def _silhouette(points: Floats, labels: Labels) -> float:
-    """Rate clusters from -1 to 1, by distances to the centres of clusters: 1 is tight clusters far apart."""
+    """Return rate clusters from -1 to 1, by distances to the centres of clusters: 1 is tight clusters far
+    apart.
+    """
     numbers = np.unique(labels)
     if len(numbers) < 2:
         return -1.0

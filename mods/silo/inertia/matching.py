@@ -132,7 +132,7 @@ class Suggester:
 
 
 def _alike(left: str, right: str) -> float:
-    """Rate likeness from 0 to 1; 0 at once if it cannot reach the limit."""
+    """Return rate likeness from 0 to 1; 0 at once if it cannot reach the limit."""
     matcher = SequenceMatcher(None, left, right, autojunk=False)
     if matcher.real_quick_ratio() < SUGGEST_FROM or matcher.quick_ratio() < SUGGEST_FROM:
         return 0.0
@@ -338,7 +338,7 @@ class _Contest:
             self.found[product.key] = Match(bundle, self.rule, decided)
 
     def _settle(self, decided: Decided, fits: Callable[[Product, Bundle], bool]) -> None:
-        """Pair what fits one way only, from both sides, until nothing changes."""
+        """Pair what fits in one way only, from both sides, until nothing changes."""
         changed = True
         while changed and self.products and self.bundles:
             changed = False

@@ -46,7 +46,7 @@ class State(StrEnum):
 
 
 def new_key() -> str:
-    """A name for a commit."""
+    """Return a name for a commit."""
     return str(uuid4())
 
 
@@ -195,21 +195,21 @@ class Entry(Said):
 
     @property
     def item(self) -> str:
-        """What orders entries: those of one item go one after another."""
+        """Return what orders entries: those of one item go one after another."""
         return (self.identity or self.part_number).casefold()
 
     @property
     def keys(self) -> set[str]:
-        """The names of its item."""
+        """Return the names of its item."""
         return {self.item, self.part_number.casefold()} - {""}
 
     @property
     def has_file(self) -> bool:
-        """True where a file belongs to the commit, sent or not."""
+        """Return True if a file belongs to the commit, sent or not."""
         return bool(self.copy)
 
     def is_away(self, here: str) -> bool:
-        """True where it is meant for another server than the one in use; ``here`` may be ""."""
+        """Return True if it is meant for another server than the one in use; ``here`` may be ""."""
         return bool(here) and self.server not in ("", here)
 
 
@@ -298,7 +298,9 @@ def entry_of(row: sqlite3.Row) -> Entry:
 
 
 def on_top(comment: str, newer: Mapping[str, Any]) -> dict[str, Any]:
-    """What a commit says that a person sends on top of a revision that they saw: the fields of a commit."""
+    """Return what a commit says that a person sends on top of a revision that they saw: the fields of a
+    commit.
+    """
     number = newer["revision_number"]
     if not newer.get("set_back"):  # a server that was set back has nothing of a colleague
         who = f" by {newer['created_by']}" if newer.get("created_by") else ""
@@ -316,7 +318,9 @@ class Words:
 
 
 def words(entry: Entry, here: str, *, is_paused: bool, translate: Translate = english) -> Words:
-    """How an entry stands, for the pane and the command line. ``here``: the address in use, "" for none."""
+    """Return how an entry stands, for the pane and the command line. ``here``: the address in use, "" for
+    none.
+    """
     reason, urgent = entry.reason, entry.state is State.HELD or entry.is_away(here)
     if entry.is_away(here):
         meant = translate("Silo", "It is meant for {there}, which is not the server in use.")
@@ -338,14 +342,14 @@ def words(entry: Entry, here: str, *, is_paused: bool, translate: Translate = en
 
 
 def parts(entry: Entry, translate: Translate = english) -> str:
-    """What of an entry is not in Silo yet."""
+    """Return what of an entry is not in Silo yet."""
     if entry.file_left and entry.bom_left:
         return translate("Silo", "file and BOM")
     return translate("Silo", "BOM") if entry.bom_left else translate("Silo", "file")
 
 
 def pause_text(pause: Pause, server: str, now: float, translate: Translate = english) -> str:
-    """Why nothing is sent to a server now, and until when."""
+    """Return why nothing is sent to a server now, and until when."""
     text = translate("Silo", "Nothing is sent to {host} before you retry: {reason}")
     if not math.isinf(left := pause.left(now)):
         text = translate("Silo", "Nothing is sent to {host} for {time}: {reason}")
@@ -355,5 +359,5 @@ def pause_text(pause: Pause, server: str, now: float, translate: Translate = eng
 
 
 def host_of(address: str) -> str:
-    """An address as people read it."""
+    """Return an address as people read it."""
     return urlsplit(address).netloc or address

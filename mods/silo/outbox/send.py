@@ -97,12 +97,12 @@ class Sent:
 
     @property
     def number(self) -> str:
-        """The item's part number; "" for a document without one."""
+        """Return the item's part number; "" for a document without one."""
         return "" if isinstance(self.part_number, DocumentId) else self.part_number
 
     @property
     def page(self) -> str:
-        """Where a person looks at it on the server."""
+        """Return where a person looks at it on the server."""
         return f"/items/{self.number}/bom" if self.number else f"/documents/{self.part_number}"
 
 
@@ -129,7 +129,7 @@ class Report:
 
 
 def went_alone(entry: Entry) -> list[str]:
-    """Says which half of a commit with file and BOM the server has, where the other one was refused."""
+    """Say which half of a commit with file and BOM the server has, where the other one was refused."""
     if not entry.has_file or entry.file_left == entry.bom_left:
         return []
     there, left = ("BOM", "file") if entry.file_left else ("file", "BOM")
@@ -342,7 +342,7 @@ class _Run:
         return summary
 
     def _is_there(self, entry: Entry) -> bool:
-        """False where a file that was sent is gone, and its BOM would go alone: the server was restored."""
+        """Return False if a file that was sent is gone, and its BOM would go alone: the server was restored."""
         try:
             revisions = self.client.revisions(entry.part_number)
         except RouteMissingError:
@@ -352,7 +352,7 @@ class _Run:
         return is_there(revisions, entry.file_name, entry.sha256, entry.revision)
 
     def _again(self, entry: Entry) -> Entry:
-        """The file has to go once more; what was seen of the server says nothing of it as it is now."""
+        """Send the file once more; what was seen of the server may no longer be true."""
         again: dict[str, Any] = {"file_left": True, "base_revision": None, "revision": None}
         self.store.update(entry.id, **again)
         return replace(entry, **again)
@@ -364,7 +364,9 @@ class _Run:
             raise InputError(f"{entry.label}: its BOM cannot be read any more; commit it again") from error
 
     def _number(self, entry: Entry) -> str:
-        """The item or document that the file goes to; "" for an attachment of the assembly that needs it."""
+        """Return the item or document that the file goes to; "" for an attachment of the assembly that needs
+        it.
+        """
         within = InFile.of(entry.document)
         if within.own and self._knows_documents():
             return DocumentId(entry.identity)
@@ -446,8 +448,9 @@ class _Run:
         return replace(entry, revision=number)
 
     def _base(self, entry: Entry, revisions: Sequence[Revision]) -> int | None:
-        """The revision that the file was made from; None where nobody asks. NewerRevisionError where sending
-        it would undo a colleague's; the server looks again, for somebody may commit before the upload."""
+        """Return the revision that the file was made from; None if nobody asks. NewerRevisionError if sending
+        it would undo a colleague's; the server looks again, for somebody may commit before the upload.
+        """
         if not entry.origin:
             return None
         stands = self._standing(entry, revisions, entry.origin)
@@ -582,7 +585,7 @@ class _Run:
         return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
 
     def _at_revision(self, entry: Entry) -> Entry:
-        """An entry without a file, with the revision that its document is or was made from."""
+        """Return an entry without a file, with the revision that its document is or was made from."""
         if entry.has_file or not entry.origin or entry.revision is not None:
             return entry
         revisions = self._revisions(entry.part_number)
@@ -595,7 +598,7 @@ class _Run:
         )
 
     def _named(self, entry: Entry, request: str) -> MergeRequest:
-        """The request with its name and its document, where it does not have them yet."""
+        """Return the request with its name and its document, where it does not have them yet."""
         try:
             wanted = MergeRequest.model_validate_json(request)
         except ValidationError as error:
@@ -618,5 +621,5 @@ def _refuse(error: SiloError, refused: list[SiloError], *, alone: bool) -> None:
 
 
 def _waits(error: SiloError) -> bool:
-    """True for the refusal of one half that may be over by itself."""
+    """Return True for the refusal of one half that may be over by itself."""
     return isinstance(error, ReadOnlyError) or judge(error, lambda: None).then is Then.RETRY

@@ -96,14 +96,14 @@ class QueueDatabase:
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
-        """All or nothing, on disk when it returns."""
+        """Commit all or nothing, on disk when it returns."""
         self._make_ready()
         with self._open() as db, _transaction(db):
             yield db
 
     @contextmanager
     def send_lock(self) -> Iterator[bool]:
-        """True for the one process and thread that may send now; the lock ends with its process."""
+        """Yield True to the one process and thread that may send now; the lock ends with its process."""
         self._make_ready()
         with self._translated():
             lock = hold_lock(self.path.with_suffix(".lock"))
@@ -193,7 +193,7 @@ class QueueDatabase:
             return False
 
     def _is_whole(self) -> bool:
-        """True where the file is our database in this format, and no page of it is damaged."""
+        """Return True if the file is our database in this format, and no page of it is damaged."""
         with closing(self._connect()) as db:
             if not self._is_ours(db):
                 return False
@@ -233,7 +233,7 @@ class QueueDatabase:
         return result
 
     def aside(self, path: str) -> Path:
-        """A new place for a copy of a file; its folder is there. DocumentError where it cannot be made."""
+        """Return a new place for a copy of a file; its folder is there. DocumentError if it cannot be made."""
         folder = self._kept_aside / time.strftime("%Y-%m-%d")
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -319,8 +319,8 @@ class FileOrigins(QueueDatabase):
     """What files were made from, as far as it is known here."""
 
     def origin_of(self, sha256: str) -> str:
-        """SHA-256 of the committed file that a file with this content was made from, as far as is known here;
-        the content itself where it was never saved over.
+        """Return the SHA-256 of the committed file that a file with this content was made from, as far as is
+        known here; the content itself where it was never saved over.
 
         A file that was saved first and committed then is a committed one itself, also while it waits.
         """
@@ -334,7 +334,7 @@ class FileOrigins(QueueDatabase):
         return str(row[0]) if row else sha256
 
     def derived(self, sha256: str, origin: str) -> None:
-        """A file was saved without being committed; it was made from ``origin``."""
+        """Note that a file was saved without being committed; it was made from ``origin``."""
         if not sha256 or sha256 == origin:
             return
         with self.transaction() as db:
@@ -342,7 +342,7 @@ class FileOrigins(QueueDatabase):
             db.execute("DELETE FROM derived WHERE at < ?", (self.clock() - _REMEMBERED,))
 
     def known_revision(self, server: str, sha256: str, item: str) -> int | None:
-        """The revision that a file is, for servers that keep no checksums; None where that is not known."""
+        """Return the revision that a file is, for servers that keep no checksums; None if that is not known."""
         with self._open() as db:
             row = db.execute(
                 "SELECT revision FROM known WHERE server = ? AND sha256 = ? AND item = ?",
@@ -351,7 +351,7 @@ class FileOrigins(QueueDatabase):
         return int(row[0]) if row else None
 
     def learn(self, server: str, sha256: str, item: str, revision: int) -> None:
-        """This file is that revision of an item."""
+        """Note that this file is that revision of an item."""
         if not (sha256 and item):
             return
         with self.transaction() as db:
@@ -450,7 +450,7 @@ class Store(FileOrigins):
         return held
 
     def _second(self, key: str) -> Path | None:
-        """What :meth:`hold` has kept for a commit."""
+        """Return what :meth:`hold` has kept for a commit."""
         paths = (path for path in (self._held / key).rglob("*") if path.is_file())
         return next((path for path in paths if not path.name.endswith(".part")), None)
 
@@ -493,7 +493,7 @@ class Store(FileOrigins):
                 remove_patiently(self._coming_lock(key))
 
     def is_coming(self, key: str) -> bool:
-        """True where a living program is about to copy a commit's file: nobody else does it then."""
+        """Return True if a living program is about to copy a commit's file: nobody else does it then."""
         if key in self._coming:
             return True
         path = self._coming_lock(key)
@@ -566,7 +566,7 @@ class Store(FileOrigins):
         return DocumentError(str(content), f"{reason}; nothing was kept, commit it again")
 
     def add(self, commit: Commit, server: str = "") -> Entry:
-        """Both at once: on disk with its copy when it returns."""
+        """Add row and copy at once: both are on disk when it returns."""
         self.stage(commit, server)
         self.finish(commit.key, commit.file)
         entry = self.by_key(commit.key)
@@ -630,7 +630,7 @@ class Store(FileOrigins):
     # -- pauses -----------------------------------------------------------------------------------------
 
     def pause(self, server: str, item: str = "") -> Pause | None:
-        """The last pause of a server, or of one item there; None where all went well since."""
+        """Return the last pause of a server, or of one item there; None if all went well since."""
         where = (canonical(server), item)
         with self._open() as db:
             row = db.execute(f"SELECT {_PAUSE} FROM pause WHERE server = ? AND item = ?", where).fetchone()  # noqa: S608
@@ -653,25 +653,25 @@ class Store(FileOrigins):
     # -- reading and changing ---------------------------------------------------------------------------
 
     def entries(self) -> tuple[Entry, ...]:
-        """All entries, oldest first."""
+        """Return all entries, oldest first."""
         with self._open() as db:
             return tuple(entry_of(row) for row in db.execute(f"{SELECT} ORDER BY e.id"))
 
     def entry(self, entry_id: int) -> Entry | None:
-        """One entry, None where it is gone."""
+        """Return one entry, None if it is gone."""
         return self._entry_where("e.id = ?", entry_id)
 
     def by_key(self, key: str) -> Entry | None:
-        """The entry of a commit, None where it is gone."""
+        """Return the entry of a commit, None if it is gone."""
         return self._entry_where("e.key = ?", key)
 
     def next_due(self, server: str, after: int) -> Entry | None:
-        """The oldest entry for a server that is newer than ``after`` and no person has to look at."""
+        """Return the oldest entry for a server that is newer than ``after`` and no person has to look at."""
         where = "e.state <> 'held' AND e.server IN ('', ?) AND e.id > ? ORDER BY e.id LIMIT 1"
         return self._entry_where(where, canonical(server), after)
 
     def bom(self, entry_id: int) -> tuple[str, str]:
-        """Extraction and merge request of an entry, as JSON; "" where there is none."""
+        """Return extraction and merge request of an entry, as JSON; "" if there is none."""
         with self._open() as db:
             row = db.execute("SELECT extraction, request FROM entry WHERE id = ?", (entry_id,)).fetchone()
         return (str(row[0]), str(row[1])) if row else ("", "")
@@ -693,8 +693,8 @@ class Store(FileOrigins):
         base: int | None = None,
         note: bool = True,
     ) -> None:
-        """The server has its file or its BOM. An entry of which nothing is left is gone, with its copy; until
-        then a server that is restored from a backup may need the copy once more.
+        """Note that the server has its file or its BOM. An entry of which nothing is left is removed, with
+        its copy; until then a server that is restored from a backup may need the copy once more.
 
         base
             the revision that the file was made from. A BOM of that one which a person still has to look at
@@ -730,8 +730,9 @@ class Store(FileOrigins):
     # -- copies -----------------------------------------------------------------------------------------
 
     def verified(self, entry: Entry) -> Path:
-        """The copy, after its hash was looked at. InputError where it is damaged, OSError where it cannot
-        be read."""
+        """Return the copy, after its hash was looked at. InputError if it is damaged, OSError if it cannot be
+        read.
+        """
         path = self.copies / entry.copy
         if content_hash(path) != entry.sha256:
             raise InputError(
@@ -797,7 +798,7 @@ class Store(FileOrigins):
 
 
 def _place(copy: Path, path: str) -> dict[str, str]:
-    """Where the file is and what it links to; nothing where it is not a FreeCAD file."""
+    """Return where the file is and what it links to; nothing where it is not a FreeCAD file."""
     if not path:
         return {}
     from silo.fcstd.linked import place_of
@@ -810,11 +811,11 @@ def _place(copy: Path, path: str) -> dict[str, str]:
 
 
 def _key_of(copy: str) -> str:
-    """Whose copy it is; one that is being made, or was cut off, has a point before its name."""
+    """Return whose copy it is; one that is being made, or was cut off, has a point before its name."""
     return copy.lstrip(".").split(".")[0]
 
 
 def _ending(file: Path) -> str:
-    """The ending of a copy; never that of a description."""
+    """Return the ending of a copy; never that of a description."""
     ending = file.suffix[:20]
     return f"{ending}.copy" if ending.casefold() in (".json", ".gone") else ending

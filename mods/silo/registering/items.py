@@ -112,14 +112,15 @@ class Registration:
 
 
 def component_key(entry: BomEntry) -> str:
-    """How the journal names a component; a path may be no text, and SQLite keeps text only."""
+    """Return how the journal names a component; a path may be no text, and SQLite keeps text only."""
     path = entry.doc_path.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
     return f"{path}#{entry.object_name}"
 
 
 def on_disk(entry: BomEntry, *, shares_file: bool = False) -> tuple[str, str]:
-    """FreeCAD's UUID of the component's document, and the component's identity, as they are on disk; "" for
-    none, and where the file cannot be read."""
+    """Return FreeCAD's UUID of the component's document, and the component's identity, as they are on disk;
+    "" for none, and where the file cannot be read.
+    """
     from silo.fcstd import Library
 
     if not os.path.isfile(entry.doc_path):
@@ -146,7 +147,7 @@ def finished(record: RegistrationRecord, journal: Journal) -> bool:
 
 
 def unclear(proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """The answer where nobody can be asked: an error that names the items."""
+    """Return the answer if nobody can be asked: an error that names the items."""
     numbers = ", ".join(str(item["part_number"]) for item in matches)
     raise ConflictError(
         f"{proposal.name}: {numbers} may be its item: made by an interrupted run, or registered from this "
@@ -202,7 +203,7 @@ class _Run:
     ask: Ask
 
     def item(self, check: Check, copy: bool) -> tuple[Mapping[str, Any], bool]:
-        """The component's item, which its file names, and whether it was there already."""
+        """Return the component's item, which its file names, and whether it was there already."""
         entry = self.proposal.entry
         uid, now = on_disk(entry, shares_file=self.proposal.shares_file)
         carried = entry.silo_uuid or ""
@@ -233,7 +234,7 @@ class _Run:
         return item, existing
 
     def _registered_meanwhile(self, identity: str) -> Mapping[str, Any]:
-        """The item that somebody gave the component since it was read."""
+        """Return the item that somebody gave the component since it was read."""
         entry = self.proposal.entry
         item = self.api.get_item_by_uuid(identity)
         if item is None:
@@ -246,8 +247,9 @@ class _Run:
         return item
 
     def _lost(self, uid: str) -> Mapping[str, Any] | None:
-        """The item of a document that was registered before and lost its identity, if a person says so:
-        FreeCAD saved over it, or a copy lies in its place, which has the same UUID."""
+        """Return the item of a document that was registered before and lost its identity, if a person says
+        so: FreeCAD saved over it, or a copy lies in its place, which has the same UUID.
+        """
         record = self.turn.journal.find(self.turn.component)
         if record is None or not record.finished or not uid or record.document_uid != uid:
             return None
@@ -255,7 +257,7 @@ class _Run:
         return None if item is None else self.ask(self.proposal, (item,))
 
     def _made(self, intent: RegistrationRecord, begun: bool, wanted: str) -> tuple[Mapping[str, Any], bool]:
-        """The component's item, and whether it was there already."""
+        """Return the component's item, and whether it was there already."""
         proposal, api = self.proposal, self.api
         item = self._made_before(intent) if begun or wanted else None
         was_there = item is not None
@@ -293,7 +295,7 @@ class _Run:
         return item
 
     def _made_before(self, intent: RegistrationRecord) -> Mapping[str, Any] | None:
-        """The item that this intent made, if it came that far."""
+        """Return the item that this intent made, if it came that far."""
         api = self.api
         for fromkey in dict.fromkeys((intent.item_id, intent.wanted)):
             item = api.get_item_by_uuid(fromkey)
@@ -322,7 +324,7 @@ def _may_have_arrived(error: SiloError) -> bool:
 
 
 def _of_the_same_name(proposal: Proposal, api: RegistrationApi, since: float) -> Iterator[Mapping[str, Any]]:
-    """The items of this description made since then, each once; by search, then by the whole list."""
+    """Yield the items of this description made since then, each once; by search, then by the whole list."""
     name, seen = proposal.name.casefold(), set()
     for item in _all_items(proposal.name, api):
         if str(item["id"]) in seen:
@@ -351,7 +353,7 @@ def _all_items(name: str, api: RegistrationApi) -> Iterator[Mapping[str, Any]]:
 
 
 def _mark(api: RegistrationApi, item: Mapping[str, Any]) -> str | None:
-    """The registration that an item names; None where it names none that can be read."""
+    """Return the registration that an item names; None if it names none that can be read."""
     mark = (item.get("properties") or {}).get(REGISTRATION_PROPERTY)
     if mark is None:
         try:
@@ -454,21 +456,21 @@ class Journal:
         self._clock, self._patience = clock, patience
 
     def pending(self) -> dict[str, str]:
-        """``file#object`` → the UUID that its item was to get, or has."""
+        """Return ``file#object`` → the UUID that its item was to get, or has."""
         return {record.component: record.item_id for record in self.unfinished()}
 
     def unfinished(self) -> list[RegistrationRecord]:
-        """The registrations whose file does not name its item yet, oldest first."""
+        """Return the registrations whose file does not name its item yet, oldest first."""
         return self._records("finished_at IS NULL ORDER BY begun_at")
 
     def find(self, component: str) -> RegistrationRecord | None:
-        """What is known of a component."""
+        """Return what is known of a component."""
         return next(iter(self._records("component = ?", component)), None)
 
     def begin(
         self, component: str, carried: str = "", beside: RegistrationRecord | None = None
     ) -> tuple[RegistrationRecord, bool]:
-        """The intent for a component's item, and whether an earlier run had already begun with it.
+        """Return the intent for a component's item, and whether an earlier run had already begun with it.
 
         carried
             the identity that its file has from elsewhere, and that the item shall have.
@@ -499,16 +501,16 @@ class Journal:
         self._write("UPDATE registrations SET item_id = ? WHERE component = ?", item_id, component)
 
     def done(self, component: str, document_uid: str = "") -> None:
-        """The component's file names its item."""
+        """Note that the component's file names its item."""
         changed = "UPDATE registrations SET finished_at = ?, document_uid = ? WHERE component = ?"
         self._write(changed, self._clock(), document_uid, component)
 
     def forget(self, component: str) -> None:
-        """The server made no item for it, or it was taken back."""
+        """Forget a component: the server made no item for it, or it was taken back."""
         self._write("DELETE FROM registrations WHERE component = ?", component)
 
     def item_ids(self) -> frozenset[str]:
-        """The items of all components that are known here."""
+        """Return the items of all components that are known here."""
         return frozenset(record.item_id for record in self._records("TRUE"))
 
     @contextmanager
@@ -584,12 +586,12 @@ class Turn:
         self.journal.replace(self.component, item_id)
 
     def done(self, document_uid: str) -> None:
-        """The component's file names its item."""
+        """Note that the component's file names its item."""
         self.journal.done(self.component, document_uid)
         self._release()
 
     def forget(self) -> None:
-        """The server certainly made no item for it."""
+        """Forget a component: the server certainly made no item for it."""
         self.journal.forget(self.component)
         self._release()
 
@@ -610,7 +612,7 @@ class Turn:
 
 
 def begun_beside(path: str, component: str, document_uid: str) -> RegistrationRecord | None:
-    """What a computer has begun with a component, and says so in the folder of its file.
+    """Return what a computer has begun with a component, and says so in the folder of its file.
 
     document_uid
         FreeCAD's own UUID of the file as it is now: another file of the same name continues nothing.
@@ -630,7 +632,7 @@ def _beside(path: str) -> str:
 
 
 def _reserved(path: str) -> dict[str, dict[str, Any]]:
-    """What is begun in a folder, by ``file#object``."""
+    """Return what is begun in a folder, by ``file#object``."""
     try:
         with open(path, encoding="utf-8") as file:
             reserved = json.load(file)

@@ -82,7 +82,7 @@ class ComponentState(StrEnum):
 
     @property
     def usable(self) -> bool:
-        """True where the identity can be written."""
+        """Return True if the identity can be written."""
         return self in (ComponentState.READY, ComponentState.EDITED, ComponentState.ELSEWHERE)
 
 
@@ -133,7 +133,7 @@ class Learnt:
 
     @property
     def recent(self) -> tuple[str, ...]:
-        """The categories that were chosen last, the newest first."""
+        """Return the categories that were chosen last, the newest first."""
         folder = self._folders.get("")
         return tuple(map(str, folder)) if isinstance(folder, list) else ()
 
@@ -187,7 +187,9 @@ class Candidate:
 
     @property
     def decided(self) -> bool:
-        """True for what is modelled in the assembly's file and a component already, or said to be no part."""
+        """Return True for what is modelled in the assembly's file and a component already, or said to be no
+        part.
+        """
         return self.article is not None and self.article.decided
 
     @property
@@ -196,8 +198,9 @@ class Candidate:
 
     @property
     def foreign(self) -> bool:
-        """True where the file carries an identity that the server does not know, from another server or from
-        another computer's run."""
+        """Return True if the file carries an identity that the server does not know, from another server or
+        from another computer's run.
+        """
         has_one = bool(self.entry.silo_uuid) and not self.entry.is_standard
         return has_one and not self.same_as and self.article is None
 
@@ -207,7 +210,7 @@ class Candidate:
 
     @property
     def wanted(self) -> bool:
-        """Checked to begin with? Not where a person has to look first."""
+        """Return True if it is checked to begin with, so if no person has to look first."""
         fine = self.state.usable and self.state is not ComponentState.ELSEWHERE
         if self.proposal.is_guess or self.article is not None or self.foreign:
             return False
@@ -265,7 +268,7 @@ class Offer:
 
 
 def copied(extraction: Extraction) -> tuple[BomEntry, ...]:
-    """The components that carry an identity which another file carries too."""
+    """Return the components that carry an identity which another file carries too."""
     places = {
         (place.doc_path, place.obj)
         for finding in extraction.findings
@@ -287,7 +290,7 @@ def offer(
     own_file: bool = True,
     learnt: Learnt | None = None,
 ) -> Offer:
-    """What can be registered of an assembly; a part is an extraction without entries.
+    """Return what can be registered of an assembly; a part is an extraction without entries.
 
     most
         look-alikes are searched for so many components; None for all.
@@ -339,7 +342,7 @@ def offer(
 
 
 def _perhaps_copies(extraction: Extraction, numbers: Mapping[str, str], api: Any) -> tuple[BomEntry, ...]:
-    """The copied ones, and the document itself where its item's file has another name."""
+    """Return the copied ones, and the document itself where its item's file has another name."""
     entries, top = copied(extraction), extraction.assembly
     number = numbers.get((top.silo_uuid or "").lower())
     if number is None or any(entry.key == top.key for entry in entries):
@@ -363,7 +366,7 @@ def _candidate(
     learnt: Learnt,
     copied: Mapping[str, str],
 ) -> Candidate:
-    """``copied``: the number of each identity that another file carries too."""
+    """Make a candidate. ``copied``: the number of each identity that another file carries too."""
     proposal, same_as = (
         propose(entry, categories, shares_file=entry.doc_path in crowded),
         copied.get((entry.silo_uuid or "").lower(), ""),
@@ -391,7 +394,7 @@ def _candidate(
 def _modelled(
     extraction: Extraction, seen: Mapping[str, OpenedFile], categories: Mapping[str, str]
 ) -> list[Candidate]:
-    """What the saved file of the assembly holds that could be declared, or is; those come last."""
+    """Return what the saved file of the assembly holds that could be declared, or is; those come last."""
     top = extraction.assembly
     look = seen.get(top.doc_path, OpenedFile(ComponentState.MISSING))
     try:
@@ -407,7 +410,8 @@ def _modelled(
 
 
 def changed_since(entry: BomEntry, saved_at: str) -> bool:
-    """True where the file is not the one that was opened: saved by somebody else, or registered meanwhile.
+    """Return True if the file is not the one that was opened: saved by somebody else, or registered
+    meanwhile.
 
     saved_at
         the open document's own time stamp.
@@ -422,14 +426,18 @@ def changed_since(entry: BomEntry, saved_at: str) -> bool:
 
 
 def fingerprint(path: str) -> str:
-    """What changes whenever FreeCAD saves a file, and stays when an identity is stamped; "" where unknown."""
+    """Return what changes whenever FreeCAD saves a file, and stays when an identity is stamped; "" if
+    unknown.
+    """
     head, content = _look_into(path)
     match = _SAVED_AT.search(head)
     return hashlib.sha256(repr((match and match[1], content)).encode()).hexdigest()[:16] if head else ""
 
 
 def _look_into(path: str) -> tuple[bytes, list[tuple[str, int]]]:
-    """The document's own properties, which come first (a hostile file may never end), and what is beside."""
+    """Return the document's own properties, which come first (a hostile file may never end), and what is
+    beside.
+    """
     try:
         with zipfile.ZipFile(path) as file, file.open("Document.xml") as xml:
             beside = [
@@ -452,7 +460,7 @@ def picture_in(path: str) -> bytes:
 
 
 def sha256_or_nothing(path: str) -> str:
-    """The hash of a file's content; "" where it cannot be read."""
+    """Return the hash of a file's content; "" if it cannot be read."""
     try:
         return content_hash(path)
     except OSError:
@@ -466,7 +474,7 @@ def _with_look_alikes(
     begun: Mapping[str, str],
     most: int | None,
 ) -> tuple[list[Candidate], str]:
-    """The candidates with what they may be already; why nobody knows, where the server did not say."""
+    """Return the candidates with what they may be already; why nobody knows, where the server did not say."""
     # An item of a standard part's designation is joined, no matter who made it.
     asked = [
         each_candidate
@@ -515,7 +523,7 @@ def _next_numbers(candidates: Iterable[Candidate], api: Any, schema: str) -> dic
 
 
 def next_number(api: Any, schema: str, category: str) -> str:
-    """The number that the next item of a category would get; "" where the server does not say."""
+    """Return the number that the next item of a category would get; "" if the server does not say."""
     try:
         return str(api.generate_part_number(api.find_schema(schema), category))
     except SiloError:
@@ -550,16 +558,16 @@ class Modelled:
 
     @property
     def decided(self) -> bool:
-        """True where a person has said what it is: a component, or no part."""
+        """Return True if a person has said what it is: a component, or no part."""
         return self.declared or self.no_part
 
     @property
     def declared(self) -> bool:
-        """True where it is a component already."""
+        """Return True if it is a component already."""
         return self.entry.silo_uuid is not None
 
     def apart(self) -> tuple[Modelled, ...]:
-        """Each object as an article of its own; the quantity of each is not known then."""
+        """Return each object as an article of its own; the quantity of each is not known then."""
         return tuple(
             replace(
                 self, entry=replace(self.entry, object_name=name, label=name, quantity=1), objects=(name,)
@@ -569,7 +577,7 @@ class Modelled:
 
 
 def modelled(path: str, assembly: str | None = None) -> list[Modelled]:
-    """What is modelled in the file of an assembly, read without FreeCAD. DocumentError, InputError."""
+    """Return what is modelled in the file of an assembly, read without FreeCAD. DocumentError, InputError."""
     with Library() as library:
         return modelled_in(choose_assembly(library.open(path), assembly), _shape_of)
 
@@ -582,7 +590,9 @@ def _shape_of(obj: object) -> str:
 
 
 def chosen(articles: Sequence[Modelled], names: Iterable[str], *, apart: bool = False) -> list[Modelled]:
-    """The articles that these names (or labels) mean, each once. InputError for a name that means none."""
+    """Return the articles that these names (or labels) mean, each once. InputError for a name that means
+    none.
+    """
     by_chain: dict[tuple[str, ...], Modelled] = {}
     for name in names:
         fitting = [article for article in articles if name in article.objects] or [
@@ -598,7 +608,7 @@ def chosen(articles: Sequence[Modelled], names: Iterable[str], *, apart: bool = 
 
 
 def source_identity(article: Modelled) -> str | None:
-    """The identity of the file that A2plus imported an article from; None where there is none to be read."""
+    """Return the identity of the file that A2plus imported an article from; None if there is none to be read."""
     if not article.source or not os.path.isfile(article.source):
         return None
     try:
@@ -609,7 +619,8 @@ def source_identity(article: Modelled) -> str | None:
 
 
 def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
-    """The articles modelled in the file of an assembly (or of a single part); what is decided comes last.
+    """Return the articles modelled in the file of an assembly (or of a single part); what is decided comes
+    last.
 
     shape_of
         something equal for equal shapes wherever they are placed; "" where that is not known.
@@ -642,7 +653,7 @@ def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
 
 
 def label_stem(label: str, labels: Set[str]) -> str:
-    """A label without the number that FreeCAD gives to copies; "" where that says nothing.
+    """Return a label without the number that FreeCAD gives to copies; "" if that says nothing.
 
     labels
         all labels: a number is FreeCAD's only where the label without it is there too.
@@ -653,7 +664,7 @@ def label_stem(label: str, labels: Set[str]) -> str:
 
 
 def _alike(objects: Iterable[Any], shape_of: Callable[[Any], str]) -> list[tuple[list[Any], str]]:
-    """Equal objects together: those of one shape, and those of one label whose shapes do not differ."""
+    """Group equal objects: those of one shape, and those of one label whose shapes do not differ."""
     groups: list[tuple[list[Any], str]] = []
     by_shape: dict[tuple[str, str], int] = {}
     by_stem: dict[str, int] = {}

@@ -96,7 +96,7 @@ class Order:
 
     @classmethod
     def of(cls, candidate: Candidate) -> Order:
-        """A row as it was proposed."""
+        """Return a row as it was proposed."""
         return cls(candidate, **{name: getattr(candidate.proposal, name) for name in CHOSEN})
 
     @property
@@ -105,13 +105,13 @@ class Order:
 
     @property
     def teaches(self) -> bool:
-        """True where a person chose something that the next part of such a name shall have too."""
+        """Return True if a person chose something that the next part of such a name shall have too."""
         before, entry = self.candidate.proposal, self.candidate.entry
         changed = (self.category, self.sourcing) != (before.category, before.sourcing)
         return changed and not entry.is_standard and not entry.is_assembly and self.existing is None
 
     def retyped(self, item_type: str, categories: Mapping[str, str]) -> Order:
-        """With another type; the category follows where it is still one that was proposed.
+        """Return the order with another type; the category follows where it is still one that was proposed.
 
         categories
             code → description, as the schema has them.
@@ -134,7 +134,7 @@ AskOrder = Callable[[Order, Proposal, Sequence[Mapping[str, Any]]], Mapping[str,
 
 
 def seen_before(order: Order, proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> None:
-    """None (make a new item) where the person saw these items in the dialog and took none of them."""
+    """Return None (make a new item) if the person saw these items in the dialog and took none of them."""
     shown = {similar.item_id for similar in order.candidate.similar}
     if not all(str(item["id"]) in shown for item in matches):
         unclear(proposal, matches)
@@ -274,7 +274,9 @@ class _Run:
         return replace(done[0], proposal=order.proposal, part_number=numbers)
 
     def _as_imported(self, candidate: Candidate, article: Modelled) -> Registration | None:
-        """With the identity of the file that A2plus imported it from; None where Silo has no such item."""
+        """Register with the identity of the file that A2plus imported it from; None where Silo has no such
+        item.
+        """
         try:
             identity = source_identity(article)
             item = self.api.get_item_by_uuid(identity) if identity else None
@@ -305,7 +307,7 @@ _NOBODY = _Nobody()
 def whole_folder(
     plan: Plan, reading: VaultReader, base: str, *, hardware: bool = True
 ) -> tuple[Extraction, frozenset[str]]:
-    """All components of a folder's assemblies, and the files that no assembly uses."""
+    """Return all components of a folder's assemblies, and the files that no assembly uses."""
     from silo.vault.reading import Question
 
     entries: dict[tuple[str, str], BomEntry] = {}
@@ -327,7 +329,7 @@ def whole_folder(
 
 
 def seen_on_disk(paths: Iterable[str], *, even_if_open: bool) -> dict[str, OpenedFile]:
-    """How the files of components stand."""
+    """Return how the files of components stand."""
     opened = None if even_if_open else open_in_any()
     return {path: OpenedFile(_state(path, opened)) for path in paths}
 
@@ -341,7 +343,7 @@ def _state(path: str, opened: OpenInFreecad | None) -> ComponentState:
 
 
 def is_own(candidate: Candidate) -> bool:
-    """True where the look-alike is its own item, made by a run that was interrupted or undone."""
+    """Return True if the look-alike is its own item, made by a run that was interrupted or undone."""
     entry, component = candidate.entry, component_key(candidate.entry)
     uid = on_disk(entry)[0]
     record = Journal().find(component) or begun_beside(entry.doc_path, component, uid)
@@ -370,7 +372,7 @@ def carry_out_on_disk(
     results: list[Registration] = [] if done is None else done
 
     def places(candidate: Candidate) -> list[tuple[str | None, str | None]]:
-        """(the object that the identity is for, the object that gets the property), each once."""
+        """Return (the object that the identity is for, the object that gets the property), each once."""
         if candidate.article is not None:
             return [(name, name) for name in candidate.article.objects]
         name = candidate.entry.object_name
@@ -404,7 +406,7 @@ def carry_out_on_disk(
 
 
 def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> list[Proposal]:
-    """What to register: the components without an item, parts first, and the assembly itself last."""
+    """Return what to register: the components without an item, parts first, and the assembly itself last."""
     wanted = resolve(extraction, client).unregistered
     tree = (extraction.assembly, *extraction.entries)
     return propose_all(wanted, tree, client.categories(schema)) if wanted else []
@@ -452,13 +454,13 @@ Key = tuple[str, str]
 
 
 def key_of(candidate: Candidate, base: str) -> Key:
-    """How a table names a component."""
+    """Return how a table names a component."""
     entry = candidate.entry
     return ("", entry.standard) if entry.standard else (relative(entry.doc_path, base), entry.object_name)
 
 
 def doubts(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
-    """Why it may be an item already; ``earlier``: the candidates before it, which get theirs first."""
+    """Return why it may be an item already; ``earlier``: the candidates before it, which get theirs first."""
     result = [
         f"Silo has this very file as {similar.part_number}"
         if similar.same_file
@@ -475,7 +477,7 @@ def doubts(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
 
 
 def remarks(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
-    """What a person should know of a row."""
+    """Return what a person should know of a row."""
     result = doubts(candidate, earlier)
     if candidate.proposal.is_guess:
         result.append("the category is a guess")
@@ -489,7 +491,7 @@ def remarks(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
 
 
 def write_table(offer: Offer, wanted: Callable[[Candidate], bool], base: str) -> bytes:
-    """The table (RFC 4180, UTF-8 with a mark that spreadsheets want); ``wanted``: what says ``yes``."""
+    """Return the table (RFC 4180, UTF-8 with a mark that spreadsheets want); ``wanted``: what says ``yes``."""
     out = io.StringIO()
     writer = csv.DictWriter(out, COLUMNS)
     writer.writeheader()
@@ -523,12 +525,12 @@ def _as_text(cell: str) -> str:
 
 
 def _as_written(cell: str) -> str:
-    """What :func:`_as_text` was given."""
+    """Return what :func:`_as_text` was given."""
     return cell[1:] if cell.startswith("'") and _NO_TEXT.fullmatch(cell) else plain_cell(cell)
 
 
 def _fingerprint(candidate: Candidate) -> str:
-    """A letter first: sixteen digits alone are a number to a spreadsheet, which rounds it."""
+    """Return a letter first: sixteen digits alone are a number to a spreadsheet, which rounds it."""
     checksum = "" if candidate.entry.is_standard else fingerprint(candidate.entry.doc_path)
     return checksum and f"x{checksum}"
 
@@ -548,7 +550,7 @@ class TableRow:
 
 
 def read_table(data: bytes, name: str) -> list[TableRow]:
-    """The rows of a table, as a spreadsheet or an editor saved it. InputError lists all that is wrong."""
+    """Return the rows of a table, as a spreadsheet or an editor saved it. InputError lists all that is wrong."""
     text = _decoded(data, name)
     first = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=first.count)
@@ -608,7 +610,9 @@ class Planned:
 
 
 def orders_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name: str) -> Planned:
-    """The orders of a table. InputError lists all problems with their lines; then nothing is registered."""
+    """Return the orders of a table. InputError lists all problems with their lines; then nothing is
+    registered.
+    """
     candidates = {
         key_of(each_candidate, base): each_candidate
         for each_candidate in offer.candidates
@@ -687,7 +691,7 @@ def _order(
 
 
 def _joined_before(order: Order, earlier: list[Order]) -> list[str]:
-    """A number that was copied down a column makes one item of several parts."""
+    """Find a number that was copied down a column, which makes one item of several parts."""
     others = [other for other in earlier if other.candidate.sha256 != order.candidate.sha256]
     earlier.append(order)
     number = order.existing.part_number if order.existing else ""
@@ -703,7 +707,7 @@ def _changed(before: str, candidate: Candidate) -> bool:
 
 
 def wrong_name(name: str, candidate: Candidate) -> str:
-    """What is wrong with an item's name; "" where nothing is."""
+    """Return what is wrong with an item's name; "" if nothing is."""
     if not name:
         return "name: it is empty"
     if candidate.entry.standard and name != candidate.entry.standard:
@@ -720,7 +724,7 @@ def wrong_name(name: str, candidate: Candidate) -> str:
 
 
 def find_item(number: str, candidate: Candidate, api: Any) -> Similar:
-    """The item that a component shall join. InputError where it cannot."""
+    """Return the item that a component shall join. InputError if it cannot."""
     if candidate.entry.is_standard:
         raise InputError("a standard part has its item by its designation; leave this empty")
     try:

@@ -42,7 +42,7 @@ class Range:
 
 
 def parse_range(repository: str, text: str) -> Range:
-    """``A..B``, ``A...B`` (from where B branched off A), or ``A`` (against the work tree).
+    """Return ``A..B``, ``A...B`` (from where B branched off A), or ``A`` (against the work tree).
 
     Raises InputError where git does not know a revision.
     """
@@ -57,8 +57,8 @@ def parse_range(repository: str, text: str) -> Range:
 
 
 def top_of(folder: Path | str) -> tuple[str, str, bool]:
-    """The repository that a folder lies in, the folder below it with ``/`` ("" for the top itself), and
-    whether there is a work tree.
+    """Return the repository that a folder lies in, the folder below it with ``/`` ("" for the top itself),
+    and whether there is a work tree.
 
     The folder may be gone: a revision may have it. Raises InputError.
     """
@@ -129,7 +129,7 @@ def lay_out(
 
 
 def _listed(repository: str, revision: str) -> Iterator[tuple[bytes, str, str]]:
-    """Mode, object and path of what is to be laid out."""
+    """Yield mode, object and path of what is to be laid out."""
     for record in _git(repository, "ls-tree", "-r", "-z", "--full-tree", revision).split(b"\0"):
         head, _, raw = record.partition(b"\t")
         name = os.fsdecode(raw)
@@ -163,7 +163,7 @@ def _submodule(
 
 
 def _lay_link(path: Path, to: str, target: Path) -> None:
-    """A symbolic link that stays inside. Where a system makes no links, its file is missing."""
+    """Make a symbolic link that stays inside. If a system makes no links, its file is missing."""
     meant = os.path.join(os.path.dirname(path), to)
     inside = _is_below(path.parent, target) and _is_below(Path(os.path.normpath(meant)), target)
     if inside and not os.path.isabs(to) and not os.path.lexists(path):
@@ -270,7 +270,7 @@ def _git(repository: str, *words: str) -> bytes:
 
 
 def _no_answer(repository: str, words: Sequence[str]) -> str:
-    """Why git may have said nothing."""
+    """Return why git may have said nothing."""
     said = "there is no common ancestor" if words[0] == "merge-base" else "it does not know this revision"
     if _git(repository, "rev-parse", "--is-shallow-repository").strip() == b"true":
         said += "; the clone is shallow, so fetch more of it (git fetch --unshallow)"

@@ -98,7 +98,7 @@ class IndexDatabase:
             self._guard.close()
 
     def select(self, statement: str, *values: str) -> list[Any]:
-        """Rows; none where the database fails."""
+        """Return rows; none where the database fails."""
         try:
             return self._database.execute(statement, values).fetchall()
         except sqlite3.Error as error:
@@ -106,7 +106,7 @@ class IndexDatabase:
             return []
 
     def select_in(self, statement: str, paths: Sequence[str], *values: str) -> Iterator[Any]:
-        """Rows whose path is one of these; ``statement`` ends with ``IN``."""
+        """Yield rows whose path is one of these; ``statement`` ends with ``IN``."""
         for at in range(0, len(paths), _VARIABLES):
             some = paths[at : at + _VARIABLES]
             marks = ",".join("?" * len(some))
@@ -158,7 +158,7 @@ class IndexDatabase:
             self._give_up(error)
 
     def _give_up(self, error: sqlite3.Error | OSError) -> None:
-        """The database fails: what it holds is read as long as it can be, and nothing is written any more."""
+        """Stop writing to a database that fails; read from it as long as that works."""
         if not self.trouble:
             self.trouble = f"the index {self.path} cannot be used ({error}); nothing is lost but time"
             log.warning("%s", self.trouble)
@@ -173,7 +173,7 @@ class IndexDatabase:
 
 
 def _empty() -> sqlite3.Connection:
-    """A database of this process alone, on disk where it grows large."""
+    """Return a database of this process alone, on disk where it grows large."""
     database = sqlite3.connect("", isolation_level=None)
     database.executescript(_TABLES)
     return database
@@ -184,7 +184,9 @@ class _Unusable(Exception):
 
 
 def _connected(path: Path) -> sqlite3.Connection:
-    """An open database of our format. Raises _Unusable, sqlite3.OperationalError (locked, full, no right)."""
+    """Return an open database of our format. Raises _Unusable, sqlite3.OperationalError (locked, full, no
+    right).
+    """
     database = sqlite3.connect(path, timeout=_BUSY_S, isolation_level=None)
     try:
         database.execute("PRAGMA synchronous = NORMAL")
@@ -224,7 +226,7 @@ def _removed(path: Path) -> bool:
 
 
 def _may_replace(path: Path) -> bool:
-    """True for a path where nothing is, and for a database of ours, however damaged behind its head."""
+    """Return True for a path where nothing is, and for a database of ours, however damaged behind its head."""
     try:
         with path.open("rb") as file:
             head = file.read(72)
@@ -241,7 +243,7 @@ _SETTLED_NS = 2_500_000_000  # FAT has ticks of 2 s, the coarsest in use
 
 @cache
 def engine() -> str:
-    """A name for the code that reads documents: another one where any of it differs."""
+    """Return a name for the code that reads documents: another one where any of it differs."""
     digest = sha256(f"{FORMAT}".encode())
     for package in (silo.bom, silo.fcstd):
         for folder in package.__path__:
@@ -262,7 +264,7 @@ class SeenFile(NamedTuple):
 
     @classmethod
     def of(cls, content: Content | Remembered) -> SeenFile:
-        """What was read."""
+        """Return what was read."""
         state = content.state
         return cls(
             content.digest,
@@ -275,7 +277,9 @@ class SeenFile(NamedTuple):
 
     @classmethod
     def unread(cls, error: FcstdError) -> SeenFile | None:
-        """What could not be read: known by its state, so that any change of it counts. None without one."""
+        """Return what could not be read: known by its state, so that any change of it counts. None without
+        one.
+        """
         state = error.state
         if not isinstance(state, FileState):
             return None
@@ -283,17 +287,17 @@ class SeenFile(NamedTuple):
         return cls(content, state.inode, state.size, state.modified_ns, 0, 0)
 
     def text(self) -> str:
-        """For the index."""
+        """Return the key for the index."""
         return f"{self.inode} {self.size} {self.modified_ns} {self.changed_ns} {self.read_ns} {self.content}"
 
     @classmethod
     def from_text(cls, text: str) -> SeenFile:
-        """What :meth:`text` wrote."""
+        """Return what :meth:`text` wrote."""
         *numbers, content = text.split(" ", 5)
         return cls(content, *map(int, numbers))
 
     def still(self, status: os.stat_result) -> bool:
-        """True where the file certainly is what it was then."""
+        """Return True if the file certainly is what it was then."""
         then = (self.inode, self.size, self.modified_ns, self.changed_ns)
         now = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
         return then == now and max(self.modified_ns, self.changed_ns) + _SETTLED_NS < self.read_ns
@@ -321,7 +325,7 @@ class StoredAnswer(NamedTuple):
 
     @classmethod
     def found_in(cls, library: Library, answer: Any) -> StoredAnswer:
-        """An answer that was found in a session which did nothing else."""
+        """Return an answer that was found in a session which did nothing else."""
         seen: dict[str, SeenFile] = {}
         lasting = True
         for path, document in library.documents.items():
@@ -347,12 +351,12 @@ class StoredAnswer(NamedTuple):
 
     @property
     def is_of_one_file(self) -> bool:
-        """True where nothing but the very file that was asked about was read, and no link followed."""
+        """Return True if nothing but the very file that was asked about was read, and no link followed."""
         return not self.trail.startswith("[")
 
     @property
     def links(self) -> frozenset[str]:
-        """The files that links lead to, counted or not; of those that are not there what is recorded."""
+        """Return the files that links lead to, counted or not; of those that are not there what is recorded."""
         if self.is_of_one_file:
             return frozenset()
         files, lookups = json.loads(self.trail)
@@ -387,7 +391,7 @@ _ANSWERS = "SELECT path, answer, trail, mark FROM answers"
 
 
 def default_path() -> Path:
-    """The user's index."""
+    """Return the user's index."""
     return cache_folder() / "documents.sqlite3"
 
 
@@ -396,7 +400,7 @@ def _mark(*texts: str) -> int:
 
 
 def _facts_mark(path: str, facts: str) -> bytes:
-    """Also keep what other code has recorded, which must never be taken."""
+    """Return the mark of the code that made the facts; what other code recorded must never be used."""
     text = f"{engine()}\0{path}\0{facts}"
     return blake2b(text.encode("utf-8", "surrogateescape"), digest_size=16).digest()
 
@@ -428,7 +432,7 @@ class Index:
 
     @property
     def trouble(self) -> str:
-        """Why nothing is kept; "" where all is well."""
+        """Return why nothing is kept; "" if all is well."""
         return self._database.trouble
 
     def __enter__(self) -> Index:
@@ -445,11 +449,11 @@ class Index:
     # --- answers ----------------------------------------------------------------------------------------
 
     def recall(self, path: str, question: str) -> StoredAnswer | None:
-        """The answer to a question about a file; None where it must be read (again)."""
+        """Return the answer to a question about a file; None if it must be read (again)."""
         return next(self.recall_all([(path, question)]))
 
     def recall_all(self, asked: Sequence[tuple[str, str]]) -> Iterator[StoredAnswer | None]:
-        """The same for several questions, in their order."""
+        """Yield the same for several questions, in their order."""
         rows: dict[tuple[str, str], tuple[str, str, int]] = {}
         for question in dict.fromkeys(question for _, question in asked):
             paths = [_text(path) for path, wanted in asked if wanted == question]
@@ -507,7 +511,7 @@ class Index:
             self.save()
 
     def facts(self, paths: Sequence[str]) -> dict[str, str]:
-        """The facts of these files, of those that are what they were then."""
+        """Return the facts of these files, of those that are what they were then."""
         facts_by_path = {path: self._facts[path] for path in paths if path in self._facts}
         rows = {
             path: (facts, mark)
@@ -525,7 +529,7 @@ class Index:
         }
 
     def content(self, path: str) -> str | None:
-        """What lies at a path without symlinks now, as the trails name it; None where nobody can say."""
+        """Return what lies at a path without symlinks now, as the trails name it; None if nobody can say."""
         if path not in self._now:
             self._now[path] = self._look(path)
         seen = self._now[path]
@@ -549,14 +553,14 @@ class Index:
         return seen
 
     def _leads(self, folders: tuple[str, ...], recorded: str) -> str:
-        """Where a link leads now."""
+        """Return where a link leads now."""
         key = (folders, recorded)
         if (now := self._led.get(key)) is None:
             now = self._led[key] = led_to(self._locator.find(recorded, folders))
         return now
 
     def untouched(self, path: str) -> bool:
-        """True where a file is still in the state in which this run found it. From any thread."""
+        """Return True if a file is still in the state in which this run found it. From any thread."""
         seen = self._now.get(path)
         try:
             status = os.stat(path)
@@ -568,7 +572,7 @@ class Index:
     # --- where items were -------------------------------------------------------------------------------
 
     def places(self, vault: str) -> dict[str, set[str]]:
-        """Identity → files that carried it when the vault was last read."""
+        """Return identity → files that carried it when the vault was last read."""
         result: dict[str, set[str]] = {}
         rows = self._database.select("SELECT uuid, path FROM places WHERE vault = ?", _text(vault))
         for uuid, path in rows:
@@ -584,7 +588,7 @@ class Index:
         )
 
     def told(self, vault: str) -> frozenset[str] | None:
-        """What the last report about the vault said; None if there was none."""
+        """Return what the last report about the vault said; None if there was none."""
         rows = self._database.select("SELECT sentence FROM told WHERE vault = ?", _text(vault))
         return frozenset(os.fsdecode(sentence) for (sentence,) in rows) - {""} if rows else None
 
@@ -664,7 +668,7 @@ class Index:
 
 
 def _below(folder: str) -> tuple[str, str]:
-    """Between these lie the paths below a folder, in the order of the database."""
+    """Return two texts, between which lie the paths below a folder, in the order of the database."""
     begin = _text(os.path.join(folder, ""))
     return begin, begin[:-1] + chr(ord(os.sep) + 1)
 

@@ -73,7 +73,7 @@ class FolderBoms:
 
     @property
     def complete(self) -> bool:
-        """True where every file was read and every BOM is whole."""
+        """Return True if every file was read and every BOM is whole."""
         return not self.unreadable and not self.findings
 
 
@@ -114,7 +114,9 @@ def read_folder(
 
 
 def _without(message: str, base: str, root: Path | str | None) -> str:
-    """A message whose paths begin at the folder, also those beside it: the root may be a temporary one."""
+    """Return a message whose paths begin at the folder, also those beside it: the root may be a temporary
+    one.
+    """
     message = shorten(message, base)
     if root is None or (top := os.path.realpath(root)) == base:
         return message
@@ -122,7 +124,7 @@ def _without(message: str, base: str, root: Path | str | None) -> str:
 
 
 def _users_first(paths: Sequence[str], library: Library) -> list[str]:
-    """Files that no other links to come first, so that what they use is walked once, as part of them."""
+    """Return files that no other links to come first, so that what they use is walked once, as part of them."""
     used: set[str] = set()
     for path in paths:
         with suppress(SiloError):  # reported where it is read
@@ -133,7 +135,7 @@ def _users_first(paths: Sequence[str], library: Library) -> list[str]:
 def _extractions(
     library: Library, path: str, assemblies: dict[tuple[str, str], ComparedAssembly]
 ) -> Iterator[Extraction]:
-    """The BOMs of a file's assemblies, without those that were read as part of another one."""
+    """Yield the BOMs of a file's assemblies, without those that were read as part of another one."""
     document = library.open(path)
     for top in _tops(document):
         if (document.FileName, top.Name) not in assemblies:
@@ -148,7 +150,7 @@ def _tops(document: Any) -> Iterable[Any]:
 
 
 def _assemblies(extraction: Extraction) -> Iterator[ComparedAssembly]:
-    """The assembly itself and every sub-assembly below it that has lines."""
+    """Yield the assembly itself and every sub-assembly below it that has lines."""
     seen: set[int] = set()
     stack = [(extraction.assembly, extraction.entries)]
     while stack:
@@ -229,7 +231,7 @@ class Plan:
     _files: dict[str, str] = field(default_factory=dict)
 
     def extraction(self, node: PlannedAssembly, reading: VaultReader) -> Extraction:
-        """What an assembly holds, with all that the whole plan knows of it. Raises SiloError."""
+        """Return what an assembly holds, with all that the whole plan knows of it. Raises SiloError."""
         error = reading.ask(node.question).found
         if isinstance(error, SiloError):
             raise error
@@ -328,13 +330,15 @@ _Rows = tuple[_Row, list[_Row]]
 
 
 def _rows(plain: Mapping[str, Any]) -> _Rows:
-    """The assembly, and its components."""
+    """Return the assembly, and its components."""
     table = plain["table"]
     return whole_row(table[plain["assembly"]]), [whole_row(table[number]) for number in plain["entries"]]
 
 
 def _is_part(plain: Mapping[str, Any], head: _Row, entries: Sequence[_Row]) -> bool:
-    """No assembly: nothing in it, or an unregistered file of screws or parts for others to link."""
+    """Return True if it is no assembly: nothing in it, or an unregistered file of screws or parts for others
+    to link.
+    """
     if any(finding["severity"] == Severity.ERROR for finding in plain["findings"]):
         return False
     if not entries:  # a named assembly of own parts that are no items yet is one anyway
@@ -386,7 +390,7 @@ def _entry(row: Mapping[str, Any]) -> BomEntry:
 
 
 def _add_used_parts(plan: Plan, reading: VaultReader, hardware: bool, recursive: bool) -> None:
-    """Named assemblies without components are left alone, except where another assembly uses them."""
+    """Add named assemblies without components if another assembly uses them."""
     if not recursive:
         return
     used = {key: node.top for node in plan.nodes.values() for key in node.below}
@@ -430,7 +434,9 @@ def _put_in_order(plan: Plan) -> None:
 
 
 def _report_rings(plan: Plan, keys: Sequence[Key]) -> None:
-    """Assemblies that contain themselves, and those above them: nobody knows how many pieces that makes."""
+    """Report assemblies that contain themselves, and those above them: nobody knows how many pieces that
+    makes.
+    """
     rings = Rings({key: plan.nodes[key].below for key in plan.nodes})
     for key in keys:
         members = [key] if rings.same_ring(key, key) else [k for k in keys if rings.same_ring(k, k)]
@@ -440,7 +446,7 @@ def _report_rings(plan: Plan, keys: Sequence[Key]) -> None:
 
 
 def _find_copies(plan: Plan) -> None:
-    """Files that claim to be one item: fine where they hold the same, else no BOM of that item is right."""
+    """Find files that claim to be one item: fine where they hold the same, else no BOM of that item is right."""
     users: dict[str, list[PlannedAssembly]] = {}
     for node in plan.nodes.values():
         if node.uuid:
@@ -478,7 +484,7 @@ def _tell(plan: Plan, key: Key, code: FindingCode, message: str, where: Iterable
 
 
 def _find_meant(plan: Plan, reading: VaultReader) -> None:
-    """Which files were meant where some are missing; the project's files are read once for all of it."""
+    """Find the files that were meant if some are missing; read the project's files once for all of it."""
     broken = [node for node in plan.nodes.values() if node.broken]
     if not broken:
         return
@@ -543,7 +549,7 @@ class SyncJob:
         self._sent: dict[str, Future[Outcome]] = {}
 
     def results(self) -> Iterator[TopResult]:
-        """The result of each file, as soon as it is known; files that could not be read first."""
+        """Yield the result of each file, as soon as it is known; files that could not be read first."""
         for top, error in self.plan.errors.items():
             yield TopResult(top, self._base(top), error=error)
         try:
@@ -567,14 +573,14 @@ class SyncJob:
         return self.base or os.path.dirname(os.path.realpath(top))
 
     def _known_items(self) -> Known:
-        """What the server knows of everything in the plan, as far as it is needed."""
+        """Return what the server knows of everything in the plan, as far as it is needed."""
         items = known_items(self.plan.uuids, self.plan.standards.values(), self.api)
         return {
             key: {name: item.get(name) for name in _KEPT} for key, item in items.items() if item is not None
         }
 
     def _outcomes(self, nodes: Sequence[PlannedAssembly], items: Known) -> list[Outcome]:
-        """Of assemblies that do not depend on each other."""
+        """Sync assemblies that do not depend on each other."""
         several = [resolve_known(self.plan.extraction(node, self.reading), items) for node in nodes]
         numbers = [resolved.assembly.part_number for resolved in several]
         lines = self._lines([number for number in numbers if number is not None])
@@ -602,12 +608,14 @@ class SyncJob:
         ]
 
     def _with_suggestion(self, resolved: Resolved, lines: Lines) -> Resolved:
-        """Missing files, with those that have the identity which the server knows from the last sync."""
+        """Return missing files, with those that have the identity which the server knows from the last sync."""
         line = lines.get(resolved.assembly.part_number or "", ())
         return suggest_by_identity(resolved, [(resolved, line)], self._files_with if self.base else None)
 
     def _files_with(self, identities: Iterable[str]) -> set[str]:
-        """The files of the folder that have one of these identities: all were read, none is read again."""
+        """Return the files of the folder that have one of these identities: all were read, none is read
+        again.
+        """
         wanted = {identity.lower() for identity in identities}
         return {path for identity, path in self.plan.places | self.plan.spares if identity in wanted}
 
@@ -644,7 +652,7 @@ class SyncJob:
         return outcome
 
     def _source(self, resolved: Resolved) -> SourceDocument:
-        """The file of a BOM that is about to be sent; it must still be the one that was read."""
+        """Return the file of a BOM that is about to be sent; it must still be the one that was read."""
         if not self.reading.index.untouched(resolved.assembly.doc_path):
             raise DocumentError(
                 resolved.assembly.doc_path, "it was changed while the job ran; the next run takes it"
@@ -652,12 +660,12 @@ class SyncJob:
         return source_document(resolved.assembly)
 
     def _stop_for(self, error: SiloError) -> None:
-        """What concerns every request ends the job; the others have it as their error."""
+        """End the job for an error that concerns every request; the others get it as their error."""
         if self.stopped is None and ends_run(error, self.api):
             self.stopped = error
 
 
 def _as_the_first(resolved: Resolved, first: Outcome) -> Outcome:
-    """What became of a copy: what became of the file that was sent for both."""
+    """Return what became of a copy: what became of the file that was sent for both."""
     status = Status.UNCHANGED if first.status is Status.MERGED else first.status
     return replace(first, resolved=resolved, status=status, result=None)

@@ -90,7 +90,7 @@ class ProjectFile:
 
     @property
     def base(self) -> str:
-        """The content that it was made from, as far as the project remembers; "" where it does not."""
+        """Return the content that it was made from, as far as the project remembers; "" if it does not."""
         is_same_document = self.kept is not None and self.kept.document.lower() == self.document.lower()
         return self.kept.sha256 if is_same_document and self.kept is not None else ""
 
@@ -196,7 +196,7 @@ def read_project(tops: Sequence[str], project: Project, *, hardware: bool = True
 def _reached(
     paths: Iterable[str], locator: Locator, project: Project | None = None
 ) -> tuple[list[str], list[tuple[str, str]], list[tuple[str, str]], list[tuple[str, str]]]:
-    """The files and all that they link to, linked ones first; what is unreadable, outside, missing."""
+    """Return the files and all that they link to, linked ones first; what is unreadable, outside, missing."""
     order: list[str] = []
     unreadable: list[tuple[str, str]] = []
     outside: list[tuple[str, str]] = []
@@ -284,7 +284,7 @@ def _one_file_per_item(files: Sequence[ProjectFile]) -> tuple[list[ProjectFile],
 
 
 def _moved(file: ProjectFile, gone: Mapping[str, ProjectEntry], files: Sequence[ProjectFile]) -> ProjectFile:
-    """The file with its place before: a remembered file is gone, and only this one can be it."""
+    """Return the file with its place before: a remembered file is gone, and only this one can be it."""
     if file.kept is not None and (file.kept.document == file.document or not file.document):
         return file
     rules: tuple[Callable[[ProjectEntry], bool], ...] = (
@@ -338,7 +338,7 @@ def name_documents(belonging: Belonging, client: SiloClient | None, *, new: bool
 
 
 def _linked_documents(belonging: Belonging, client: SiloClient) -> dict[str, str]:
-    """Place → document, as the newest revisions of the registered files above record their links."""
+    """Return place → document, as the newest revisions of the registered files above record their links."""
     nameless = {file.place for file in belonging.files if not file.document}
     documents: dict[str, str] = {}
     users = [file for file in belonging.files if file.item] if nameless else []
@@ -384,7 +384,7 @@ def compare(belonging: Belonging, client: SiloClient | None, store: Store) -> li
 
 
 def _remembered(files: Iterable[ProjectFile]) -> dict[str, Revision]:
-    """The content that each file was made from, as if it were the newest."""
+    """Return the content that each file was made from, as if it were the newest."""
     return {
         file.document.lower(): Revision(revision_number=0, file_checksum=file.base)
         for file in files
@@ -483,7 +483,7 @@ def commits(
 
 
 def _users(belonging: Belonging) -> dict[str, str]:
-    """Place → an item whose file links to it, for a Silo that keeps other files as attachments."""
+    """Return place → an item whose file links to it, for a Silo that keeps other files as attachments."""
     users: dict[str, str] = {}
     registered = [file for file in belonging.files if file.item]
     for file in registered:

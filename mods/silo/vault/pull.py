@@ -52,12 +52,14 @@ if TYPE_CHECKING:
 
 
 def top_of(extraction: Extraction) -> ComparedAssembly:
-    """The assembly itself with its direct lines."""
+    """Return the assembly itself with its direct lines."""
     return ComparedAssembly(extraction.assembly, tuple(extraction.entries))
 
 
 def bom_in(content: Path | str, path: str) -> ComparedAssembly | None:
-    """The BOM of a file that belongs at ``path``; None for a part, or where it holds several assemblies."""
+    """Return the BOM of a file that belongs at ``path``; None for a part, or where it holds several
+    assemblies.
+    """
     contents = FileContents(instead={os.path.realpath(path): os.fspath(content)})
     with Library(contents=contents) as library:
         try:
@@ -85,7 +87,7 @@ class RevisionBoms:
         self._stack.close()
 
     def bom(self, number: int) -> ComparedAssembly | None:
-        """The BOM of a revision; None for a part."""
+        """Return the BOM of a revision; None for a part."""
         if number not in self._known:
             target = self._folder / f"{number}.FCStd"
             self.client.download_file(self.part_number, target, number, cancelled=self.cancelled)
@@ -94,13 +96,13 @@ class RevisionBoms:
         return self._known[number]
 
     def change(self, older: int | None, newer: int) -> tuple[LineChange, ...]:
-        """The lines that differ between two revisions; all of them where there is no older one."""
+        """Return the lines that differ between two revisions; all of them where there is no older one."""
         before, after = self.bom(older) if older is not None else None, self.bom(newer)
         changes = compare_assemblies([before] if before else [], [after] if after else [])
         return tuple(line for change in changes for line in change.lines)
 
     def three(self, stands: Standing, mine: ComparedAssembly | None) -> tuple[ThreeLines, ...]:
-        """Base → theirs → mine, where all of them are assemblies."""
+        """Compare base → theirs → mine, if all of them are assemblies."""
         if mine is None or stands.newest is None:
             return ()
         theirs = self.bom(stands.newest.revision_number)
@@ -109,17 +111,17 @@ class RevisionBoms:
 
 
 def file_revisions(revisions: Sequence[Revision]) -> list[Revision]:
-    """Those with a file, newest first."""
+    """Return the revisions with a file, newest first."""
     return sorted(filter(has_file, revisions), key=lambda revision: revision.revision_number, reverse=True)
 
 
 def words(lines: Sequence[LineChange], most: int = 6) -> str:
-    """A difference in one line, such as ``+ Bolt 4, - Plate 1, Nut 4 → 8``."""
+    """Return a difference in one line, such as ``+ Bolt 4, - Plate 1, Nut 4 → 8``."""
     return listed(line_texts(lines), most)
 
 
 def line_texts(lines: Iterable[LineChange]) -> list[str]:
-    """The lines of a difference in words."""
+    """Return the lines of a difference in words."""
     texts = []
     for line in lines:
         name = display_name(line.entry) or line.entry.object_name
@@ -150,7 +152,7 @@ class Holder:
 
     @property
     def part_number(self) -> str:
-        """The item's; "" for a document without one."""
+        """Return the item's; "" for a document without one."""
         return "" if isinstance(self.of, DocumentId) else self.of
 
 
@@ -238,7 +240,7 @@ class _Fetch:
         return FileTree(tuple(self.files.values()), tuple(self.lost))
 
     def frozen(self, holder: Holder) -> Revision | None:
-        """The revision of a file in the release that is fetched; None if the file is not in it."""
+        """Return the revision of a file in the release that is fetched; None if the file is not in it."""
         files = self.release.files if self.release is not None else ()
         numbers = {file.document: file.revision for file in files}
         revisions = self.revisions(holder) if holder.id in numbers else []
@@ -247,7 +249,7 @@ class _Fetch:
         )
 
     def unlinked(self) -> list[tuple[str, Holder, Revision]]:
-        """The next file of the release that no link led to: a person uploaded it."""
+        """Return the next file of the release that no link led to: a person uploaded it."""
         there = {file.item for file in self.files.values()} | self._sought
         for file in self.release.files if self.release is not None else ():
             if file.document not in there:
@@ -264,7 +266,7 @@ class _Fetch:
         return []
 
     def holder(self, item: Item) -> Holder:
-        """The item, or the file of several items that it lies in."""
+        """Return the item, or the file of several items that it lies in."""
         own = Holder(item.part_number, item.id)
         if self.revisions(own):
             return own
@@ -348,7 +350,7 @@ class _Fetch:
     def means(
         self, path: str, link: LinkedFile | None, items: Mapping[str, Item], others: _Children
     ) -> Holder | None:
-        """What a link leads to."""
+        """Return what a link leads to."""
         if link is not None and link.document:
             own = Holder(DocumentId(link.document), link.document)
             if self.revisions(own):
@@ -357,7 +359,7 @@ class _Fetch:
         return self.holder(child) if child is not None else None
 
     def choose(self, child: Holder, sha256: str, *, by_top: bool) -> Revision | None:
-        """The newest revision of a linked file; for a chosen revision of the top, that of its time.
+        """Return the newest revision of a linked file; for a chosen revision of the top, that of its time.
 
         What the top itself links to was written down with it (``sha256``). A file further below
         may have been committed again between the file that links to it and the top.
@@ -410,12 +412,12 @@ class _Children:
 
 
 def _is_place(folder: str) -> bool:
-    """True for a folder inside a project, such as ``parts/bought``."""
+    """Return True for a folder inside a project, such as ``parts/bought``."""
     return not any(":" in part or part in ("", ".", "..") or refusal(part) for part in folder.split("/"))
 
 
 def _refused(path: str) -> str:
-    """Why a recorded path is not followed; "" where it is."""
+    """Return why a recorded path is not followed; "" if it is."""
     if _ABSOLUTE.match(path):
         return "it is an absolute path, which has no place in another folder"
     if (refused := refusal(path)) is not None:
@@ -442,7 +444,7 @@ def fetched(
     progress: Progress = lambda _name, _count: None,
     most: int = MOST_FILES,
 ) -> Iterator[FileTree]:
-    """The tree of an item, in a scratch folder that goes with the block.
+    """Yield the tree of an item, in a scratch folder that goes with the block.
 
     revision
         the number of a file's revision: its linked files are then those of its time. The label of a released
@@ -490,7 +492,7 @@ class Pulled:
 
     @property
     def complete(self) -> bool:
-        """True where every file is there as wanted."""
+        """Return True if every file is there as wanted."""
         return not self.lost and not any(
             file.state in (PullState.EDITED, PullState.OPEN) for file in self.files
         )
@@ -500,7 +502,7 @@ class Pulled:
 
 
 def lay_out(files: Iterable[tuple[str, str | None]]) -> list[str]:
-    """Where each file goes below one folder: its position, with names for the folders above the top's.
+    """Return where each file goes below one folder: its position, with names for the folders above the top's.
 
     files
         (position, ``file_path`` of the revision); the paths name folders that the positions only step out of.
@@ -530,7 +532,7 @@ def _ups(position: str) -> tuple[int, list[str]]:
 
 
 def _anchor(tree: FileTree, places: Sequence[str], into: Path) -> Path:
-    """Where the folder of the places begins: the item may have its file in the user's folder already."""
+    """Return where the folder of the places begins: the item may have its file in the user's folder already."""
     top, name = tree.files[0], posixpath.basename(places[0])
     path = into.joinpath(*places[0].split("/"))
     if path.exists() or not into.is_dir():
@@ -615,7 +617,7 @@ def _uid_of(path: Path) -> str:
 
 
 def _in_the_way(target: Path, base: Path) -> str:
-    """Why a file cannot go where it belongs, though the disk takes others; "" where it can."""
+    """Return why a file cannot go where it belongs, though the disk takes others; "" if it can."""
     if base not in Path(os.path.realpath(target)).parents:
         return f"its place leads out of {base}; nothing was written there"
     if target.is_dir():
@@ -654,7 +656,7 @@ def _place(one: Fetched, target: Path, rules: Rules) -> PulledFile:
 
 
 def pulled_json(pulled: Pulled, base: Path) -> dict[str, Any]:
-    """For machines; paths relative to ``base``."""
+    """Return the data for machines; paths relative to ``base``."""
 
     def below(path: Path) -> str:
         return os.path.relpath(path, base).replace(os.sep, "/")

@@ -68,7 +68,7 @@ class Question:
 
     @property
     def name(self) -> str:
-        """For the index."""
+        """Return the key for the index."""
         return _name(self.assembly, self.hardware, self.below, self.name_only)
 
 
@@ -90,7 +90,7 @@ def collect_seldom() -> None:
 
 @contextmanager
 def collecting_seldom() -> Iterator[None]:
-    """:func:`collect_seldom`, for a while."""
+    """Do :func:`collect_seldom`, for a while."""
     before = gc.get_threshold()
     collect_seldom()
     try:
@@ -119,7 +119,7 @@ class First(NamedTuple):
 
     @property
     def files(self) -> list[str]:
-        """The file, and those that it links to."""
+        """Return the file, and those that it links to."""
         return [self.path, *(location.real for location in self.linked.values())]
 
 
@@ -144,7 +144,7 @@ class WalkSession:
         self.locator = Locator(remembers_files=True)
 
     def ask(self, question: Question, facts: Callable[[str], str] = lambda _path: "") -> StoredAnswer:
-        """The answer with its trail."""
+        """Return the answer with its trail."""
         library = Library(contents=self.contents, locator=self.locator, facts=facts)
         try:
             return StoredAnswer.found_in(library, self._answer(library, question))
@@ -152,7 +152,7 @@ class WalkSession:
             library.dissolve()
 
     def read(self, question: Question) -> First:
-        """The file of a question, and the answer where no other file is needed for it."""
+        """Return the file of a question, and the answer where no other file is needed for it."""
         library = Library(contents=self.contents, locator=self.locator)
         try:
             return self._read(library, question)
@@ -214,7 +214,7 @@ def work(questions: Sequence[Question], supplies: Supplies | None, run: str) -> 
 
 
 def work_in(session: WalkSession, questions: Sequence[Question], supplies: Supplies | None) -> Done:
-    """:func:`work` in this process."""
+    """Return :func:`work` in this process."""
     reads, begin = session.contents.reads, time.thread_time()
     if supplies is None:
         firsts = [session.read(question) for question in questions]
@@ -281,7 +281,7 @@ class Pool:
 
 @contextmanager
 def pool_of(jobs: int, dask: str | None = None, *, worth: int = _WORTH_A_POOL) -> Iterator[Pool | None]:
-    """Processes of this machine, or a Dask cluster at an address; None for one job."""
+    """Yield processes of this machine, or a Dask cluster at an address; None for one job."""
     if dask is not None:
         with _dask_client(dask) as client:
             workers = sum(client.nthreads().values())
@@ -336,14 +336,14 @@ class WalkAnswer:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """As :mod:`silo.bom.report` writes an extraction; or the one key of an error."""
+        """Return what :mod:`silo.bom.report` writes of an extraction; or the one key of an error."""
         if self._plain is None:
             self._plain = json.loads(self.known.answer)
         return self._plain
 
     @property
     def found(self) -> Extraction | SiloError:
-        """The BOM, or why there is none."""
+        """Return the BOM, or why there is none."""
         if "document" in self.plain:
             return DocumentError(*self.plain["document"])
         if "several" in self.plain:
@@ -388,7 +388,7 @@ class VaultReader:
         return self._session.contents.reads + self._elsewhere
 
     def ask(self, question: Question) -> WalkAnswer:
-        """One question."""
+        """Ask one question."""
         answer = self.index.recall(question.path, question.name)
         if answer is None:
             self.asked += 1
@@ -397,7 +397,7 @@ class VaultReader:
         return WalkAnswer(question, answer)
 
     def ask_many(self, questions: Iterable[Question]) -> Iterator[WalkAnswer]:
-        """The answers in the order of the questions."""
+        """Yield the answers in the order of the questions."""
         asked = list(questions)
         waiting: dict[int, StoredAnswer] = {}
         left: list[int] = []
@@ -441,7 +441,7 @@ class VaultReader:
     def _recalled(
         self, asked: Sequence[Question], numbers: Iterable[int]
     ) -> Iterator[tuple[int, StoredAnswer | None]]:
-        """What the index has, question by question."""
+        """Yield what the index has, question by question."""
         for group in grouped(numbers, _RECALLED):
             yield from zip(
                 group,
@@ -469,7 +469,7 @@ class VaultReader:
         self.index.remember(question.path, question.name, answer)
 
     def _worked_on(self, chunks: Iterable[_Chunk], pool: Pool | None) -> Iterator[First]:
-        """What the chunks gave, in their order."""
+        """Yield what the chunks gave, in their order."""
         waiting: deque[_Chunk] = deque()
         for chunk in chunks:
             if pool is None:
@@ -483,7 +483,7 @@ class VaultReader:
             yield from self._collect(waiting, pool)
 
     def _collect(self, waiting: deque[_Chunk], pool: Pool) -> list[First]:
-        """What the first chunk that waits gave."""
+        """Return what the first chunk that waits gave."""
         chunk = waiting[0]
         while chunk.asked is not None:
             try:
@@ -502,7 +502,7 @@ class VaultReader:
         return done.found
 
     def _again(self, waiting: Iterable[_Chunk], pool: Pool) -> None:
-        """A worker died. What it had not finished is asked again; a file that kills twice is found alone."""
+        """Ask again what a dead worker had not finished; a file that kills twice is asked alone."""
         lost = [chunk for chunk in waiting if chunk.asked is not None and not _succeeded(chunk.asked)]
         pool.renew()
         for chunk in lost:
@@ -510,7 +510,7 @@ class VaultReader:
             chunk.asked = pool.submit(chunk.questions, chunk.supplies) if chunk.tries < _TRIES else None
 
     def _alone(self, question: Question, supplies: Supplies | None, pool: Pool) -> First:
-        """One question in a process of its own."""
+        """Return one question in a process of its own."""
         with pool.alone() as executor:
             try:
                 return self._counted(executor.submit(work, [question], supplies, str(uuid4())).result())[0]
@@ -526,14 +526,14 @@ def _succeeded(future: Future[Any]) -> bool:
 
 
 def grouped(several: Iterable[T], size: int) -> Iterator[list[T]]:
-    """Lists of ``size``; the last one may be shorter."""
+    """Yield lists of ``size``; the last one may be shorter."""
     left = iter(several)
     while group := list(islice(left, size)):
         yield group
 
 
 def tapered(several: Sequence[T], size: int, jobs: int) -> Iterator[Sequence[T]]:
-    """Lists of ``size``, and smaller ones towards the end, so that no worker is left with much to do."""
+    """Yield lists of ``size``, and smaller ones towards the end, so that no worker is left with much to do."""
     at = 0
     while at < len(several):
         some = min(size, max(_LEAST, (len(several) - at) // (3 * jobs)))

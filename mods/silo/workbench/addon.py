@@ -129,8 +129,7 @@ class AddOn:
         host.add_document_observer(LossGuard(lambda: self.session.outbox, self.session.add, ask))
 
     def _closing(self) -> None:
-        """FreeCAD's window is asked to close: what was committed is saved and held before its documents
-        go."""
+        """Save and hold what was committed before FreeCAD's window closes its documents."""
         if "commits" in vars(self):
             self.commits.finish()
 
@@ -143,7 +142,7 @@ class AddOn:
 
     @cached_property
     def session(self) -> Session:
-        """What works beside the GUI thread."""
+        """Return what works beside the GUI thread."""
         from silo.workbench.session.session import Listener, Session
         from silo.workbench.settings.server import Keyring, read_known
 
@@ -158,19 +157,19 @@ class AddOn:
 
     @cached_property
     def buttons(self) -> Buttons:
-        """What the buttons of the pane do."""
+        """Return what the buttons of the pane do."""
         return Buttons(self)
 
     @cached_property
     def desk(self) -> LiveDesk:
-        """FreeCAD as the flows see it."""
+        """Return FreeCAD as the flows see it."""
         from silo.workbench.freecad.live_desk import LiveDesk
 
         return LiveDesk(self.opened, lambda: self.preferences.flag("CountHardware"))
 
     @cached_property
     def commits(self) -> CommitFlow:
-        """The commit flow."""
+        """Return the commit flow."""
         from silo.workbench.commit.flow import CommitFlow
 
         return CommitFlow(
@@ -183,21 +182,21 @@ class AddOn:
 
     @cached_property
     def revisions(self) -> RevisionFlow:
-        """Getting files from Silo."""
+        """Return the flow that gets files from Silo."""
         from silo.workbench.revisions.flow import RevisionFlow
 
         return RevisionFlow(self.session, self.desk)
 
     @cached_property
     def projects(self) -> ProjectFlow:
-        """The project folder."""
+        """Return the project folder."""
         from silo.workbench.revisions.flow import ProjectFlow
 
         return ProjectFlow(self.session, self.preferences, self.commits, self.desk, self.revisions)
 
     @cached_property
     def previews(self) -> PreviewFlow:
-        """The previews."""
+        """Return the previews."""
         from silo.workbench.preview.flow import PreviewFlow
 
         return PreviewFlow(
@@ -212,20 +211,20 @@ class AddOn:
 
     @cached_property
     def group(self) -> SiloGroup:
-        """What the property editor shows of components."""
+        """Return what the property editor shows of components."""
         from silo.workbench.freecad.live_desk import SiloGroup
 
         return SiloGroup()
 
     @cached_property
     def registrations(self) -> RegisterFlow:
-        """The registering dialogs."""
+        """Return the registering dialogs."""
         from silo.workbench.register.flow import RegisterFlow
 
         return RegisterFlow(self.session, self.preferences, self.commits, self.desk)
 
     def settings_changed(self) -> None:
-        """The preference page was saved."""
+        """Use the settings of the saved preference page."""
         from silo.workbench.settings.server import read_known
 
         host.save_parameters()
@@ -247,7 +246,7 @@ class AddOn:
             self.dock.update_shown(replace(shown, presence=presence))
 
     def _presence(self, colleagues: Mapping[str, Newer]) -> tuple[str, ...]:
-        """What colleagues committed of the documents that are open, since they were opened."""
+        """Return what colleagues committed of the documents that are open, since they were opened."""
         docs = [(doc, self.opened.of(doc).since) for doc in host.documents() if doc.FileName]
         # To find the item of each document takes a while where there are hundreds.
         asked = (colleagues, [(doc.Name, since) for doc, since in docs])
@@ -263,7 +262,7 @@ class AddOn:
         return self._present[1]
 
     def _sent(self, sent: Sent) -> None:
-        """A commit of this FreeCAD arrived."""
+        """Note that a commit of this FreeCAD arrived."""
         path = sent.entry.path
         if sent.resolved is not None:
             self.group.know(path, sent.resolved.entries)
@@ -275,7 +274,7 @@ class AddOn:
             self.buttons.register(path)
 
     def _refresh_project(self) -> None:
-        """Once for all that arrives together."""
+        """Refresh the project once for all that arrives together."""
         if not self._refreshing:
             self._refreshing = True
             qt.later(REFRESH_MS, self._refresh_now)
@@ -293,15 +292,15 @@ class AddOn:
     # -- commands ---------------------------------------------------------------------------------------
 
     def has_document(self) -> bool:
-        """True where there is something to commit."""
+        """Return True if there is something to commit."""
         return host.active_document() is not None
 
     def shown_everywhere(self) -> bool:
-        """True where Commit belongs in every workbench's File menu."""
+        """Return True if Commit belongs in every workbench's File menu."""
         return self.preferences.flag("ShowEverywhere")
 
     def preference_page(self) -> Any:
-        """The preference page of our own settings."""
+        """Return the preference page of our own settings."""
         from silo.workbench.settings.page import PreferencePage
 
         return PreferencePage(self.preferences, self.session, self.settings_changed)
@@ -321,7 +320,7 @@ class AddOn:
         self._hook.watch(name)
 
     def _find_foreign_commit(self) -> None:
-        """The Kindred workbench has further commands that upload a revision; connect to what is there."""
+        """Connect to the commands of the Kindred workbench that upload a revision."""
         from silo.workbench.freecad.facts import FOREIGN
         from silo.workbench.start import COMMIT, commands
 
@@ -375,7 +374,7 @@ class AddOn:
         self.project.refresh()
 
     def history(self) -> None:
-        """The revisions of the active document."""
+        """Show the revisions of the active document."""
         from silo.workbench.revisions.dialog import HistoryDialog
 
         doc = host.active_document()
@@ -455,7 +454,7 @@ class Buttons:
             self._addon.session.retry_all()
 
     def _choose(self, action: Action) -> None:
-        """What to do about the colleague's revision for which a commit is held."""
+        """Ask what to do about the colleague's revision for which a commit is held."""
         from silo.workbench.commit.flow import Choice, of_held
         from silo.workbench.pane.activity import Do
 
@@ -471,7 +470,7 @@ class Buttons:
             )
 
     def _compare(self, action: Action) -> None:
-        """The colleague's revision as a ghost beside the document that a held commit is of."""
+        """Show the colleague's revision as a ghost beside the document that a held commit is of."""
         from silo.workbench.commit.flow import of_held
 
         held = next(
@@ -487,7 +486,7 @@ class Buttons:
             )
 
     def _details(self, action: Action) -> None:
-        """All lines of the BOM difference for which a commit is held."""
+        """Show all lines of the BOM difference for which a commit is held."""
         from silo.workbench.commit.flow import line_texts
         from silo.workbench.gui import widgets
 
@@ -496,7 +495,7 @@ class Buttons:
             widgets.read(host.main_window(), theirs.headline, line_texts(theirs))
 
     def _same_part(self, action: Action) -> None:
-        """These files are one part on purpose; the BOM is synced without the question."""
+        """Accept that these files are one part on purpose; the BOM is synced without the question."""
         commits = self._addon.commits
         commits.accept(action.target, action.objects)
         doc = host.find_document(action.document)

@@ -61,7 +61,7 @@ class HeadlessJob:
 
     @classmethod
     def from_text(cls, text: str | None) -> HeadlessJob:
-        """Raises InputError that names what is wrong."""
+        """Read a job; raise InputError that names what is wrong."""
         try:
             data = json.loads(text or "")
         except ValueError as error:
@@ -133,7 +133,7 @@ def _extractions(
 
 
 def _write_lines(job: HeadlessJob, out: TextIO) -> int:
-    """One line when a file is begun and one when it is done, so that a reader knows where FreeCAD died."""
+    """Write one line when a file is begun and one when it is done, to show where FreeCAD died."""
     from silo.bom.report import to_plain
 
     fine = True
@@ -164,7 +164,7 @@ def _line(out: TextIO, data: Mapping[str, Any]) -> None:
 
 
 def error_json(error: SiloError) -> dict[str, str]:
-    """An error for the other side; a document's error keeps path and reason apart."""
+    """Return an error for the other side; a document's error keeps path and reason apart."""
     path, reason = getattr(error, "path", None), getattr(error, "reason", None)
     data = {"code": error.code, "message": str(error)}
     return {**data, "path": path, "reason": reason} if isinstance(path, str) and reason else data
@@ -213,7 +213,8 @@ def _sync(job: HeadlessJob) -> int:
 
 
 def _each(tops: list[str], job: HeadlessJob) -> Iterator[tuple[str, Extraction | SiloError]]:
-    """The BOM of each file, read by a FreeCAD of its own: where that dies of a file, another reads the rest.
+    """Yield the BOM of each file, read by a FreeCAD of its own: where that dies of a file, another reads the
+    rest.
 
     Where this program cannot start itself again, the files are read in here.
     """
@@ -240,7 +241,7 @@ def _client() -> Any:
 
 
 def _without_server(job: HeadlessJob, error: ImportError) -> int:
-    """The packages for a server are not there: write the BOMs, which need none, and say what to do."""
+    """Write the BOMs without the packages for a server, and say what to do."""
     from silo.bom.report import bom_json
 
     config_error = ConfigError(
@@ -260,7 +261,7 @@ def _without_server(job: HeadlessJob, error: ImportError) -> int:
 
 
 def _write(path: str, text: str) -> None:
-    """Whole or not at all: a run that dies while it writes leaves the report before."""
+    """Write the whole report or nothing: a run that dies leaves the previous report."""
     from silo.platform import replacing
 
     target = Path(path)

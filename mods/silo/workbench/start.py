@@ -72,7 +72,7 @@ class Command:
         self.keys, self.help, self.active = keys, help, active
 
     def GetResources(self) -> dict[str, str]:
-        """What FreeCAD shows."""
+        """Return what FreeCAD shows."""
         texts = {
             "MenuText": self.text,
             "ToolTip": self.tip,
@@ -84,16 +84,16 @@ class Command:
         return {name: text for name, text in texts.items() if text}
 
     def Activated(self, _index: int = 0) -> None:
-        """Chosen from a menu, a toolbar, or by ``Gui.runCommand``."""
+        """Run the command: chosen from a menu, a toolbar, or by ``Gui.runCommand``."""
         self.run()
 
     def IsActive(self) -> bool:
-        """Whether FreeCAD offers the command now."""
+        """Return whether FreeCAD offers the command now."""
         return self.active()
 
 
 def commands(addon: Any) -> dict[str, Command]:
-    """All commands. ``addon`` does the work (:class:`silo.workbench.addon.AddOn`)."""
+    """Return all commands. ``addon`` does the work (:class:`silo.workbench.addon.AddOn`)."""
     return {
         COMMIT: Command(
             text=QT_TRANSLATE_NOOP("Origin_Commit", "Commit to Silo"),
@@ -301,7 +301,7 @@ class Late:
 
     @property
     def addon(self) -> AddOn:
-        """The add-on."""
+        """Return the add-on."""
         if self._addon is None:
             from silo.workbench.addon import AddOn
 
@@ -312,7 +312,9 @@ class Late:
         return lambda: getattr(self.addon, name)()
 
     def preference_page(self) -> type:
-        """What FreeCAD makes the preference page with; it wants a class, and calls it when the page opens."""
+        """Return what FreeCAD makes the preference page with; it wants a class, and calls it when the page
+        opens.
+        """
         late = self
 
         class Page:
@@ -348,7 +350,7 @@ class Names:
         self.foreign: list[str] = []
 
     def of(self, wanted: Sequence[str]) -> list[str]:
-        """The names of these commands; adds them all, the first time."""
+        """Return the names of these commands; adds them all, the first time."""
         if not self._got:
             self._got = {name: self._add(name, command) for name, command in self._known.items()}
         return [self._got[name] for name in wanted]
@@ -376,7 +378,7 @@ def when_loaded(call: Callable[[], None]) -> None:
 
 
 def finish(addon: AddOn, names: Names, *, by_hand: bool) -> None:
-    """The rest, once all add-ons are loaded: one of them may have brought an ``Origin_Commit`` of its own."""
+    """Finish the start once all add-ons are loaded: one of them may have its own ``Origin_Commit``."""
     placed = names.of(PLACED)
     for name in names.foreign:
         if name in (COMMIT, OWN_COMMIT):
@@ -396,7 +398,7 @@ def finish(addon: AddOn, names: Names, *, by_hand: bool) -> None:
 
 
 def silo_workbench(names: Names, toolbar: Sequence[str], menu: Sequence[str]) -> Any:
-    """The Silo workbench: a toolbar and a menu with all commands.
+    """Return the Silo workbench: a toolbar and a menu with all commands.
 
     FreeCAD knows it by the name of its class, and the real Silo's is called SiloWorkbench.
     """
@@ -421,12 +423,12 @@ def _is_installed(name: str) -> bool:
 
 
 def missing_packages(is_there: Callable[[str], bool] = _is_installed) -> tuple[str, ...]:
-    """The packages that are not there; their names on PyPI are those by which they are imported."""
+    """Return the packages that are not there; their names on PyPI are those by which they are imported."""
     return tuple(name for name in FREECAD_PACKAGES if not is_there(name))
 
 
 def packages_hint(packages: Sequence[str], folder: str, python: tuple[int, int]) -> str:
-    """The hint for the user, in one line: a command that can be copied, for this very FreeCAD.
+    """Return the hint for the user, in one line: a command that can be copied, for this very FreeCAD.
 
     folder
         where this FreeCAD looks for additional packages; python: its version of Python.

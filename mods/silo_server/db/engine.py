@@ -88,7 +88,7 @@ class Turnstile:
 
     @contextmanager
     def enter(self) -> Iterator[None]:
-        """Inside until the block ends. Raises BusyError; then nothing was done."""
+        """Stay inside until the block ends. Raises BusyError; then nothing was done."""
         with self._lock:
             if self.full:
                 raise BusyError(f"too many {self._who} are waiting; nothing was changed, try again later")
@@ -109,7 +109,7 @@ class Turnstile:
                 self._here -= 1
 
     def close(self) -> None:
-        """The server ends: who waits goes away now, who is inside at the next :meth:`check`."""
+        """End for the server's end: who waits leaves now, who is inside at the next :meth:`check`."""
         self._closed = True
         self._free.release(self._room)
 
@@ -120,12 +120,12 @@ class Turnstile:
 
     @property
     def here(self) -> int:
-        """How many are inside or wait."""
+        """Return how many are inside or wait."""
         return self._here
 
     @property
     def full(self) -> bool:
-        """True where the next one is sent away."""
+        """Return True if the next one is sent away."""
         return self._here >= self._room
 
 
@@ -163,7 +163,7 @@ class Tx:
 
     @property
     def stamp(self) -> str:
-        """The transaction's one time, as stored."""
+        """Return the transaction's one time, as stored."""
         return stamp(self.at)
 
     def take_time(self, after: str) -> None:
@@ -182,18 +182,18 @@ class Tx:
         self.pending.append(new)
 
     def end_access(self) -> None:
-        """With the commit, every event stream looks whether it may still be read."""
+        """Make every event stream check with the commit if it may still be read."""
         self.ends_access = True
         if self.postgres:
             self.conn.execute(select(func.pg_notify(EVENT_CHANNEL, "access")))
 
     def lock(self, key: int) -> None:
-        """From here to the commit nobody else has this lock; SQLite's writers are alone anyhow."""
+        """Take this lock until the commit; SQLite's writers are alone anyhow."""
         if self.postgres:
             self.conn.execute(select(func.pg_advisory_xact_lock(key)))
 
     def lock_structure(self) -> None:
-        """From here to the commit nobody else adds a BOM edge."""
+        """Keep others from adding a BOM edge until the commit."""
         self.lock(STRUCTURE_LOCK)
 
 
@@ -225,13 +225,13 @@ class Database:
 
     @contextmanager
     def read(self, actor: Actor = SYSTEM) -> Iterator[Tx]:
-        """One consistent snapshot; changes nothing."""
+        """Open one consistent snapshot; change nothing."""
         with self._reader.connect() as conn, conn.begin():
             yield Tx(conn, actor, self.clock(), self.settings, self.clock, built=self.built)
 
     @contextmanager
     def write(self, actor: Actor = SYSTEM, *, even_when_read_only: bool = False) -> Iterator[Tx]:
-        """All or nothing: state, history and events are committed together.
+        """Write all or nothing: state, history and events are committed together.
 
         Raises ReadOnlyError while the server takes no changes, BusyError where it would wait too long.
         """
@@ -251,7 +251,7 @@ class Database:
 
     @property
     def connections(self) -> int:
-        """How many are in use now, by readers, writers and those who look after the whole."""
+        """Return how many are in use now, by readers, writers and those who look after the whole."""
         pools: list[Any] = [engine.pool for engine in {self.engine, self._reads, self._writes}]
         return sum(pool.checkedout() for pool in pools)
 
@@ -262,14 +262,14 @@ class Database:
 
 
 def mode_of(tx: Tx) -> str:
-    """``normal`` or ``read-only``; kept in the database, so that all processes agree."""
+    """Return ``normal`` or ``read-only``; kept in the database, so that all processes agree."""
     if tx.settings.read_only:
         return "read-only"
     return get_state(tx, "mode") or "normal"
 
 
 def get_state(tx: Tx, key: str) -> str | None:
-    """The value kept under ``key``, None where there is none."""
+    """Return the value kept under ``key``, None if there is none."""
     return tx.conn.scalar(select(server_state.c.value).where(server_state.c.key == key))
 
 
@@ -309,7 +309,7 @@ def _flush_events(tx: Tx) -> None:
 
 
 def uses_of(which: ColumnElement[bool], *, kept: bool = False) -> Select[Any]:
-    """The ids of these items and of all that they are in, on any level.
+    """Return the ids of these items and of all that they are in, on any level.
 
     kept
         only of what has a summary; nothing above something without one has one.
@@ -328,7 +328,7 @@ def _reader_options(settings: Settings) -> dict[str, Any]:
 
 
 def _postgres_engine(settings: Settings, connections: int, seconds: float | None = None) -> Engine:
-    """``seconds``: how long one statement may take, None = as long as it takes."""
+    """Make an engine. ``seconds``: how long one statement may take, None = as long as it takes."""
 
     # Compiling a query costs more than any of ours takes; a look into an index is one into memory.
     options = ["-c jit=off -c random_page_cost=1.1"]
@@ -404,7 +404,7 @@ def _sqlite_engine(settings: Settings) -> Engine:
 
 
 def _keep_private(path: Path) -> None:
-    """The database has password hashes in it. SQLite gives the files beside it the rights that it has."""
+    """Keep the database private: it has password hashes. SQLite gives its other files the same rights."""
     if path.parent == data_folder():
         private_folder(path.parent)
     private_file(path)
@@ -433,7 +433,7 @@ FEW = 500
 
 
 def one_of(tx: Tx, column: ColumnElement[Any], values: Collection[Any]) -> ColumnElement[bool]:
-    """``column`` is one of ``values``, as one parameter however many there are."""
+    """Return the condition that ``column`` is one of ``values``, as one parameter for any number of them."""
     listed = list(values)
     if tx.postgres:
         array: ColumnElement[Any] = cast(literal(listed, ARRAY(column.type)), ARRAY(column.type))
@@ -488,8 +488,9 @@ def _unnest(table: Table, names: Sequence[str], rows: Sequence[Mapping[str, Any]
 
 
 def among(tx: Tx, column: ColumnElement[Any], query: Select[Any]) -> ColumnElement[bool]:
-    """``column`` is one of those that ``query`` selects. PostgreSQL would rather read all of a table, not
-    knowing how many they are (66 000 parents: 45 s instead of 0.1 s)."""
+    """Return the condition that ``column`` is one of those that ``query`` selects. PostgreSQL would rather
+    read all of a table, not knowing how many they are (66 000 parents: 45 s instead of 0.1 s).
+    """
     if not tx.postgres:
         return column.in_(query)
     return column == any_(func.array(query.scalar_subquery(), type_=ARRAY(column.type)))
@@ -503,7 +504,7 @@ def newest_first(
     before: int | None = None,
     after: int | None = None,
 ) -> list[Any]:
-    """A page of a list by its ids, newest first: those before an id, or the nearest after one."""
+    """Return a page of a list by its ids, newest first: those before an id, or the nearest after one."""
     if before is not None:
         query = query.where(column < before)
     if after is None:

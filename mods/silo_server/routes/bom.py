@@ -99,7 +99,7 @@ MERGE_BODY = {
 
 @router.get("", response_model=list[LineOut], responses=READ_ERRORS)
 def get_bom(call: Viewer, part_number: str) -> Response:
-    """The lines of one level. ``ETag`` is the BOM's version, for ``If-Match``."""
+    """Return the lines of one level. ``ETag`` is the BOM's version, for ``If-Match``."""
     with call.read() as tx:
         item = get_item(tx, part_number)
         rows = _lines_of(tx, [item])[item.id]
@@ -108,7 +108,7 @@ def get_bom(call: Viewer, part_number: str) -> Response:
 
 @several.post("/items/boms", response_model=BomsOut, responses=READ_ERRORS)
 def get_boms(call: Viewer, body: NumbersBody) -> Response:
-    """The lines of many items, one level each; items that are not known are absent. Reads only.
+    """Return the lines of many items, one level each; items that are not known are absent. Reads only.
 
     413 if they have more than 10 000 lines in all; half of them may be asked for, or one however large.
     """
@@ -120,7 +120,7 @@ def get_boms(call: Viewer, body: NumbersBody) -> Response:
 
 
 def _lines_of(tx: Tx, parents: Sequence[Item]) -> dict[int, list[dict[str, Any]]]:
-    """The lines of these items as the API has them, by the item's internal id."""
+    """Return the lines of these items as the API has them, by the item's internal id."""
     ids = [parent.id for parent in parents]
     lines, quantities, last = lines_of_many(tx, ids), told_quantities(tx, ids), last_syncs(tx, ids)
     return {
@@ -197,7 +197,7 @@ async def merge(call: Editor, part_number: str, expected: ExpectedVersion) -> Re
 
 @router.get("/expanded", response_model=list[LineOut], responses=READ_ERRORS)
 def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) -> Response:
-    """The tree as rows, parents before children; quantities per one parent, and in total."""
+    """Return the tree as rows, parents before children; quantities per one parent, and in total."""
     with call.server.large_reads.enter():
         with call.read() as tx:
             item = get_item(tx, part_number)
@@ -207,7 +207,7 @@ def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) 
 
 @router.get("/flat", responses=READ_ERRORS)
 def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
-    """The leaf parts, quantities multiplied down the tree and summed; 409 where it never ends."""
+    """Return the leaf parts, quantities multiplied down the tree and summed; 409 where it never ends."""
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
         still = summary_of(tx, graph.root).open.values()
@@ -234,7 +234,7 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
 
 @router.get("/cost", responses=READ_ERRORS)
 def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
-    """Flat BOM × ``standard_cost``, per currency; ``missing`` names what has no cost."""
+    """Return flat BOM × ``standard_cost``, per currency; ``missing`` names what has no cost."""
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
         cost = tree.roll_up_cost(graph, tree.parts_of(tx, graph))
@@ -251,7 +251,7 @@ def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
 
 @router.get("/mass", responses=READ_ERRORS)
 def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
-    """The mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names what has none."""
+    """Return the mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names what has none."""
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
         parts = tree.parts_of(tx, graph)
@@ -268,7 +268,7 @@ def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
 
 @router.get("/summary", responses=READ_ERRORS)
 def get_summary(call: Viewer, part_number: str) -> dict[str, Any]:
-    """The product over its whole graph: what is open, mass and cost, counts, the last change.
+    """Return the product over its whole graph: what is open, mass and cost, counts, the last change.
 
     ``total_mass_kg`` and ``totals`` lack what ``mass_missing`` and ``cost_missing`` count; the first of them
     are named.
@@ -304,7 +304,7 @@ def get_where_used(
     limit: Annotated[int, Query(ge=1, le=1000)] = 1000,
     offset: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
 ) -> Response:
-    """The parents; with ``indirect`` theirs as well. ``X-Total-Count`` says how many there are in all."""
+    """Return the parents; with ``indirect`` theirs as well. ``X-Total-Count`` says how many there are in all."""
     with call.read() as tx:
         item = get_item(tx, part_number)
         usages, total = tree.where_used(tx, item, indirect=indirect, limit=limit, offset=offset)
@@ -324,7 +324,7 @@ def get_where_used(
 
 
 def line_changes(body: LineChangeBody) -> dict[str, Any]:
-    """The changes that a body asks for: only what it names; null clears what may be empty."""
+    """Return the changes that a body asks for: only what it names; null clears what may be empty."""
     changes = body.model_dump(exclude_unset=True)
     if "reference_designators" in changes:
         changes["reference_designators"] = tuple(changes["reference_designators"] or ())
@@ -368,7 +368,7 @@ def _edited(edited: review.Edited, status: int) -> Response:
 
 
 def render_expanded(rows: Iterable[tree.Occurrence]) -> bytes:
-    """The rows as a JSON list, each a line with ``depth`` and ``total_quantity``.
+    """Return the rows as a JSON list, each a line with ``depth`` and ``total_quantity``.
 
     Written from pieces that are made once per child and once per state: a tree of 100 000 occurrences has few
     of either. The pieces are those of ``line_to_wire``.
@@ -444,7 +444,7 @@ class UndoBody(Body):
 
 @review_router.get("/review", responses=READ_ERRORS)
 def get_review(call: Viewer, part_number: str) -> Response:
-    """What is open: unreferenced lines, conflicts with both values, and the last merge."""
+    """Return what is open: unreferenced lines, conflicts with both values, and the last merge."""
     with call.read() as tx:
         open_lines = service.review(tx, part_number)
         open_below = summary_of(tx, open_lines.parent).told(open_lines.parent.id)
@@ -490,7 +490,7 @@ def resolve(call: Editor, part_number: str, body: ResolveBody, expected: Expecte
 def list_history(
     call: Viewer, part_number: str, limit: Annotated[int, Query(ge=1, le=500)] = 50, before: PageFrom = None
 ) -> list[dict[str, Any]]:
-    """The changes, newest first: who, when, why, from which file."""
+    """Return the changes, newest first: who, when, why, from which file."""
     with call.read() as tx:
         changes = history.list_changes(tx, get_item(tx, part_number, include_archived=True), limit, before)
     return [change_to_wire(change) for change in changes]
@@ -498,7 +498,7 @@ def list_history(
 
 @review_router.get("/history/{change_id}", responses=READ_ERRORS)
 def get_change(call: Viewer, part_number: str, change_id: ChangeId) -> dict[str, Any]:
-    """One change with its lines before and after."""
+    """Return one change with its lines before and after."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         change, lines = history.get_change(tx, item, change_id)
@@ -517,7 +517,7 @@ def get_change(call: Viewer, part_number: str, change_id: ChangeId) -> dict[str,
 
 @review_router.get("/history/{change_id}/bom", responses=READ_ERRORS)
 def get_past_bom(call: Viewer, part_number: str, change_id: ChangeId) -> list[dict[str, Any]]:
-    """The BOM as this change left it (0 = before everything)."""
+    """Return the BOM as this change left it (0 = before everything)."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         lines = history.state_at(tx, item, change_id)
@@ -542,7 +542,7 @@ def compare(
     from_point: Annotated[str, Query(alias="from", max_length=40), WithJsonSchema(context.POINT)] = "0",
     to: Point = "now",
 ) -> dict[str, Any]:
-    """Two points of time side by side; each a change id, a time, or ``now``."""
+    """Compare two points of time side by side; each a change id, a time, or ``now``."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         first, second = find_point(tx, item, from_point), find_point(tx, item, to)
@@ -584,7 +584,7 @@ def undo(call: Editor, part_number: str, body: UndoBody, expected: ExpectedVersi
 
 
 def find_point(tx: Tx, item: Item, text: str) -> int:
-    """The change that a point of time means; RejectedError where it is none."""
+    """Return the change that a point of time means; RejectedError if it is none."""
     if (change_id := whole_number(text, 18)) is not None:
         return change_id
     if text == "now":
@@ -602,7 +602,7 @@ def find_point(tx: Tx, item: Item, text: str) -> int:
 
 
 def change_to_wire(change: history.Change) -> dict[str, Any]:
-    """A change, without its lines."""
+    """Return a change, without its lines."""
     context = {
         "file": change.document_file,
         "sha256": change.document_sha256,
@@ -616,7 +616,7 @@ def change_to_wire(change: history.Change) -> dict[str, Any]:
 
 
 def state_to_wire(state: LineState | None) -> dict[str, Any] | None:
-    """A line's state; only what is set."""
+    """Return a line's state; only what is set."""
     if state is None:
         return None
     state_json = line_state_to_wire(state)
@@ -635,7 +635,7 @@ XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
 
 
 def content_of(media_type: str) -> dict[int | str, dict[str, Any]]:
-    """The answers of a route that hands out a file."""
+    """Return the answers of a route that hands out a file."""
     return {**READ_ERRORS, 200: {"content": {media_type: {}}, "description": "The file"}}
 
 
@@ -678,7 +678,7 @@ As = Annotated[ExportRequest, Depends()]
 
 @transfer_router.get("/export.csv", response_class=Response, responses=content_of("text/csv"))
 def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = False) -> Response:
-    """The BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text.
+    """Return the BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text.
 
     ``pieces``: totals for so many of it; ``q``, ``type``: only what fits. ``semicolons``: for an Excel that
     expects 1,5 instead of 1.5.
@@ -695,13 +695,13 @@ def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = Fa
 
 @transfer_router.get("/export.xlsx", response_class=Response, responses=content_of(XLSX))
 def export_xlsx(call: Viewer, part_number: str, wanted: As) -> Response:
-    """The BOM as a workbook."""
+    """Return the BOM as a workbook."""
     return _exported(call, part_number, wanted, transfer.to_xlsx, XLSX, "xlsx")
 
 
 @transfer_router.get("/export.json", responses=READ_ERRORS)
 def export_json(call: Viewer, part_number: str, wanted: As) -> Response:
-    """The BOM as JSON."""
+    """Return the BOM as JSON."""
     return _exported(call, part_number, wanted, transfer.to_json, "application/json", "json")
 
 
@@ -712,7 +712,7 @@ Since = Annotated[str, Query(alias="from", min_length=1, max_length=40), WithJso
 
 @transfer_router.get("/changes", responses=READ_ERRORS)
 def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -> dict[str, Any]:
-    """What changed in the product, over all levels: lines, quantities, data and files of its parts.
+    """Return what changed in the product, over all levels: lines, quantities, data and files of its parts.
 
     ``from`` and ``to`` are a date, a time, a revision of the item as ``r3``, or the label of a revision that
     was frozen for release; without ``to`` until now. Two frozen revisions do not say who changed what, and
@@ -731,14 +731,14 @@ def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -
 
 @transfer_router.get("/changes.csv", response_class=Response, responses=content_of("text/csv"))
 def changes_csv(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
-    """What changed, as CSV."""
+    """Return what changed, as CSV."""
     make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
     return file_of(call, make, transfer.to_csv, "text/csv; charset=utf-8; header=present", "changes.csv")
 
 
 @transfer_router.get("/changes.xlsx", response_class=Response, responses=content_of(XLSX))
 def changes_xlsx(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
-    """What changed, as a workbook."""
+    """Return what changed, as a workbook."""
     make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
     return file_of(call, make, transfer.to_xlsx, XLSX, "changes.xlsx")
 
@@ -789,7 +789,7 @@ async def import_csv(
 
 
 def plan_to_wire(plan: imports.ImportPlan, dry_run: bool) -> dict[str, Any]:
-    """What an import does, or would do."""
+    """Return what an import does, or would do."""
     return {
         "dry_run": dry_run,
         "counts": {status: plan.count(status) for status in ("add", "change", "same", "skip", "error")},

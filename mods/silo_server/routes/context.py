@@ -80,7 +80,7 @@ class Server:
 
 
 def server_of(request: Request) -> Server:
-    """The server that this request came to."""
+    """Return the server that this request came to."""
     server: Server = request.app.state.server
     return server
 
@@ -101,11 +101,11 @@ class Call:
     actor: Actor
 
     def read(self) -> AbstractContextManager[Tx]:
-        """One consistent snapshot of the database, for this caller."""
+        """Return one consistent snapshot of the database, for this caller."""
         return self.server.db.read(self.actor)
 
     def write(self, *, even_when_read_only: bool = False) -> AbstractContextManager[Tx]:
-        """A transaction in this caller's name."""
+        """Return a transaction in this caller's name."""
         return self.server.db.write(self.actor, even_when_read_only=even_when_read_only)
 
 
@@ -135,7 +135,7 @@ Admin = Annotated[Call, Depends(Guard(Role.ADMIN))]
 
 
 def find_actor(request: Request) -> Actor | None:
-    """Who calls, None where nobody known does. A wrong token is not saved by a good cookie."""
+    """Return who calls, None if nobody known does. A wrong token is not saved by a good cookie."""
     server, address = server_of(request), client_address(request)
     header = request.headers.get("authorization")
     if header is not None:
@@ -148,7 +148,7 @@ def find_actor(request: Request) -> Actor | None:
 
 
 def client_address(request: Request) -> str:
-    """The caller's address, as given by the connection (or by a proxy that uvicorn trusts)."""
+    """Return the caller's address, as given by the connection (or by a proxy that uvicorn trusts)."""
     return request.client.host if request.client else ""
 
 
@@ -162,20 +162,21 @@ async def _check_csrf(request: Request, actor: Actor) -> None:
 
 
 async def form_of(request: Request) -> FormData:
-    """The request's form, which the first caller reads, and Starlette keeps."""
+    """Return the request's form, which the first caller reads, and Starlette keeps."""
     return await request.form(max_files=1, max_fields=MOST_FIELDS)
 
 
 def masked(secret: str) -> str:
-    """A secret as a page shows it: another text each time, so that the size of a compressed page that also
-    shows what somebody else made up says nothing about it (the BREACH attack)."""
+    """Return a secret as a page shows it: another text each time, so that the size of a compressed page that
+    also shows what somebody else made up says nothing about it (the BREACH attack).
+    """
     raw = secret.encode()
     mask = secrets.token_bytes(len(raw))
     return _MASKED + (mask + bytes(a ^ b for a, b in zip(mask, raw, strict=True))).hex()
 
 
 def unmasked(sent: str) -> bytes:
-    """What :func:`masked` was given; a text that it did not make as it is."""
+    """Return what :func:`masked` was given; a text that it did not make as it is."""
     if not sent.startswith(_MASKED):
         return sent.encode()
     try:
@@ -190,7 +191,7 @@ _MASKED = "m."
 
 
 def json_answer(value: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
-    """``value`` as JSON, by the quick writer that pydantic brings along.
+    """Return ``value`` as JSON, by the quick writer that pydantic brings along.
 
     It writes all that :mod:`silo_server.values` lets in. Call it before the commit: an answer that
     cannot be written must not leave anything behind.
@@ -199,12 +200,12 @@ def json_answer(value: Any, status: int = 200, headers: Mapping[str, str] | None
 
 
 def raw_json(text: str | bytes, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
-    """JSON that is written already."""
+    """Answer with JSON that is written already."""
     return Response(text, status, headers, media_type="application/json")
 
 
 async def json_body(request: Request) -> Any:
-    """The request's JSON body; RejectedError where it is none. NaN and Infinity are no JSON."""
+    """Return the request's JSON body; RejectedError if it is none. NaN and Infinity are no JSON."""
     body = await request.body()
 
     def parse() -> Any:
@@ -221,12 +222,12 @@ def _no_constant(name: str) -> Any:
 
 
 def etag_of(version: int) -> str:
-    """The ETag of a BOM's version."""
+    """Return the ETag of a BOM's version."""
     return f'"v{version}"'
 
 
 def expected_version(request: Request) -> int | None:
-    """The version in ``If-Match``, None where there is none (or ``*``); -1 for one that cannot be ours."""
+    """Return the version in ``If-Match``, None if there is none (or ``*``); -1 for one that cannot be ours."""
     header = request.headers.get("if-match", "").strip()
     if header in ("", "*"):
         return None
@@ -235,7 +236,7 @@ def expected_version(request: Request) -> int | None:
 
 
 def idempotency_key(request: Request) -> str | None:
-    """The ``Idempotency-Key``, under which a repeat of the request gets the first answer."""
+    """Return the ``Idempotency-Key``, under which a repeat of the request gets the first answer."""
     key = request.headers.get("idempotency-key")
     if key is not None and (not key or (problem := text_problem(key, 128))):
         raise RejectedError(f"Idempotency-Key: {problem if key else 'wanted 1 to 128 characters, got none'}")
@@ -255,17 +256,17 @@ REFUSED = "x-valid-but-refused"
 
 
 def text(longest: int, **more: Any) -> Schema:
-    """A text of allowed characters."""
+    """Return a text of allowed characters."""
     return {"type": "string", "maxLength": longest, "pattern": ALLOWED, **more}
 
 
 def or_null(schema: Schema) -> Schema:
-    """The schema, or null."""
+    """Return the schema, or null."""
     return {"anyOf": [schema, NOTHING]}
 
 
 def part_number(*, or_empty: bool = False) -> Schema:
-    """A part number to be given to an item; ``or_empty``: an empty text stands for none."""
+    """Return a part number to be given to an item; ``or_empty``: an empty text stands for none."""
     optional = "?" if or_empty else ""
     return {
         "type": "string",
@@ -277,7 +278,7 @@ def part_number(*, or_empty: bool = False) -> Schema:
 
 
 def _in_any_case(word: str) -> str:
-    """A pattern of the texts that are ``word`` when case does not count; ſ is an s."""
+    """Return a pattern of the texts that are ``word`` when case does not count; ſ is an s."""
     same = {"s": "sSſ", "k": "kK\u212a"}
     return "".join(
         f"[{same.get(c, c + c.upper())}]" if c.isalpha() else "\\" + c if c == "." else c for c in word
@@ -285,7 +286,7 @@ def _in_any_case(word: str) -> str:
 
 
 def refused(reason: str) -> Schema:
-    """``openapi_extra`` of an operation that refuses (400) what has the right form, and why."""
+    """Return ``openapi_extra`` of an operation that refuses (400) what has the right form, and why."""
     return {REFUSED: reason}
 
 
@@ -390,7 +391,7 @@ _MERGE: dict[str, dict[str, Schema]] = {
 
 
 def complete(document: Schema) -> Schema:
-    """FastAPI's document with what it does not know of this server."""
+    """Complete FastAPI's document with what it does not know of this server."""
     for operations in document["paths"].values():
         for operation in operations.values():
             # We answer 400 where FastAPI by itself would answer 422.

@@ -98,7 +98,7 @@ def list_items(
     limit: Limit = 100,
     offset: Offset = 0,
 ) -> Response:
-    """Items by part number; ``X-Total-Count`` says how many match in all."""
+    """Return items by part number; ``X-Total-Count`` says how many match in all."""
     query = service.ItemQuery(
         search=search or q,
         item_type=item_type,
@@ -142,7 +142,7 @@ def create_item(call: Editor, body: NewItemBody) -> Response:
 
 @router.get("/items/by-uuid/{uuid}", response_model=ItemOut, responses=READ_ERRORS)
 def get_item_by_uuid(call: Viewer, uuid: Uuid) -> Response:
-    """The item with this UUID; 404 when there is none or it is archived, 400 for no UUID."""
+    """Return the item with this UUID; 404 when there is none or it is archived, 400 for no UUID."""
     with call.read() as tx:
         item = service.get_by_uuid(tx, uuid)
         last = last_sync(tx, item)
@@ -151,7 +151,7 @@ def get_item_by_uuid(call: Viewer, uuid: Uuid) -> Response:
 
 @router.post("/items/by-uuid", response_model=ItemsOut, responses=READ_ERRORS)
 def get_items_by_uuid(call: Viewer, body: UuidsBody) -> Response:
-    """Many UUIDs in one request; those that are not known are absent. Reads only, so a viewer may."""
+    """Return many UUIDs in one request; those that are not known are absent. Reads only, so a viewer may."""
     with call.read() as tx:
         items_found = service.get_by_uuids(tx, body.uuids)
         last = last_syncs(tx, [item.id for item in items_found])
@@ -160,7 +160,7 @@ def get_items_by_uuid(call: Viewer, body: UuidsBody) -> Response:
 
 @router.post("/items/look-alikes", response_model=LookAlikesOut, responses=READ_ERRORS)
 def find_look_alikes(call: Viewer, body: LookAlikesBody) -> Response:
-    """The items that have a component's name or its very file, for many components. Reads only."""
+    """Return the items that have a component's name or its very file, for many components. Reads only."""
     with call.read() as tx:
         matches = search.find_look_alikes(tx, [(query.name, query.sha256) for query in body.wanted])
     return json_answer({"look_alikes": [[asdict(like) for like in likes] for likes in matches]})
@@ -168,7 +168,7 @@ def find_look_alikes(call: Viewer, body: LookAlikesBody) -> Response:
 
 @router.get("/items/{part_number}", response_model=ItemOut, responses=READ_ERRORS)
 def get_item(call: Viewer, part_number: str) -> Response:
-    """One item."""
+    """Return one item."""
     with call.read() as tx:
         item = service.get_item(tx, part_number)
         last = last_sync(tx, item)
@@ -238,7 +238,7 @@ def unarchive_item(call: Editor, part_number: str) -> Response:
 
 @router.post("/generate-part-number", response_model=NumberOut, responses=READ_ERRORS)
 def generate_part_number(call: Editor, body: NumberBody) -> Response:
-    """The number the next item of the category would get; a preview that consumes nothing."""
+    """Return the number the next item of the category would get; a preview that consumes nothing."""
     with call.read() as tx:
         number = preview_number(tx, body.schema_name, body.category)
     return json_answer({"part_number": number})
@@ -246,24 +246,24 @@ def generate_part_number(call: Editor, body: NumberBody) -> Response:
 
 @router.get("/schemas", responses=READ_ERRORS)
 def list_schemas(call: Viewer) -> list[dict[str, Any]]:
-    """All part-number schemas."""
+    """Return all part-number schemas."""
     return [describe(schema) for schema in schemas().values()]
 
 
 @router.get("/schemas/{name}", responses=READ_ERRORS)
 def get_schema(call: Viewer, name: str) -> dict[str, Any]:
-    """A schema: its segments with their values."""
+    """Return a schema: its segments with their values."""
     return describe(find_schema(name))
 
 
 @router.get("/schemas/{name}/form", responses=READ_ERRORS)
 def get_schema_form(call: Viewer, name: str) -> dict[str, Any]:
-    """The form descriptor for new items."""
+    """Return the form descriptor for new items."""
     return describe_form(find_schema(name))
 
 
 def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any]:
-    """An item, under the contract's names; ``last_sync`` where it was looked up."""
+    """Return an item, under the contract's names; ``last_sync`` where it was looked up."""
     fields = {} if last_sync is None else {"last_sync": last_sync.to_wire()}
     empty = (name for name in ("supplier_parts", "origins") if not getattr(item, name))
     left_out = ("id", "uuid", "texts", *empty)
@@ -338,7 +338,7 @@ def list_revisions(
     after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
     offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
 ) -> Response:
-    """Revisions, newest first; those below the number ``before`` and above ``after``.
+    """Return revisions, newest first; those below the number ``before`` and above ``after``.
 
     ``X-Total-Count`` says how many there are above ``after``.
     """
@@ -353,7 +353,7 @@ def list_revisions(
 
 @revisions_router.get("/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
 def get_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Response:
-    """One revision, with the files that its file links to."""
+    """Return one revision, with the files that its file links to."""
     with call.read() as tx:
         item = items.get_item(tx, part_number)
         revision = revisions.get_revision(tx, item, number)
@@ -362,7 +362,7 @@ def get_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Resp
 
 @revisions_router.post("/revisions", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS)
 def add_revision(call: Editor, part_number: str, body: RevisionBody) -> Response:
-    """A revision without a file: a new property snapshot."""
+    """Return a revision without a file: a new property snapshot."""
     with call.write() as tx:
         item = items.get_item(tx, part_number, lock=True)
         revision = revisions.add_revision(tx, item, comment=body.comment, properties=body.properties)
@@ -424,7 +424,7 @@ async def receive(call: Call, find: Find) -> Response:
 
 @revisions_router.get("/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
 def download_newest(call: Viewer, part_number: str) -> Response:
-    """The newest file."""
+    """Return the newest file."""
     with call.read() as tx:
         revision = revisions.newest_file(tx, items.get_item(tx, part_number))
     return download(call, revision)
@@ -432,7 +432,7 @@ def download_newest(call: Viewer, part_number: str) -> Response:
 
 @revisions_router.get("/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
 def download_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Response:
-    """The file of one revision."""
+    """Return the file of one revision."""
     with call.read() as tx:
         revision = revisions.get_revision(tx, items.get_item(tx, part_number), number)
     return download(call, revision)
@@ -444,7 +444,9 @@ def download_revision(call: Viewer, part_number: str, number: RevisionNumber) ->
     responses={**READ_ERRORS, 200: {"content": {"image/png": {}}, "description": "The picture"}},
 )
 def thumbnail(call: Viewer, part_number: str, key: Annotated[str, Query(max_length=64)] = "") -> Response:
-    """The picture that came with the newest file that has one. One asked for by its ``key`` may be kept."""
+    """Return the picture that came with the newest file that has one. One asked for by its ``key`` may be
+    kept.
+    """
     with call.read() as tx:
         item = items.get_item(tx, part_number)
     if not item.thumbnail_key:
@@ -486,7 +488,9 @@ def store_file(
     sha256: str = "",
     origin: Origin | None = None,
 ) -> Response:
-    """An uploaded file as a new revision, for the API and the pages; ``answer`` is made before the commit."""
+    """Return an uploaded file as a new revision, for the API and the pages; ``answer`` is made before the
+    commit.
+    """
     origin = origin or Origin()
     with call.read() as tx:
         find(tx, False)  # before anything is written to the disk
@@ -600,7 +604,7 @@ def document_at(uuid: str) -> Find:
 
 @by_uuid.post("/documents/by-uuid", response_model=DocumentsOut, responses=READ_ERRORS)
 def get_documents(call: Viewer, body: UuidsBody) -> Response:
-    """Many documents in one request; those that are not known are absent. Reads only, so a viewer may."""
+    """Return many documents in one request; those that are not known are absent. Reads only, so a viewer may."""
     with call.read() as tx:
         documents = revisions.shown(tx, revisions.documents_by_uuid(tx, body.uuids))
     return json_answer({"documents": [to_wire(document) for document in documents]})
@@ -608,7 +612,7 @@ def get_documents(call: Viewer, body: UuidsBody) -> Response:
 
 @by_uuid.get("/items/{part_number}/documents", response_model=DocumentsOut, responses=READ_ERRORS)
 def documents_of(call: Viewer, part_number: str) -> Response:
-    """The documents that hold an item: its own, or the file of several parts in which it is an object."""
+    """Return the documents that hold an item: its own, or the file of several parts in which it is an object."""
     with call.read() as tx:
         documents = revisions.shown(tx, revisions.documents_holding(tx, items.get_item(tx, part_number)))
     return json_answer({"documents": [to_wire(document) for document in documents]})
@@ -616,14 +620,14 @@ def documents_of(call: Viewer, part_number: str) -> Response:
 
 @by_uuid.get("/documents/{uuid}", response_model=wire.Document, responses=READ_ERRORS)
 def get_document(call: Viewer, uuid: Uuid) -> Response:
-    """One document, with what it links to and what links to it."""
+    """Return one document, with what it links to and what links to it."""
     with call.read() as tx:
         document_json = told_of(tx, uuid)
     return json_answer(document_json)
 
 
 def told_of(tx: Tx, uuid: str) -> dict[str, Any]:
-    """All that is known of a document, for the API and the pages. Raises NotFoundError."""
+    """Return all that is known of a document, for the API and the pages. Raises NotFoundError."""
     document = revisions.get_document(tx, items.normal_uuid(uuid))
     now = revisions.shown(tx, [document])
     if not now:
@@ -646,7 +650,7 @@ def list_document_revisions(
     after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
     offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
 ) -> Response:
-    """Revisions with a file, newest first, as those of an item."""
+    """Return revisions with a file, newest first, as those of an item."""
     with call.read() as tx:
         of = revisions.get_document(tx, items.normal_uuid(uuid))
         found_revisions, total = revisions.list_revisions(
@@ -658,7 +662,7 @@ def list_document_revisions(
 
 @by_uuid.get("/documents/{uuid}/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
 def get_document_revision(call: Viewer, uuid: Uuid, number: RevisionNumber) -> Response:
-    """One revision, with the files that its file links to."""
+    """Return one revision, with the files that its file links to."""
     with call.read() as tx:
         of = revisions.get_document(tx, items.normal_uuid(uuid))
         revision = revisions.get_revision(tx, of, number)
@@ -680,7 +684,7 @@ async def upload_document_file(call: Editor, uuid: Uuid) -> Response:
 
 @by_uuid.get("/documents/{uuid}/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
 def download_newest_of_document(call: Viewer, uuid: Uuid) -> Response:
-    """The newest file."""
+    """Return the newest file."""
     with call.read() as tx:
         revision = revisions.newest_file(tx, revisions.get_document(tx, items.normal_uuid(uuid)))
     return download(call, revision)
@@ -688,7 +692,7 @@ def download_newest_of_document(call: Viewer, uuid: Uuid) -> Response:
 
 @by_uuid.get("/documents/{uuid}/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
 def download_revision_of_document(call: Viewer, uuid: Uuid, number: RevisionNumber) -> Response:
-    """The file of one revision."""
+    """Return the file of one revision."""
     with call.read() as tx:
         revision = revisions.get_revision(tx, revisions.get_document(tx, items.normal_uuid(uuid)), number)
     return download(call, revision)

@@ -102,7 +102,7 @@ if TYPE_CHECKING:
 else:
 
     def _bounded(of: type[BaseModel]) -> type[Body]:
-        """The texts that a wire model names, with the server's bounds and characters."""
+        """Return the texts that a wire model names, with the server's bounds and characters."""
 
         def kind(hints: dict[str, Any]) -> Any:
             return Text if hints.get("long") else Brief if "maxLength" in hints else Short

@@ -113,7 +113,7 @@ class RatesBody(Body):
 
 @router.get("/items/{part_number}/suppliers", responses=READ_ERRORS)
 def get_suppliers(call: Viewer, part_number: str) -> Response:
-    """An item's supplier parts; ``ETag`` is the version of the list, for ``If-Match``."""
+    """Return an item's supplier parts; ``ETag`` is the version of the list, for ``If-Match``."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         version = suppliers.list_version(tx, item)
@@ -186,7 +186,7 @@ def asked_of(
     release: Annotated[str, Query(max_length=16)] = "",
     rest: bool = False,
 ) -> OrderRequest:
-    """What an order list is for; ``spares`` in percent, ``rest``: without what was ordered already."""
+    """Return what an order list is for; ``spares`` in percent, ``rest``: without what was ordered already."""
     reading = read_number(spares or "0")
     if reading.value is None or not 0 <= reading.value <= orders.MOST_SPARES:
         problem = reading.problem or f"wanted 0 to {orders.MOST_SPARES} percent, got {spares}"
@@ -201,7 +201,8 @@ Kind = Annotated[str, Query(pattern="^(bought|made|unsaid)$")]
 
 @router.get("/items/{part_number}/order", responses=READ_ERRORS)
 def get_order(call: Viewer, part_number: str, asked: AskedFor) -> dict[str, Any]:
-    """What to order for so many pieces: bought parts with prices, made parts, what nobody called either.
+    """Return what to order for so many pieces: bought parts with prices, made parts, what nobody called
+    either.
 
     Amounts and money are decimal numbers as text.
     """
@@ -254,7 +255,7 @@ def order_csv(
     supplier: Supplier = None,
     semicolons: bool = False,
 ) -> Response:
-    """The list as CSV, or what is ordered from one supplier."""
+    """Return the list as CSV, or what is ordered from one supplier."""
     write = partial(transfer.to_csv, semicolons=semicolons)
     return _exported(
         call, part_number, asked, kind, supplier, write, "text/csv; charset=utf-8; header=present"
@@ -265,7 +266,7 @@ def order_csv(
 def order_xlsx(
     call: Viewer, part_number: str, asked: AskedFor, kind: Kind = orders.BOUGHT, supplier: Supplier = None
 ) -> Response:
-    """The list as a workbook, or what is ordered from one supplier."""
+    """Return the list as a workbook, or what is ordered from one supplier."""
     return _exported(call, part_number, asked, kind, supplier, transfer.to_xlsx, XLSX)
 
 
@@ -282,7 +283,7 @@ def _exported(
 
 @router.get("/items/{part_number}/orders", responses=READ_ERRORS)
 def get_orders(call: Viewer, part_number: str) -> dict[str, Any]:
-    """What was ordered for a product, newest first."""
+    """Return what was ordered for a product, newest first."""
     with call.read() as tx:
         product = get_item(tx, part_number, include_archived=True)
         recorded = orders.list_recorded(tx, product=product)
@@ -319,7 +320,7 @@ def _recorded_to_wire(recorded: Recorded, part_number: str) -> dict[str, Any]:
 
 @router.get("/rates", responses=READ_ERRORS)
 def get_rates(call: Viewer) -> dict[str, Any]:
-    """The site's currency, and what one of each other currency is in it."""
+    """Return the site's currency, and what one of each other currency is in it."""
     with call.read() as tx:
         return _rates(suppliers.rates_of(tx))
 

@@ -54,7 +54,7 @@ class ReleasesOut(wire.Answer):
 
 
 def release_to_wire(tx: Tx, release: Release, *, whole: bool = False) -> dict[str, Any]:
-    """A revision as it is sent; ``whole``: with the item's revision and all files of the product."""
+    """Return a revision as it is sent; ``whole``: with the item's revision and all files of the product."""
     result = {
         **to_wire(release, "id"),
         "blocks": releases.blocks_of(tx, release) if release.status == "review" else release.blocks,
@@ -68,7 +68,7 @@ def release_to_wire(tx: Tx, release: Release, *, whole: bool = False) -> dict[st
 
 @router.get("", response_model=ReleasesOut, responses=READ_ERRORS)
 def list_releases(call: Viewer, part_number: str) -> Response:
-    """The revisions of a product: in review, released, obsolete, and those that came to nothing."""
+    """Return the revisions of a product: in review, released, obsolete, and those that came to nothing."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         releases_json = [release_to_wire(tx, release) for release in releases.list_releases(tx, item)]
@@ -86,14 +86,14 @@ def submit(call: Editor, part_number: str, body: SubmitBody) -> Response:
 
 
 def frozen_now(call: Call, part_number: str) -> releases.Frozen:
-    """The product as one snapshot of the database has it."""
+    """Return the product as one snapshot of the database has it."""
     with call.server.large_reads.enter(), call.read() as tx:
         return frozen.freeze(tx, get_item(tx, part_number))
 
 
 @router.get("/{label}", response_model=wire.Release, responses=READ_ERRORS)
 def get_release(call: Viewer, part_number: str, label: str) -> Response:
-    """One revision, with all files of the product as they were frozen."""
+    """Return one revision, with all files of the product as they were frozen."""
     with call.read() as tx:
         release = releases.get_release(tx, get_item(tx, part_number, include_archived=True), label)
         release_json = release_to_wire(tx, release, whole=True)

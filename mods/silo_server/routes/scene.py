@@ -48,7 +48,7 @@ _BYTES = {"type": "string", "format": "binary"}
 
 @router.post("/models/missing", response_model=ContentsBody, responses=READ_ERRORS)
 def missing(call: Viewer, body: ContentsBody) -> Response:
-    """Which of these files of revisions have no geometry or no structure yet."""
+    """Return which of these files of revisions have no geometry or no structure yet."""
     with call.read() as tx:
         return json_answer({"sha256": scene.missing(tx, body.sha256)})
 
@@ -60,7 +60,7 @@ def missing(call: Viewer, body: ContentsBody) -> Response:
     openapi_extra=_sent("application/octet-stream", _BYTES),
 )
 async def put_geometry(call: Editor, sha256: Checksum) -> Response:
-    """What is drawn of a file: a GLB, packed with gzip (``Content-Encoding``) or not."""
+    """Return what is drawn of a file: a GLB, packed with gzip (``Content-Encoding``) or not."""
     return await _keep(call, sha256, "geometry")
 
 
@@ -71,7 +71,7 @@ async def put_geometry(call: Editor, sha256: Checksum) -> Response:
     openapi_extra=_sent(JSON, {"type": "object"}),
 )
 async def put_structure(call: Editor, sha256: Checksum) -> Response:
-    """What a file shows, and where: JSON, packed with gzip (``Content-Encoding``) or not."""
+    """Return what a file shows, and where: JSON, packed with gzip (``Content-Encoding``) or not."""
     return await _keep(call, sha256, "structure")
 
 
@@ -94,13 +94,13 @@ async def _keep(call: Call, sha256: str, part: scene.Part) -> Response:
 
 @router.get("/models/{sha256}/geometry", response_class=Response, responses=_binary(GLB))
 def get_geometry(call: Viewer, sha256: Checksum, v: Annotated[str, Query(max_length=64)] = "") -> Response:
-    """What is drawn of a file. The address that a scene names may be kept forever."""
+    """Return what is drawn of a file. The address that a scene names may be kept forever."""
     return _part(call, sha256, "geometry", GLB, v)
 
 
 @router.get("/models/{sha256}/structure", response_class=Response, responses=_binary(JSON))
 def get_structure(call: Viewer, sha256: Checksum, v: Annotated[str, Query(max_length=64)] = "") -> Response:
-    """What a file shows, and where."""
+    """Return what a file shows, and where."""
     return _part(call, sha256, "structure", JSON, v)
 
 
@@ -118,7 +118,7 @@ def _part(call: Call, sha256: str, part: scene.Part, kind: str, version: str) ->
 def get_scene(
     call: Viewer, part_number: str, revision: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None
 ) -> Response:
-    """Where each part of a product stands: in the newest files, or in those that a revision recorded."""
+    """Return where each part of a product stands: in the newest files, or in those that a revision recorded."""
     with call.server.large_reads.enter(), call.read() as tx:
         item = items.get_item(tx, part_number, include_archived=True)
         return json_answer(scene.scene(tx, call.server.files, item, revision))

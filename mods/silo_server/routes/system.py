@@ -63,7 +63,7 @@ class ModeBody(BaseModel):
 
 @router.get("/health")
 async def health(server: ServerDep) -> dict[str, Any]:
-    """The process lives; says also in which mode. Waits for nothing that others wait for."""
+    """Return the process lives; says also in which mode. Waits for nothing that others wait for."""
     state = await server.probe.look(HEALTH_SECONDS) or server.probe.last
     return {"status": "ok", "mode": state.mode}
 
@@ -71,14 +71,14 @@ async def health(server: ServerDep) -> dict[str, Any]:
 @router.api_route("/health", methods=["HEAD", "OPTIONS"], include_in_schema=False)
 @router.api_route("/ready", methods=["OPTIONS"], include_in_schema=False)
 async def looked_at() -> Response:
-    """For balancers and browsers that look before they ask."""
+    """Answer balancers and browsers that look before they ask."""
     return Response(status_code=204, headers={"Allow": "GET, HEAD, OPTIONS"})
 
 
 @router.api_route("/ready", methods=["HEAD"], include_in_schema=False)
 @router.get("/ready", responses={503: {"description": "The database or the file store is not there"}})
 async def ready(server: ServerDep) -> Response:
-    """The server can do its work: 200, or 503 while the database or the file store is away or full."""
+    """Say if the server can do its work: 200, or 503 while the database or the file store is away or full."""
     state = await server.probe.look(READY_SECONDS) or State(
         "degraded", "unreachable", server.probe.last.files
     )
@@ -101,7 +101,7 @@ async def ready(server: ServerDep) -> Response:
     responses={**READ_ERRORS, 200: {"content": {"text/plain": {}}, "description": "The numbers"}},
 )
 def metrics(call: Viewer) -> Response:
-    """For Prometheus, with a viewer's token."""
+    """Return metrics for Prometheus, with a viewer's token."""
     rendered = call.request.app.state.metrics.render(call.server.db, call.server.hub, call.server.files)
     return Response(rendered, headers={"Content-Type": CONTENT_TYPE})
 
@@ -116,7 +116,7 @@ async def stream_events(
     item: Annotated[list[str] | None, Query(max_length=100)] = None,
     last_event_id: Annotated[str | None, Query(max_length=40)] = None,
 ) -> Response:
-    """Events as they happen. ``Last-Event-ID`` (or ``last_event_id``) replays what came after it.
+    """Return events as they happen. ``Last-Event-ID`` (or ``last_event_id``) replays what came after it.
 
     ``item`` (part numbers or UUIDs, repeatable) lets only their events through. ``reset`` says: you were away
     for longer than the log goes back, read everything again.
@@ -134,27 +134,31 @@ async def stream_events(
 
 @router.get("/api/modules", responses=READ_ERRORS)
 async def modules(call: Viewer) -> dict[str, Any]:
-    """What this server can do."""
+    """Return what this server can do."""
     return {"modules": {name: {"enabled": True} for name in MODULES}}
 
 
 @router.get("/api/admin/mode", responses=READ_ERRORS)
 def get_mode(call: Admin) -> dict[str, Any]:
-    """The mode: ``normal`` or ``read-only``."""
+    """Return the mode: ``normal`` or ``read-only``."""
     with call.read() as tx:
         return {"mode": mode_of(tx)}
 
 
 @router.get("/api/admin/system", responses=READ_ERRORS)
 def get_system(call: Admin) -> dict[str, Any]:
-    """Version, database, disk, the last backup and housekeeping, queues, counts, warnings of the start."""
+    """Return version, database, disk, the last backup and housekeeping, queues, counts, warnings of the
+    start.
+    """
     server = call.server
     return standing(server.db, server.hub, server.files, server.large_reads)
 
 
 @router.get("/api/admin/housekeeping", responses=READ_ERRORS)
 def get_housekeeping(call: Admin) -> dict[str, Any]:
-    """When old rows and files were last deleted, how many of what, and what went wrong; null before that."""
+    """Return when old rows and files were last deleted, how many of what, and what went wrong; null before
+    that.
+    """
     with call.read() as tx:
         run = last_run(tx)
     return {"last_run": asdict(run) if run else None}
@@ -260,7 +264,7 @@ def log_out(call: Viewer) -> Response:
 
 @auth_router.get("/auth/me", responses=READ_ERRORS)
 def who_am_i(call: Viewer) -> dict[str, Any]:
-    """Who this token or session is."""
+    """Return who this token or session is."""
     return {
         "username": call.actor.username,
         "display_name": call.actor.display_name,
@@ -278,7 +282,7 @@ def set_password(call: Viewer, body: PasswordBody) -> Response:
 
 @auth_router.get("/auth/tokens", responses=READ_ERRORS)
 def list_tokens(call: Viewer) -> list[dict[str, Any]]:
-    """The own tokens; never their secrets."""
+    """Return the own tokens; never their secrets."""
     with call.read() as tx:
         return [_token(token) for token in access.list_tokens(tx, call.actor.own_id)]
 
@@ -307,7 +311,7 @@ def revoke_token(call: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]) -
 
 @auth_router.get("/users", responses=READ_ERRORS)
 def list_users(call: Admin) -> list[dict[str, Any]]:
-    """All users."""
+    """Return all users."""
     with call.read() as tx:
         return [_user(user) for user in access.list_users(tx)]
 
@@ -332,7 +336,7 @@ def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, A
 
 @auth_router.post("/users/{username}/login-link", status_code=201, responses=WRITE_ERRORS)
 def create_login_link(call: Admin, username: str) -> dict[str, Any]:
-    """A link that lets this user in once; for a new colleague or a forgotten password."""
+    """Return a link that lets this user in once; for a new colleague or a forgotten password."""
     with call.write(even_when_read_only=True) as tx:
         secret = access.create_login_link(tx, username)
         access.note(tx, "login_link.created", username)
@@ -345,14 +349,14 @@ def create_login_link(call: Admin, username: str) -> dict[str, Any]:
 def list_audit(
     call: Admin, limit: Annotated[int, Query(ge=1, le=1000)] = 100, before: PageFrom = None
 ) -> list[dict[str, Any]]:
-    """Who did what, newest first."""
+    """Return who did what, newest first."""
     with call.read() as tx:
         entries = access.list_entries(tx, limit, before)
     return [to_wire(entry) for entry in entries]
 
 
 def set_session_cookie(response: Response, request: Request, session: access.NewSession) -> None:
-    """The session's cookie: not for scripts, not for other sites, and only over TLS where there is TLS."""
+    """Set the session's cookie: not for scripts, not for other sites, and only over TLS where there is TLS."""
     settings = server_of(request).settings
     response.set_cookie(
         SESSION_COOKIE,

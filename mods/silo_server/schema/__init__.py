@@ -54,16 +54,16 @@ class PropertyField:
     categories: tuple[str, ...] = ()
 
     def fits(self, category: str | None) -> bool:
-        """True where items of this category have the field."""
+        """Return True if items of this category have the field."""
         return not self.categories or category is None or category.startswith(self.categories)
 
     @property
     def title(self) -> str:
-        """``Mass [kg]``."""
+        """Return ``Mass [kg]``."""
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
     def read(self, text: str) -> str | int | float:
-        """The value that somebody typed; RejectedError says what was wanted. ``text`` is not empty."""
+        """Return the value that somebody typed; RejectedError says what was wanted. ``text`` is not empty."""
         if self.type in ("number", "integer"):
             return self._number(text)
         if self.options and text not in self.options:
@@ -106,11 +106,11 @@ class Schema:
     fields: tuple[PropertyField, ...]
 
     def number(self, category: str, serial: int) -> str:
-        """``F01-0001``. A serial beyond the digits grows; gaps are tolerated everywhere."""
+        """Return ``F01-0001``. A serial beyond the digits grows; gaps are tolerated everywhere."""
         return f"{category}{self.separator}{serial:0{self.serial_digits}d}"
 
     def category(self, code: str) -> Category:
-        """The category, in whatever case it is asked for."""
+        """Return the category, in whatever case it is asked for."""
         result = self.categories.get(code.strip().upper())
         if result is None:
             raise RejectedError(
@@ -122,14 +122,14 @@ class Schema:
 
 @cache
 def schemas() -> Mapping[str, Schema]:
-    """All schemas by name."""
+    """Return all schemas by name."""
     text = resources.files("silo_server.schema").joinpath("kindred_rd.toml").read_text("utf-8")
     schema = _parse(tomllib.loads(text))
     return {schema.name: schema}
 
 
 def find_schema(name: str | None) -> Schema:
-    """The schema called ``name``, or the default one; NotFoundError otherwise."""
+    """Return the schema called ``name``, or the default one; NotFoundError otherwise."""
     wanted = name or DEFAULT_SCHEMA
     schema = schemas().get(wanted)
     if schema is None:
@@ -160,7 +160,7 @@ def _parse_field(raw: Mapping[str, Any]) -> PropertyField:
 
 
 def describe(schema: Schema) -> dict[str, Any]:
-    """The schema as ``GET /api/schemas/{name}`` sends it: the segments with their values."""
+    """Return the schema as ``GET /api/schemas/{name}`` sends it: the segments with their values."""
     values = {category.code: category.name for category in schema.categories.values()}
     return {
         "name": schema.name,
@@ -178,7 +178,7 @@ def describe(schema: Schema) -> dict[str, Any]:
 
 
 def _described_rules(schema: Schema) -> dict[str, Any]:
-    """A wrong file costs the proposals, not the schema; those who register parts read what is wrong."""
+    """Return a wrong file costs the proposals, not the schema; those who register parts read what is wrong."""
     try:
         return {"category_rules": category_rules(schema)}
     except ConfigError as error:
@@ -191,7 +191,8 @@ RULES = "SILO_CATEGORY_RULES"
 
 
 def category_rules(schema: Schema, env: Mapping[str, str] = os.environ) -> list[Mapping[str, Any]]:
-    """Which category a name of a part stands for: of the site's file, else of the one beside the schema.
+    """Return which category a name of a part stands for: of the site's file, else of the one beside the
+    schema.
 
     Read again each time, so that an edit counts at once. ConfigError where the site's file is wrong, with all
     that is wrong in it. It names the file without its folder, for every designer reads it.
@@ -220,7 +221,7 @@ def category_rules(schema: Schema, env: Mapping[str, str] = os.environ) -> list[
 
 
 def _places(text: str, count: int) -> list[str]:
-    """Where each rule stands in the file."""
+    """Return where each rule stands in the file."""
     lines = [number for number, line in enumerate(text.splitlines(), 1) if _RULE.match(line)]
     if len(lines) != count:
         return [f"rule {number}" for number in range(1, count + 1)]
@@ -231,7 +232,7 @@ _RULE = re.compile(r"\s*\[\[\s*[\"']?rules[\"']?\s*\]\]")
 
 
 def describe_form(schema: Schema) -> dict[str, Any]:
-    """The form descriptor: a two-stage category picker, the item's fields, and the property fields."""
+    """Return the form descriptor: a two-stage category picker, the item's fields, and the property fields."""
     return {
         "schema": schema.name,
         "category_picker": {
@@ -260,7 +261,7 @@ def _field(field: PropertyField) -> dict[str, Any]:
 
 
 def text_hints(field: FieldInfo) -> Mapping[str, Any]:
-    """What :class:`silo.api.wire.ItemTexts` says of a field for its form: ``options``, ``long``."""
+    """Return what :class:`silo.api.wire.ItemTexts` says of a field for its form: ``options``, ``long``."""
     hints = field.json_schema_extra
     return hints if isinstance(hints, dict) else {}
 

@@ -67,7 +67,7 @@ def note(tx: Tx, action: str, target: str = "", detail: str = "") -> None:
 def list_entries(
     tx: Tx, limit: int = 100, before: int | None = None, after: int | None = None
 ) -> list[AuditEntry]:
-    """The newest entries first; ``before`` and ``after`` are ids to page on and back."""
+    """Return the newest entries first; ``before`` and ``after`` are ids to page on and back."""
     rows = newest_first(tx, select(audit), audit.c.id, limit, before, after)
     return [from_row(AuditEntry, row) for row in rows]
 
@@ -111,7 +111,7 @@ def _decoy() -> str:
 
 
 def to_user(row: Any) -> User:
-    """A frozen user from its row."""
+    """Return a frozen user from its row."""
     has_password = row.password_hash is not None
     return from_row(
         User,
@@ -124,12 +124,12 @@ def to_user(row: Any) -> User:
 
 
 def list_users(tx: Tx) -> list[User]:
-    """All users by name."""
+    """Return all users by name."""
     return [to_user(row) for row in tx.conn.execute(select(users).order_by(users.c.username_key))]
 
 
 def get_user(tx: Tx, username: str) -> User:
-    """The user, in whatever case; NotFoundError where there is none."""
+    """Return the user, in whatever case; NotFoundError if there is none."""
     row = row_of(tx, username)
     if row is None:
         raise NotFoundError(f"there is no user {username!r}")
@@ -137,7 +137,7 @@ def get_user(tx: Tx, username: str) -> User:
 
 
 def row_of(tx: Tx, username: str) -> Any:
-    """The row of this user, None where there is none."""
+    """Return the row of this user, None if there is none."""
     return tx.conn.execute(select(users).where(users.c.username_key == username.casefold())).one_or_none()
 
 
@@ -238,7 +238,7 @@ def check_lasting(tx: Tx, what: str) -> None:
 
 
 def _what_changed(user: User, values: Mapping[str, object]) -> str:
-    """``role viewer → editor``; never a password."""
+    """Return ``role viewer → editor``; never a password."""
     before: dict[str, object] = {
         "role": user.role.value,
         "display_name": user.display_name,
@@ -254,7 +254,7 @@ def _what_changed(user: User, values: Mapping[str, object]) -> str:
 
 
 def make_admin(tx: Tx, username: str) -> User:
-    """The user as an active admin; made where there is none."""
+    """Return the user as an active admin; made where there is none."""
     tx.lock(ADMIN_LOCK)
     if row_of(tx, username) is None:
         return create_user(tx, username, Role.ADMIN)
@@ -262,7 +262,7 @@ def make_admin(tx: Tx, username: str) -> User:
 
 
 def password_fits(claimed: Any, password: str) -> bool:
-    """True where the password is that of an active user; takes as long for an unknown name.
+    """Return True if the password is that of an active user; takes as long for an unknown name.
 
     claimed
         the row of :func:`row_of` for the name that somebody gave.
@@ -280,7 +280,7 @@ def password_fits(claimed: Any, password: str) -> bool:
 
 
 def hash_password(password: str) -> str:
-    """An argon2id hash; RejectedError for a password that is too short or absurdly long."""
+    """Return an argon2id hash; RejectedError for a password that is too short or absurdly long."""
     if not MIN_PASSWORD <= len(password) <= MAX_PASSWORD:
         raise RejectedError(
             f"password: wanted {MIN_PASSWORD} to {MAX_PASSWORD} characters, got {len(password)}"
@@ -325,12 +325,12 @@ class Token:
 
 
 def secret_hash(secret: str) -> str:
-    """What is stored of a secret. The secrets are 160 random bits, so that a plain SHA-256 is enough."""
+    """Return what is stored of a secret. The secrets are 160 random bits, so that a plain SHA-256 is enough."""
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def secret_of_form(actor: Actor, *sent: str) -> str | None:
-    """The secret of the token that a form asks for: the same one where the same form is sent again.
+    """Return the secret of the token that a form asks for: the same one where the same form is sent again.
 
     sent
         what the form holds, with a key that is new each time the form is shown. None for a caller without
@@ -440,7 +440,7 @@ def create_token(
 
 
 def shown_prefix(secret: str) -> str:
-    """So much of a secret as may be shown: of one that somebody chose, and that may be short, not much."""
+    """Return the part of a secret that may be shown; less of a secret chosen by a person."""
     return secret[: min(9, len(secret) // 4)]
 
 
@@ -478,7 +478,7 @@ def check_configured_secret(secret: str) -> None:
 
 
 def list_tokens(tx: Tx, user_id: int | None = None) -> list[Token]:
-    """The tokens of a user, or of everybody, newest first."""
+    """Return the tokens of a user, or of everybody, newest first."""
     query = (
         select(api_tokens, users.c.username)
         .join(users, users.c.id == api_tokens.c.user_id)
@@ -507,7 +507,7 @@ def revoke_token(tx: Tx, token_id: int, user_id: int | None) -> None:
 
 
 def actor_by_token(db: Database, secret: str, address: str) -> Actor | None:
-    """Who holds this token; None where it is unknown, expired, revoked, or its user is not active."""
+    """Return who holds this token; None if it is unknown, expired, revoked, or its user is not active."""
     with db.read() as tx:
         row = tx.conn.execute(
             select(
@@ -601,7 +601,7 @@ def set_own_password(db: Database, actor: Actor, new: str, current: str | None) 
 
 
 def _proved(db: Database, username: str, password: str, address: str) -> User:
-    """The user whose password this is; AuthError, TooManyAttemptsError."""
+    """Return the user whose password this is; AuthError, TooManyAttemptsError."""
     actor = Actor(username[:64], Role.VIEWER, address=address)
     # Reserved before the password is looked at: what comes at the same time is counted as well.
     with db.write(actor, even_when_read_only=True) as tx:
@@ -623,7 +623,7 @@ def _proved(db: Database, username: str, password: str, address: str) -> User:
 
 
 def create_login_link(tx: Tx, username: str) -> str:
-    """A secret that lets this user in once, for a while, to set a password without the old one.
+    """Return a secret that lets this user in once, for a while, to set a password without the old one.
 
     So nobody makes a link for the own account: who holds its session or token is not asked for the password.
     """
@@ -662,7 +662,7 @@ def use_login_link(db: Database, secret: str, address: str) -> NewSession:
 
 
 def actor_by_session(db: Database, secret: str, address: str) -> Actor | None:
-    """Who this session cookie is; None where it is unknown or over."""
+    """Return who this session cookie is; None if it is unknown or over."""
     with db.read() as tx:
         row = tx.conn.execute(
             select(

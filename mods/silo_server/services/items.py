@@ -48,7 +48,7 @@ _UNSEEN = re.compile(f"[{UNSEEN}]")
 
 
 def check_number(number: str) -> str:
-    """A part number as given, trimmed; RejectedError where it cannot stand in a path or a cell."""
+    """Return a part number as given, trimmed; RejectedError if it cannot stand in a path or a cell."""
     if problem := character_problem(number):
         raise RejectedError(f"part_number: {problem}")
     trimmed = number.strip()
@@ -66,7 +66,7 @@ def check_number(number: str) -> str:
 
 
 def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
-    """The number the next item of the category would get; consumes nothing."""
+    """Return the number the next item of the category would get; consumes nothing."""
     schema = find_schema(schema_name)
     category_found = schema.category(category)
     last = tx.conn.scalar(
@@ -78,7 +78,7 @@ def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
 
 
 def take_number(tx: Tx, schema: Schema, category: Category) -> str:
-    """The next free number of the category, taken."""
+    """Return the next free number of the category, taken."""
     where = (number_counters.c.schema_name == schema.name, number_counters.c.category == category.code)
     _ensure_counter(tx, schema.name, category.code)
     last = tx.conn.scalar(select(number_counters.c.last_serial).where(*where).with_for_update()) or 0
@@ -160,7 +160,7 @@ SORTS: Mapping[str, Sequence[ColumnElement[Any]]] = {
 
 
 def to_item(row: Any) -> Item:
-    """A frozen item from its row."""
+    """Return a frozen item from its row."""
     texts = {name: getattr(row, name) for name in ItemTexts.model_fields}
     offers = json.loads(row.supplier_parts) if row.supplier_parts else ()
     origins = json.loads(row.origins) if row.origins else {}
@@ -169,7 +169,7 @@ def to_item(row: Any) -> Item:
 
 
 def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: bool = False) -> Item:
-    """The item with this number, in whatever case; NotFoundError where there is none (or it is archived).
+    """Return the item with this number, in whatever case; NotFoundError if there is none (or it is archived).
 
     ``lock`` makes other writers of this item, and of its BOM, wait until this transaction ends, whose time
     is then later than that of the item's last change.
@@ -187,7 +187,7 @@ def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: 
 
 
 def get_by_uuid(tx: Tx, uuid: str) -> Item:
-    """The item with this UUID; NotFoundError when there is none or it is archived."""
+    """Return the item with this UUID; NotFoundError when there is none or it is archived."""
     row = tx.conn.execute(select(items).where(items.c.uuid == normal_uuid(uuid))).one_or_none()
     if row is None or row.archived_at:
         raise NotFoundError(f"no item has the UUID {uuid}")
@@ -195,7 +195,7 @@ def get_by_uuid(tx: Tx, uuid: str) -> Item:
 
 
 def get_by_uuids(tx: Tx, wanted: Sequence[str], *, include_archived: bool = False) -> list[Item]:
-    """The items with these UUIDs, each once, in the order asked; those that are missing are absent."""
+    """Return the items with these UUIDs, each once, in the order asked; those that are missing are absent."""
     uuids_asked = [normal for uuid in wanted if (normal := as_uuid(uuid))]
     query = select(items).where(one_of(tx, items.c.uuid, uuids_asked))
     rows = tx.conn.execute(query if include_archived else query.where(items.c.archived_at.is_(None))).all()
@@ -204,7 +204,7 @@ def get_by_uuids(tx: Tx, wanted: Sequence[str], *, include_archived: bool = Fals
 
 
 def get_by_numbers(tx: Tx, wanted: Sequence[str]) -> dict[str, Item]:
-    """The items with these part numbers (in whatever case), by the number as it was asked for."""
+    """Return the items with these part numbers (in whatever case), by the number as it was asked for."""
     keys = {number: number.casefold() for number in wanted}
     rows = tx.conn.execute(
         select(items).where(
@@ -216,13 +216,13 @@ def get_by_numbers(tx: Tx, wanted: Sequence[str]) -> dict[str, Item]:
 
 
 def by_ids(tx: Tx, ids: Collection[int]) -> dict[int, Item]:
-    """Items by their internal id, archived ones too."""
+    """Return items by their internal id, archived ones too."""
     rows = tx.conn.execute(select(items).where(one_of(tx, items.c.id, ids))).all()
     return {row.id: to_item(row) for row in rows}
 
 
 def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
-    """A page of the items that match, best first, then by part number; and how many match in all."""
+    """Return a page of the items that match, best first, then by part number; and how many match in all."""
     conditions: list[ColumnElement[bool]] = []
     if query.archived:
         conditions.append(items.c.archived_at.is_not(None))
@@ -372,7 +372,7 @@ def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | No
 
 
 def _kept_from_cad(item: Item) -> list[str]:
-    """The facts that a person typed, or read from a scale: CAD does not replace them."""
+    """Return the facts that a person typed, or read from a scale: CAD does not replace them."""
     return [n for n in FACTS if n in item.properties and item.origins.get(n, {}).get("source") != "cad"]
 
 
@@ -457,7 +457,7 @@ def unarchive_item(tx: Tx, part_number: str) -> Item:
 
 
 def normal_uuid(uuid: str, field: str = "uuid") -> str:
-    """The UUID in its one written form; RejectedError, naming the field, where it is none."""
+    """Return the UUID in its one written form; RejectedError, naming the field, where it is none."""
     normal = as_uuid(uuid)
     if not normal:
         raise RejectedError(

@@ -108,23 +108,23 @@ class OrderRow(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """``bought``, ``made`` or ``unsaid``."""
+        """Return ``bought``, ``made`` or ``unsaid``."""
         made = self.item.texts.get("sourcing_type") == "manufactured"
         return BOUGHT if self.item.is_bought else MADE if made else UNSAID
 
     @property
     def supplier(self) -> str:
-        """Who sells it; "" if nobody is known."""
+        """Return who sells it; "" if nobody is known."""
         return self.offer.of.supplier if self.offer else ""
 
     @property
     def mass(self) -> Decimal | None:
-        """Of one piece [kg]."""
+        """Return the mass of one piece [kg]."""
         return own_worth(self.item.properties).mass
 
     @property
     def remarks(self) -> list[str]:
-        """What a purchaser must know about it, in words."""
+        """Return what a purchaser must know about it, in words."""
         said = list(self.doubts)
         if self.item.archived_at:
             said.append("archived")
@@ -173,7 +173,7 @@ class OrderList:
 
     @property
     def by_supplier(self) -> dict[str, list[OrderRow]]:
-        """The bought parts by supplier, those without one last."""
+        """Return the bought parts by supplier, those without one last."""
         rows: dict[str, list[OrderRow]] = {}
         for row in self.of_kind(BOUGHT):
             rows.setdefault(row.supplier, []).append(row)
@@ -238,7 +238,7 @@ def _row(
 def _state(
     tx: Tx, product: Item, release: Release | None, summary: Summary | None, graph: Graph
 ) -> tuple[str, list[str]]:
-    """What the list is of, and what a reader must know first."""
+    """Return what the list is of, and what a reader must know first."""
     if release is not None:
         state = f"Revision {release.label}, {release.status}, frozen at {wire(release.frozen_at)}"
         warnings = (
@@ -295,7 +295,7 @@ def _summed(
 
 
 def _ids_of(tx: Tx, items_by_id: Mapping[int, Item]) -> dict[int, int]:
-    """The internal ids of items that were frozen, by the number that they have in the frozen product."""
+    """Return the internal ids of items that were frozen, by the number that they have in the frozen product."""
     query = select(items.c.uuid, items.c.id).where(
         one_of(tx, items.c.uuid, {each_item.uuid for each_item in items_by_id.values()})
     )
@@ -304,7 +304,8 @@ def _ids_of(tx: Tx, items_by_id: Mapping[int, Item]) -> dict[int, int]:
 
 
 def _files(tx: Tx, item_ids: Collection[int], release: Release | None) -> dict[int, list[PartFile]]:
-    """The files that each item is in, the newest of each kind: its drawing, its STEP, its FreeCAD file.
+    """Return the files that each item is in, the newest of each kind: its drawing, its STEP, its FreeCAD
+    file.
 
     Revisions are never changed, so those until a product was frozen are those of its release.
     """

@@ -358,7 +358,8 @@ def list_revisions(
     after: int = 0,
     skip: int = 0,
 ) -> tuple[list[Revision], int]:
-    """``limit`` of the revisions below ``before`` and above ``after``, newest first, without ``skip`` ones.
+    """Return at most ``limit`` of the revisions below ``before`` and above ``after``, newest first, without
+    ``skip`` ones.
 
     And how many revisions above ``after`` there are in all.
     """
@@ -373,7 +374,7 @@ def list_revisions(
 
 
 def get_revision(tx: Tx, of: Item | Document, number: int) -> Revision:
-    """One revision; NotFoundError where there is none."""
+    """Return one revision; NotFoundError if there is none."""
     row = tx.conn.execute(
         select(revisions).where(_of(of), revisions.c.revision_number == number)
     ).one_or_none()
@@ -432,7 +433,7 @@ def _to_revision(row: Row[Any]) -> Revision:
 
 
 def revision_to_wire(of: Item | Document, revision: Revision, *, links: bool = False) -> dict[str, Any]:
-    """A revision, under the contract's names; its links only where they are wanted, there may be many."""
+    """Return a revision, under the contract's names; its links only where they are wanted, there may be many."""
     number = of.part_number if isinstance(of, Item) else ""
     return {"part_number": number, **to_wire(revision, *(() if links else ("links",)))}
 
@@ -459,7 +460,7 @@ class FileStore:
         self.root = root
 
     def path_of(self, checksum: str) -> Path:
-        """Where the file with this hash lies; NotFoundError where it does not."""
+        """Return where the file with this hash lies; NotFoundError if it does not."""
         path = self._place(checksum)
         if not path.is_file():
             raise NotFoundError(f"the file with SHA-256 {checksum} is not in this server's store")
@@ -473,7 +474,7 @@ class FileStore:
         return StoredFile(clean_name(name), checksum, size, key)
 
     def holds(self, checksum: str) -> bool:
-        """True where the file with this hash is here and undamaged; reads all of it."""
+        """Return True if the file with this hash is here and undamaged; reads all of it."""
         try:
             with self._place(checksum).open("rb") as file:
                 return hashlib.file_digest(file, "sha256").hexdigest() == checksum
@@ -481,7 +482,7 @@ class FileStore:
             return False
 
     def renew(self, checksum: str) -> bool:
-        """True where the file with this hash is here and undamaged; it counts as new then.
+        """Return True if the file with this hash is here and undamaged; it counts as new then.
 
         For those who are about to refer to it: nobody collects it meanwhile as one that is old and unused.
         """
@@ -501,7 +502,7 @@ class FileStore:
             return self._write(iter(lambda: source.read(CHUNK), b""), wanted=checksum)[0] == checksum
 
     def older_than(self, before: float) -> list[Path]:
-        """What came before this time (seconds since 1970), half-written uploads too."""
+        """Return what came before this time (seconds since 1970), half-written uploads too."""
         if not self.root.is_dir():
             return []
         paths = [path for path in self.root.glob("??/??/*") if _came_before(path, before)]
@@ -531,7 +532,7 @@ class FileStore:
         return False
 
     def state(self, wanted: int) -> str:
-        """``ok``; ``unwritable``; ``full`` where fewer than ``wanted`` bytes are free."""
+        """Return ``ok``; ``unwritable``; ``full`` where fewer than ``wanted`` bytes are free."""
         try:
             self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
             free = shutil.disk_usage(self.root).free
@@ -552,7 +553,7 @@ class FileStore:
         return self.root / checksum[:2] / checksum[2:4] / checksum
 
     def _write(self, chunks: Iterable[bytes], wanted: str | None = None) -> tuple[str, int]:
-        """(hash, size); a content whose hash is not the one ``wanted`` is not kept."""
+        """Return (hash, size); a content whose hash is not the one ``wanted`` is not kept."""
         self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
         digest, size = hashlib.sha256(), 0
         handle, name = tempfile.mkstemp(dir=self.root, prefix="upload-")
@@ -590,7 +591,7 @@ def _came_before(path: Path, before: float) -> bool:
 
 
 def clean_name(name: str) -> str:
-    """The last part of a file name without control characters; what a download is called."""
+    """Return the last part of a file name without control characters; what a download is called."""
     last = name.replace("\\", "/").rpartition("/")[2]
     cleaned = "".join(c for c in last if c.isprintable()).strip(" .")
     # A person on Windows cannot save a download that is called CON.
@@ -619,7 +620,7 @@ def read_thumbnail(path: Path) -> bytes | None:
 
 
 def _directory_size(path: Path) -> int:
-    """The bytes of a zip's directory by its end record; a huge number for ZIP64, 0 where this is no zip."""
+    """Return the bytes of a zip's directory by its end record; a huge number for ZIP64, 0 if this is no zip."""
     with path.open("rb") as source:
         length = source.seek(0, os.SEEK_END)
         source.seek(max(0, length - END_SIZE - 0xFFFF))

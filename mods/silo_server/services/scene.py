@@ -381,7 +381,7 @@ def _target(link: Mapping[str, str]) -> str:
 
 
 def _newest(tx: Tx, uuids: set[str]) -> dict[str, str]:
-    """Document → the content of its newest file."""
+    """Return document → the content of its newest file."""
     query = (
         select(documents.c.uuid, revisions.c.file_checksum)
         .join(revisions, revisions.c.document_id == documents.c.id)

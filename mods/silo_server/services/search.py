@@ -60,12 +60,12 @@ _vectors = table("item_search", column("item_id", Integer), column("words", TSVE
 
 
 def words_of(written: str) -> list[str]:
-    """The words of a text as the index has them."""
+    """Return the words of a text as the index has them."""
     return [word[:LONGEST_WORD] for word in _WORD.findall(folded(written))]
 
 
 def fits(asked: str) -> Callable[..., bool]:
-    """A test of texts: true where every word of ``asked`` is in one of them, without case and accents."""
+    """Return a test of texts: true where every word of ``asked`` is in one of them, without case and accents."""
     wanted = words_of(asked)
 
     def test(*texts: str | None) -> bool:
@@ -80,13 +80,14 @@ def fits(asked: str) -> Callable[..., bool]:
 
 @lru_cache(maxsize=16384)
 def _read(text: str) -> tuple[str, str]:
-    """The words of a text, with spaces between them and without; the caller filters again."""
+    """Return the words of a text, with spaces between them and without; the caller filters again."""
     words = words_of(text)
     return " ".join(words), "".join(words)
 
 
 def search_for(tx: Tx, written: str) -> tuple[ColumnElement[bool], ColumnElement[int]] | None:
-    """What finds the items with all words of ``written``: a condition on ``items``, and what to order by.
+    """Return what finds the items with all words of ``written``: a condition on ``items``, and what to order
+    by.
 
     None where it says nothing to search for.
 
@@ -221,7 +222,9 @@ def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
 
 
 def _matches(tx: Tx, words: Iterable[str], where: str) -> ColumnElement[bool]:
-    """The item has all ``words`` (their beginnings), ``where``: in these columns of the index, or in any."""
+    """Return the condition that an item has all ``words`` (their beginnings), ``where``: in these columns of
+    the index, or in any.
+    """
     if tx.postgres:
         weights = {"": "", "number": "A", "number name": "AB"}[where]
         query = " & ".join(f"'{word}':*{weights}" for word in words)
@@ -249,7 +252,7 @@ def _joined(number: str) -> str:
 
 
 def _inner(words: Iterable[str]) -> set[str]:
-    """Words and their ends, so that the beginning of an end, which is any part of a word, is found."""
+    """Return words and their ends, so that the beginning of an end, which is any part of a word, is found."""
     result: set[str] = set()
     for word in list(filter(None, words))[:MOST_WORDS]:  # a number of signs alone has no word
         result |= _ends(word)
@@ -302,7 +305,7 @@ class LookAlike:
 
 
 def find_look_alikes(tx: Tx, wanted: Sequence[tuple[str, str]]) -> list[list[LookAlike]]:
-    """For each (name, SHA-256 of the file or ""): what it may be already, the same file first.
+    """Find for each (name, SHA-256 of the file or "") what it may be already, the same file first.
 
     The index gives those that may fit; a name is compared as people read it, without suffix, in any case.
     """

@@ -90,7 +90,7 @@ class SupplierPart:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What no two of an item may share."""
+        """Return what no two of an item may share."""
         return self.supplier.casefold(), self.number.casefold()
 
     def amount(self, needed: Decimal) -> Decimal:
@@ -343,7 +343,7 @@ class SupplierChange:
 
     @property
     def words(self) -> list[str]:
-        """What it did, in words."""
+        """Return what it did, in words."""
         old, new = (
             {part.key: part for part in map(from_json, json.loads(t))} for t in (self.before, self.after)
         )

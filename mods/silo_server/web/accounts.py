@@ -97,7 +97,7 @@ class PageGuard(Guard):
 
 
 async def _pending_form(request: Request) -> UnsentForm | None:
-    """What the request's form holds; None where it is none, or too large to be carried along."""
+    """Return what the request's form holds; None if it is none, or too large to be carried along."""
     length = request.headers.get("content-length", "")
     small = length.isdigit() and int(length) <= MOST_KEPT
     is_form = request.headers.get("content-type", "").startswith(FORM_TYPES)
@@ -112,7 +112,7 @@ Administrator = Annotated[Call, Depends(PageGuard(Role.ADMIN))]
 
 
 def own_form(request: Request) -> None:
-    """For the one form without a session, the login: ForbiddenError where another site sent it.
+    """Check the login, the one form without a session: ForbiddenError if another site sent it.
 
     A browser says where a form comes from; a page elsewhere must not log somebody in under its own name.
     """
@@ -161,7 +161,7 @@ Next = Annotated[str, Query(max_length=500)]
 
 @router.get("/login")
 def login_form(request: Request, next: Next = START) -> Response:
-    """The login form; users who are logged in already are sent on."""
+    """Return the login form; users who are logged in already are sent on."""
     if find_actor(request) is not None:
         return back(local_path(next))
     return _login_page(request, local_path(next))
@@ -262,7 +262,7 @@ MODES = ("normal", "read-only")
 
 @router.get("/users")
 def users_page(call: Administrator) -> Response:
-    """All users and tokens; a login link that was just made is shown once."""
+    """Return all users and tokens; a login link that was just made is shown once."""
     link = secret_of(call.request)
     response = _show(call, link=link)
     return take_away_secret(call.request, response, "/users") if link else response
@@ -329,7 +329,7 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
 
 @router.post("/users/{username}/login-link")
 def create_login_link(call: Administrator, username: str) -> Response:
-    """A link that lets this user in once; it is shown once, on the page that this leads to."""
+    """Return a link that lets this user in once; it is shown once, on the page that this leads to."""
     with call.write(even_when_read_only=True) as tx:
         secret = access.create_login_link(tx, username)
         access.note(tx, "login_link.created", username)
@@ -354,7 +354,7 @@ def set_mode(call: Administrator, form: Form) -> Response:
 
 @router.get("/system")
 def system_page(call: Administrator) -> Response:
-    """How the server is, for those who look after it."""
+    """Return how the server is, for those who look after it."""
     server = call.server
     state = standing(server.db, server.hub, server.files, server.large_reads)
     with call.read() as tx:
@@ -365,7 +365,7 @@ def system_page(call: Administrator) -> Response:
 
 @router.get("/audit")
 def audit_page(call: Administrator, before: PageFrom = None, after: PageFrom = None) -> Response:
-    """Who did what, newest first."""
+    """Return who did what, newest first."""
     with call.read() as tx:
         part = part_of(partial(access.list_entries, tx), AUDIT_SIZE, before, after)
     return page(call, "audit.html", entries=part.rows, part=part)
@@ -418,7 +418,7 @@ TokenId = Annotated[int, Path(ge=1, le=2**62)]
 
 @router.get("/account")
 def account_page(call: Reader) -> Response:
-    """The own tokens, never their secrets, and a form for the password."""
+    """Return the own tokens, never their secrets, and a form for the password."""
     fresh = secret_of(call.request)
     response = _own_page(call, fresh=fresh)
     return take_away_secret(call.request, response, "/account") if fresh else response

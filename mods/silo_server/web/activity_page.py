@@ -107,7 +107,7 @@ def activity_page(
     until: Annotated[str, Query(max_length=10)] = "",
     newer_than: PageFrom = None,
 ) -> Response:
-    """What happened, newest first, by kind, user, item (with all that is ``inside``) and days.
+    """Return what happened, newest first, by kind, user, item (with all that is ``inside``) and days.
 
     ``before`` and ``after`` page through it; ``newer_than`` is for the page's script, which knows the rest.
     """
@@ -146,14 +146,14 @@ def activity_page(
 
 
 def _day(text: str) -> str:
-    """A day as it was given, "" for anything else: a filter that nobody can mean filters nothing."""
+    """Return a day as it was given, "" for anything else: a filter that nobody can mean filters nothing."""
     with suppress(ValueError):
         return date.fromisoformat(text).isoformat()
     return ""
 
 
 def entry_of(event: LoggedEvent, item: Item | None = None) -> Entry:
-    """An event in words. ``item``: what it is about, as it is now."""
+    """Return an event in words. ``item``: what it is about, as it is now."""
     data: dict[str, Any] = json.loads(event.data)
     number = item.part_number if item else str(data.get("item") or data.get("part_number") or "")
     path = f"/items/{segment(number)}" if number else ""
@@ -209,7 +209,9 @@ MOST_CHANGES = 1000
 
 @router.get("/items/{part_number}/history")
 def history_page(call: Reader, part_number: str, before: PageFrom = None, after: PageFrom = None) -> Response:
-    """All changes with their lines, newest first; ``before`` and ``after`` are the changes to page from."""
+    """Return all changes with their lines, newest first; ``before`` and ``after`` are the changes to page
+    from.
+    """
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         part = part_of(partial(history.list_changes, tx, item), PAGE_SIZE, before, after)
@@ -236,7 +238,9 @@ def changes_page(
     since: Annotated[str, Query(max_length=40)] = "",
     until: Annotated[str, Query(max_length=40)] = "",
 ) -> Response:
-    """What changed in a product over all levels: between dates or revisions, or since the person looked."""
+    """Return what changed in a product over all levels: between dates or revisions, or since the person
+    looked.
+    """
     problem, first, last, status = "", "", "", 200
     happenings: Sequence[history.Happened] = ()
     models: list[list[int]] = [[], []]
@@ -281,7 +285,7 @@ def changes_page(
 def compare_page(
     call: Reader, part_number: str, old: PageFrom = None, new: PageFrom = None, all: bool = False
 ) -> Response:
-    """Two points of time, line by line; without ``old`` what the newest change did."""
+    """Show two points of time, line by line; without ``old`` what the newest change did."""
     return _compare(call, part_number, (old, new), show_all=all)
 
 

@@ -119,7 +119,7 @@ class Problem:
 
 
 def layout_of(form: FormData, of: imports.Table = imports.BOM) -> Layout | None:
-    """How the person wants the file to be read; None where that was not chosen."""
+    """Return how the person wants the file to be read; None if that was not chosen."""
     if "header" not in form:
         return None
     marks = {mark.value: mark for mark in Mark}
@@ -178,7 +178,7 @@ _LABELS = {
 
 
 def reading(file: Upload, layout: Layout | None, of: imports.Table = imports.BOM) -> dict[str, Any]:
-    """How the file is read, for the form in which a person changes that."""
+    """Return how the file is read, for the form in which a person changes that."""
     layout_read = layout or imports.guess_of(file.data, of) or Layout(imports.likely_delimiter(file.data), 0)
     lines = imports.first_lines(file.data, layout_read.delimiter, layout_read.header + 6)
     header = lines[layout_read.header] if layout_read.header < len(lines) else []

@@ -65,7 +65,7 @@ class FormState:
 
 @router.get("/items/new")
 def new_page(call: Writer, category: str = "") -> Response:
-    """An empty form."""
+    """Return an empty form."""
     typed = {"category": category, "id": str(uuid.uuid4())}
     typed |= {
         f"p.{property_field.name}": property_field.default
@@ -110,7 +110,7 @@ def make(call: Writer, form: Form) -> Response:
 
 @router.get("/items/{part_number}/edit")
 def edit_page(call: Writer, part_number: str) -> Response:
-    """The form with what the item is."""
+    """Return the form with what the item is."""
     with call.read() as tx:
         item = get_item(tx, part_number)
         uses = where_used(tx, item, limit=1)[1]
@@ -155,7 +155,7 @@ def change(call: Writer, part_number: str, form: Form) -> Response:
 
 @router.post("/items/{part_number}/file")
 def upload(call: Writer, part_number: str, form: Form) -> Response:
-    """A file as a new revision."""
+    """Return a file as a new revision."""
     file = form.get("file")
     path = f"/items/{segment(part_number)}"
     if not isinstance(file, UploadFile) or not file.filename:
@@ -215,7 +215,7 @@ def unarchive(call: Writer, part_number: str, form: Form) -> Response:
 
 
 def texts_of(item: Item) -> dict[str, str]:
-    """An item as the texts of its form."""
+    """Return an item as the texts of its form."""
     shown = {name: str((item.texts[name] if name in TEXTS else getattr(item, name)) or "") for name in OWN}
     names = {property_field.name for property_field in find_schema(item.schema).fields}
     for name, value in item.properties.items():
@@ -227,7 +227,7 @@ def texts_of(item: Item) -> dict[str, str]:
 
 
 def property_text(value: Any) -> str:
-    """A property as text: numbers as people read them, what is nested as JSON."""
+    """Return a property as text: numbers as people read them, what is nested as JSON."""
     if isinstance(value, str):
         return value
     if isinstance(value, bool) or value is None or isinstance(value, list | dict):
@@ -236,7 +236,7 @@ def property_text(value: Any) -> str:
 
 
 def shown_properties(item: Item) -> list[tuple[str, str, str]]:
-    """(label, text, unit) of an item's properties: those of the schema first, in its order."""
+    """Return (label, text, unit) of an item's properties: those of the schema first, in its order."""
     fields = {each_field.name: each_field for each_field in find_schema(item.schema).fields}
     order = [name for name in fields if name in item.properties]
     order += sorted(name for name in item.properties if name not in fields)
@@ -296,7 +296,7 @@ def _change(tx: Tx, item: Item, typed: Mapping[str, str], mine: set[str], commen
 def _properties(
     typed: Mapping[str, str], before: Mapping[str, Any], changed: set[str] | Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
-    """The properties behind a form, and what is wrong with it; ``changed`` empty: all that is typed."""
+    """Return the properties behind a form, and what is wrong with it; ``changed`` empty: all that is typed."""
     fields = {property_field.name: property_field for property_field in find_schema(None).fields}
     properties, problems = dict(before), []
     for key in changed or [key for key in typed if key.startswith(("p.", "o."))]:
@@ -323,7 +323,7 @@ def _properties(
 
 
 def _as_before(written: str, before: Any) -> Any:
-    """A property without a field: a number or a truth value stays one, where what was typed is one."""
+    """Return a property without a field: a number or a truth value stays one, where what was typed is one."""
     if isinstance(before, bool):
         return {"true": True, "false": False}.get(written.casefold(), written)
     if isinstance(before, int | float):
@@ -333,7 +333,7 @@ def _as_before(written: str, before: Any) -> Any:
 
 
 def _typed(form: FormData, prefix: str = "") -> dict[str, str]:
-    """The texts of a form by field; properties without a field come as pairs of name and value."""
+    """Return the texts of a form by field; properties without a field come as pairs of name and value."""
     result = {name: _text(form, prefix + name) for name in OWN if prefix + name in form}
     if not prefix:
         result = dict.fromkeys(OWN, "") | result

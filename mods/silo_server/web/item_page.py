@@ -89,18 +89,18 @@ class Look:
 
     @property
     def flips(self) -> list[str]:
-        """The branches that are not as ``depth`` says."""
+        """Return the branches that are not as ``depth`` says."""
         return list(dict.fromkeys(filter(None, self.flip.split(","))))
 
     def address(self, path: str) -> Address:
-        """The page with this view."""
+        """Return the page with this view."""
         usual = {"view": "tree", "page": 1, "depth": 0, "pieces": 1}
         names = ("view", "q", "type", "sort", "page", "depth", "flip", "pieces", "beside")
         values = {name: getattr(self, name) for name in names}
         return Address(path, {n: str(v) for n, v in values.items() if v not in ("", usual.get(n))})
 
     def flipped(self, key: str) -> str:
-        """``flip`` where this branch is the other way round."""
+        """Return ``flip`` if this branch is the other way round."""
         keys = self.flips
         return (
             ",".join(each_key for each_key in keys if each_key != key)
@@ -128,12 +128,12 @@ class Branch:
 
     @property
     def mass(self) -> Decimal | None:
-        """Of all pieces [kg]."""
+        """Return the mass of all pieces [kg]."""
         return None if self.worth.mass is None else self.worth.mass * as_decimal(self.total)
 
     @property
     def costs(self) -> Mapping[str, Decimal]:
-        """Of all pieces, per currency."""
+        """Return the cost of all pieces, per currency."""
         return {currency: cost * as_decimal(self.total) for currency, cost in self.worth.costs.items()}
 
 
@@ -164,28 +164,30 @@ class Structure:
 
     @cached_property
     def parts(self) -> Mapping[int, RolledItem]:
-        """What a filter looks in, for all of the graph."""
+        """Return what a filter looks in, for all of the graph."""
         return tree.parts_of(self._tx, self.graph)
 
     @cached_property
     def fitting(self) -> Callable[[Line], bool]:
-        """The test of lines that the view's filter is; without a filter nothing is read for it."""
+        """Return the test of lines that the view's filter is; without a filter nothing is read for it."""
         look = self.look
         return tree.sought(look.q, look.type, self.parts) if look.is_filtered else lambda _line: True
 
     @cached_property
     def leaves(self) -> Sequence[tree.FlatRow]:
-        """The flat list, unfiltered."""
+        """Return the flat list, unfiltered."""
         return tree.flatten(self.graph)
 
     def lines_of(self, item_id: int, level: int) -> Sequence[Line]:
-        """The lines of what a row of this level shows; below the open levels they are read when asked for."""
+        """Return the lines of what a row of this level shows; below the open levels they are read when asked
+        for.
+        """
         if item_id not in self._lines and level >= self.look.depth and not self.look.is_filtered:
             self._lines[item_id] = lines_of_many(self._tx, [item_id]).get(item_id, [])
         return self._lines.get(item_id, ())
 
     def worth(self, line: Line) -> MassAndCost:
-        """What the child of a line is worth, to sort by it."""
+        """Return what the child of a line is worth, to sort by it."""
         if line.child_id not in self._worths:
             children = {each_line.child_id for each_line in self._lines[line.parent_id]}
             by_item = summaries(self._tx, children)
@@ -211,12 +213,12 @@ class Structure:
 
 
 def usual_depth(counts: Sequence[int]) -> int:
-    """As many levels as fit on a page, at least one."""
+    """Return how many levels fit on a page, at least one."""
     return max(1, sum(rows <= PAGE_ROWS for rows in accumulate(counts)))
 
 
 def tree_page(shown: Structure, total: int) -> tuple[Page[Branch], Sequence[Branch]]:
-    """A page of the open rows, and the branches above its first one (none on the first page).
+    """Return a page of the open rows, and the branches above its first one (none on the first page).
 
     TooLargeError where more is open than anybody can page through.
     """
@@ -294,7 +296,7 @@ def _cost_key(costs: Mapping[str, Decimal]) -> Decimal | None:
 
 
 def flat_page(shown: Structure) -> Page[Branch]:
-    """A page of the leaf parts, each with its total over the whole tree."""
+    """Return a page of the leaf parts, each with its total over the whole tree."""
     look = shown.look
     rows = arranged([row for row in shown.leaves if shown.fitting(row.line)], look.sort, _flat_keys(shown))
     table = page_of(rows, len(shown.leaves), look.page, shown.page_rows)
@@ -347,7 +349,7 @@ def item_page(
     used_from: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
     revisions_before: Annotated[int, Query(ge=1, le=2**31 - 1)] = 2**31 - 1,
 ) -> Response:
-    """The item and everything around it; ``view=flat`` shows the leaf parts with their totals.
+    """Return the item and everything around it; ``view=flat`` shows the leaf parts with their totals.
 
     ``used_from`` pages through where it is used, ``revisions_before`` through its revisions.
     """
@@ -386,7 +388,7 @@ def item_page(
 
 
 def _beside(tx: Tx, part_number: str) -> dict[str, Any] | None:
-    """What stands beside the table of a chosen row: its item."""
+    """Return what stands beside the table of a chosen row: its item."""
     try:
         item = get_item(tx, part_number, include_archived=True)
     except NotFoundError:
@@ -400,7 +402,7 @@ def _beside(tx: Tx, part_number: str) -> dict[str, Any] | None:
 
 @router.get("/documents/{uuid}")
 def document_page(call: Reader, uuid: str) -> Response:
-    """A file: which items are in it, what it links to, what uses it, and its revisions."""
+    """Return a file: which items are in it, what it links to, what uses it, and its revisions."""
     with call.read() as tx:
         document_json = told_of(tx, uuid)
         history, _ = revisions.list_revisions(tx, revisions.get_document(tx, document_json["id"]), PAGE_SIZE)
@@ -409,7 +411,7 @@ def document_page(call: Reader, uuid: str) -> Response:
 
 @router.get("/items/{part_number}/print")
 def print_page(call: Reader, part_number: str, look: Asked) -> Response:
-    """The BOM for paper: all rows of the view on one page, with what a reader must know on top."""
+    """Return the BOM for paper: all rows of the view on one page, with what a reader must know on top."""
     with call.server.large_reads.enter():
         with call.read() as tx:
             item = get_item(tx, part_number, include_archived=True)
@@ -421,7 +423,7 @@ def print_page(call: Reader, part_number: str, look: Asked) -> Response:
 
 
 def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[str, Any]:
-    """What the templates of a BOM over all levels show: table, totals, what the last sync left out."""
+    """Return what the templates of a BOM over all levels show: table, totals, what the last sync left out."""
     last = last_sync(tx, item)
     values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.gaps), "problem": ""}
     values |= dict.fromkeys(("table", "totals", "of_all")) | dict.fromkeys(("levels", "depth"), 0)

@@ -79,7 +79,7 @@ class LineForm:
 
 
 def shown(state: LineState) -> dict[str, str]:
-    """The fields of a line as its form shows them."""
+    """Return the fields of a line as its form shows them."""
     return {
         "quantity": quantity(state.quantity),
         "reference_designators": " ".join(state.reference_designators),
@@ -88,7 +88,7 @@ def shown(state: LineState) -> dict[str, str]:
 
 
 def read(form: FormData) -> LineForm:
-    """What came back; texts as they were typed."""
+    """Return what came back; texts as they were typed."""
     typed = {name: _text(form, name) for name in FIELDS if name in form}
     if readings := _text(form, "quantity_is"):
         typed["quantity"] = readings  # the answer to "which of the two numbers?"
@@ -103,7 +103,7 @@ def read(form: FormData) -> LineForm:
 
 
 def edit_of(sent: LineForm, now: LineState) -> Edit:
-    """What the form changes on the line as it is now; RejectedError where a choice was not made."""
+    """Return what the form changes on the line as it is now; RejectedError if a choice was not made."""
     if unmade(sent):
         names = ", ".join(_(FIELDS[name]) for name in unmade(sent))
         raise RejectedError(_("%(names)s: choose yours or theirs", names=names))
@@ -116,7 +116,8 @@ def edit_of(sent: LineForm, now: LineState) -> Edit:
 
 
 def still_typed(typed: Mapping[str, str], seen: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
-    """What a form that was refused shows: what the person changed, and for the rest the line as it is now.
+    """Return what a form that was refused shows: what the person changed, and for the rest the line as it is
+    now.
 
     The form is compared with ``now`` when it comes back, so an old text of a field that the person left alone
     would revert what others wrote there.
@@ -131,18 +132,18 @@ def still_typed(typed: Mapping[str, str], seen: Mapping[str, str], now: Mapping[
 
 
 def unmade(sent: LineForm) -> list[str]:
-    """The fields for which a choice was asked for and not made."""
+    """Return the fields for which a choice was asked for and not made."""
     names = [name for name in sent.asked if sent.picked.get(name) not in (MINE, THEIRS)]
     return [other for name in names for other in group_of(name)]
 
 
 def group_of(name: str) -> Sequence[str]:
-    """The fields that mean something only together with this one, itself among them."""
+    """Return the fields that mean something only together with this one, itself among them."""
     return next((group for group in TOGETHER if name in group), (name,))
 
 
 def values_of(texts: Mapping[str, str]) -> dict[str, Any]:
-    """The texts of fields as a line has them; RejectedError where one is unusable."""
+    """Return the texts of fields as a line has them; RejectedError if one is unusable."""
     values: dict[str, Any] = {}
     for name, written in texts.items():
         most = MOST.get(name, MOST_TEXT)
@@ -165,7 +166,7 @@ def values_of(texts: Mapping[str, str]) -> dict[str, Any]:
 
 
 def decision_of(form: FormData) -> tuple[Action, str | None]:
-    """What a form decides, and why; RejectedError where it has no button of ours."""
+    """Return what a form decides, and why; RejectedError if it has no button of ours."""
     try:
         action = Action(text(form, "action"))
     except ValueError:
@@ -174,7 +175,8 @@ def decision_of(form: FormData) -> tuple[Action, str | None]:
 
 
 def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
-    """The decisions in a submitted form: one action for each line (by its id, or its child) in ``chosen``.
+    """Return the decisions in a submitted form: one action for each line (by its id, or its child) in
+    ``chosen``.
 
     names
         line id → part number, of the BOM's lines. After the id may stand the mark of what was seen.
@@ -192,7 +194,7 @@ def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
 
 
 def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict[str, list[str]]:
-    """Line id → what happened to it after change ``after``, in words, newest first."""
+    """Return line id → what happened to it after change ``after``, in words, newest first."""
     return {
         line_id: [f"{_became(line)}, {by_whom(change)}" for change, line in story]
         for line_id, story in history.stories(tx, parent, line_ids, after).items()
@@ -202,7 +204,7 @@ def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict
 def disputed(
     tx: Tx, parent: Item, lines: Sequence[Line], review: Review
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Line id → who set its quantity here, and line id → what CAD says of it; both in words."""
+    """Return line id → who set its quantity here, and line id → what CAD says of it; both in words."""
     told_quantity = told_quantities(tx, [parent.id]).get(parent.id, {})
     overrides = [line for line in lines if line.state.override]
     asked = {*(line.id for line in overrides), *(conflict.line.id for conflict in review.conflicts)}
@@ -218,7 +220,7 @@ def disputed(
 
 
 def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
-    """The change in which a person gave a line the quantity that it has."""
+    """Return the change in which a person gave a line the quantity that it has."""
     for change, line in story:
         before = line.before.quantity if line.before else None
         if line.after is not None and line.after.quantity != before:
@@ -229,7 +231,7 @@ def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
 def _cad_words(
     line: Line, quantities: Mapping[int, float], by_hand: Change | None, merge: Change | None
 ) -> str:
-    """What CAD says of a line whose quantity a person changed: the same as the conflict above it says."""
+    """Return what CAD says of a line whose quantity a person changed: the same as the conflict above it says."""
     if line.child_id in quantities:
         said = quantities[line.child_id]
         return (
@@ -265,12 +267,12 @@ def _same(name: str, a: str, b: str) -> bool:
 
 
 def _text(form: FormData, name: str) -> str:
-    """A field of any length: :func:`values_of` refuses a long one by the name that the page shows."""
+    """Return a field of any length: :func:`values_of` refuses a long one by the name that the page shows."""
     return text(form, name, sys.maxsize)
 
 
 def by_whom(change: Change) -> str:
-    """``by ann, 2026-02-08 22:15: one spare``; a sync names its file."""
+    """Return ``by ann, 2026-02-08 22:15: one spare``; a sync names its file."""
     values = {"user": isolate(change.username), "at": change.at[:16].replace("T", " ")}
     said = _(
         "sync by %(user)s, %(at)s" if change.kind == ChangeKind.MERGE else "by %(user)s, %(at)s", **values
@@ -281,7 +283,9 @@ def by_whom(change: Change) -> str:
 
 
 def sentence(line: ChangedLine) -> tuple[str, str]:
-    """(mark, words) of what one change made of one line: ``~``, ``F01-0001 M8x20 Bolt: quantity 8 → 12``."""
+    """Return (mark, words) of what one change made of one line: ``~``, ``F01-0001 M8x20 Bolt: quantity 8 →
+    12``.
+    """
     who = f"{isolate(line.child.part_number)} {isolate(line.child.name)}".strip()
     if line.before is None and line.after is not None:
         shown = quantity(line.after.quantity, line.after.unit)
@@ -295,7 +299,7 @@ def sentence(line: ChangedLine) -> tuple[str, str]:
 
 
 def changes(before: LineState, after: LineState) -> list[str]:
-    """What differs between two states of a line."""
+    """Return what differs between two states of a line."""
     said: list[str] = []
     if (before.quantity, before.unit) != (after.quantity, after.unit):
         old, new = quantity(before.quantity, before.unit), quantity(after.quantity, after.unit)
@@ -320,7 +324,7 @@ def changes(before: LineState, after: LineState) -> list[str]:
 def sentences(
     lines: Sequence[ChangedLine], most: int = 30, count: int | None = None
 ) -> list[tuple[str, str]]:
-    """The lines of a change, which has ``count`` of them; beyond ``most`` only how many more."""
+    """Return the lines of a change, which has ``count`` of them; beyond ``most`` only how many more."""
     line_sentences = [sentence(line) for line in lines[:most]]
     rest = (len(lines) if count is None else count) - most
     return (

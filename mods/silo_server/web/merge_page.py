@@ -103,13 +103,13 @@ class Refused(Exception):
 
 
 def bom_path(part_number: str) -> str:
-    """The merge page of an item."""
+    """Return the merge page of an item."""
     return f"/items/{segment(part_number)}/bom"
 
 
 @router.get("/items/{part_number}/bom")
 def merge_page(call: Reader, part_number: str, edit: Annotated[str, Query(max_length=64)] = "") -> Response:
-    """Unreferenced lines, conflicts, the last sync in plain words, and the lines; ``edit`` opens one.
+    """Show unreferenced lines, conflicts, the last sync in plain words, and the lines; ``edit`` opens one.
 
     ``q``, ``show``, ``sort`` and ``page`` say which lines the table has (:func:`table_of`).
     """
@@ -385,7 +385,7 @@ _SORTS: Mapping[str, Callable[[Line], Any]] = {
 
 
 def table_of(lines: Sequence[Line], path: str, view: str) -> tuple[Page[Line], Address]:
-    """The lines that the query ``view`` asks for, and the address with it."""
+    """Return the lines that the query ``view`` asks for, and the address with it."""
     asked = {name: value[:200] for name, value in parse_qsl(view) if name in ("q", "show", "sort", "page")}
     test, shown = fits(asked.get("q", "")), SHOWS.get(asked.get("show", ""))
     shown_lines = [

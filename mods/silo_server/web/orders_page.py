@@ -38,7 +38,7 @@ AskedFor = Annotated[OrderRequest, Depends(asked_of)]
 
 @router.get("/items/{part_number}/suppliers")
 def suppliers_page(call: Reader, part_number: str) -> Response:
-    """The table of an item's supplier parts, and its last changes."""
+    """Return the table of an item's supplier parts, and its last changes."""
     return _suppliers(call, part_number)
 
 
@@ -102,7 +102,7 @@ def undo_suppliers(call: Writer, part_number: str, form: Form) -> Response:
 
 @router.get("/items/{part_number}/order")
 def order_page(call: Reader, part_number: str, asked: AskedFor) -> Response:
-    """What to order for so many pieces."""
+    """Return what to order for so many pieces."""
     with call.server.large_reads.enter(), call.read() as tx:
         product = get_item(tx, part_number, include_archived=True)
         labels = [
@@ -150,7 +150,7 @@ def _some(rows: Sequence[OrderRow]) -> dict[str, bool]:
 
 
 def _fact_of(row: OrderRow) -> str:
-    """What the box of a row records, beside how much."""
+    """Return what the box of a row records, beside how much."""
     offer = row.offer
     fact: dict[str, Any] = {"part_number": row.item.part_number, "unit": row.unit}
     if offer is not None:

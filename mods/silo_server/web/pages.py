@@ -105,7 +105,7 @@ TITLES = {
 
 
 def wants_page(request: Request) -> bool:
-    """True for a browser that shows a page; the API and programs get JSON."""
+    """Return True for a browser that shows a page; the API and programs get JSON."""
     return not request.url.path.startswith("/api/") and "text/html" in request.headers.get("accept", "")
 
 
@@ -120,7 +120,7 @@ def _for_browsers(handler: Handler) -> Handler:
 
 
 async def error_page(request: Request, plain: Response) -> Response:
-    """The page for an error that was answered as JSON."""
+    """Return the page for an error that was answered as JSON."""
     values: dict[str, Any] = json.loads(bytes(plain.body))
 
     kept = getattr(request.state, "kept", None)
@@ -147,7 +147,7 @@ async def error_page(request: Request, plain: Response) -> Response:
 
 
 def _page_above(request: Request) -> str:
-    """The page that the form of this address stands on: the nearest one above that can be looked at."""
+    """Return the page that the form of this address stands on: the nearest one above that can be looked at."""
     path = request.scope["path"].rstrip("/")
     while path:
         path = path.rpartition("/")[0]

@@ -42,7 +42,7 @@ def _path(part_number: str) -> str:
 
 @router.get("/items/{part_number}/releases")
 def releases_page(call: Reader, part_number: str) -> Response:
-    """All revisions of a product, with the forms that submit, approve, reject and end them."""
+    """Return all revisions of a product, with the forms that submit, approve, reject and end them."""
     return _show(call, part_number)
 
 
@@ -66,7 +66,7 @@ def _show(
 
 
 def state_of(tx: Tx, item: Item, list_of_releases: list[Release] | None = None) -> dict[str, Any]:
-    """What pages say of a product: the revision that is released, and whether something changed since."""
+    """Return what pages say of a product: the revision that is released, and whether something changed since."""
     list_of_releases = releases.list_releases(tx, item) if list_of_releases is None else list_of_releases
     released = next((release for release in list_of_releases if release.status == "released"), None)
     waiting = next((release for release in list_of_releases if release.status == "review"), None)
@@ -130,7 +130,7 @@ def release_page(
     view: Annotated[str, Query(max_length=10)] = "tree",
     number: Annotated[int, Query(alias="page", ge=1, le=10**9)] = 1,
 ) -> Response:
-    """One revision as it was frozen: its tree, or the flat list with totals, and its files."""
+    """Return one revision as it was frozen: its tree, or the flat list with totals, and its files."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         release = releases.get_release(tx, item, label)
@@ -167,7 +167,7 @@ def release_page(
 
 
 def _rows(product: Product, *, flat: bool) -> Any:
-    """The rows of the table: the line, its depth, its total, and what one piece is worth."""
+    """Return the rows of the table: the line, its depth, its total, and what one piece is worth."""
     if flat:
         for row in tree.flatten(product.graph):
             yield row.line, 1, row.total, product.worths[row.line.child_id]

@@ -54,7 +54,9 @@ LANGUAGE: ContextVar[str] = ContextVar("LANGUAGE", default="en")
 
 
 def language_for(chosen: str, accepted: str) -> str:
-    """The language of a page: what a person chose, else the best of an ``Accept-Language``, else English."""
+    """Return the language of a page: what a person chose, else the best of an ``Accept-Language``, else
+    English.
+    """
     if chosen in LANGUAGES:
         return chosen
     best, weight = "en", 0.0
@@ -69,13 +71,13 @@ def language_for(chosen: str, accepted: str) -> str:
 
 
 def _(text: str, **values: object) -> str:
-    """``text`` in the language of the page, with ``values`` in the place of ``%(name)s``."""
+    """Return ``text`` in the language of the page, with ``values`` in the place of ``%(name)s``."""
     translation = _CATALOGUES[LANGUAGE.get()].gettext(text) if text else ""
     return translation % values if values else translation
 
 
 def plural(number: int, one: str, many: str = "") -> str:
-    """As :func:`silo.bom.errors.counted`, in the language of the page."""
+    """Count as :func:`silo.bom.errors.counted` does, in the language of the page."""
     return f"{number} {_CATALOGUES[LANGUAGE.get()].ngettext(one, many or one + 's', number)}"
 
 
@@ -84,12 +86,12 @@ SCRIPTS += [Path(silo.__file__).with_name("viewer") / "viewer.js"]
 
 
 def script_words() -> dict[str, str]:
-    """Text → translation, for the scripts of a page."""
+    """Return text → translation, for the scripts of a page."""
     return {text: _(text) for path in SCRIPTS for text in texts_of_script(path)}
 
 
 def texts_of_script(path: Path) -> list[str]:
-    """The texts of a script that are translated: ``_("Page %(n)s", { n })``."""
+    """Return the texts of a script that are translated: ``_("Page %(n)s", { n })``."""
     return [json.loads(text) for text in re.findall(r'\b_\(("(?:[^"\\]|\\.)*")', path.read_text("utf-8"))]
 
 
@@ -112,7 +114,8 @@ _WORD = re.compile(r"[^\W\d_]{2}|\b[aI]\b")
 
 
 def translated(template: str, translate: Callable[[str], str]) -> str:
-    """A template in another language: each text and each attribute that is read, as ``translate`` has it.
+    """Return a template in another language: each text and each attribute that is read, as ``translate`` has
+    it.
 
     A text is a sentence with the elements in it; its expressions and the tags with attributes are
     placeholders: ``Suppliers of %(part_number)s``. Statements and all other elements end it.
@@ -143,13 +146,13 @@ def _has_words(pieces: Sequence[str]) -> bool:
 
 
 def _is_apart(pieces: Sequence[str]) -> bool:
-    """True for space or an element with a sign in it, at an end of a sentence."""
+    """Return True for space or an element with a sign in it, at an end of a sentence."""
     element = len(pieces) > 1 and not _has_words(pieces) and not any(piece[:1] == "{" for piece in pieces)
     return element or (len(pieces) == 1 and not pieces[0].strip())
 
 
 def _sentence(run: Sequence[str], translate: Callable[[str], str]) -> str:
-    """A run of texts, expressions and tags, translated in its largest parts that are sentences."""
+    """Return a run of texts, expressions and tags, translated in its largest parts that are sentences."""
     if not _has_words(run):
         return "".join(run)
     ends: dict[int, int] = {}
@@ -210,7 +213,9 @@ def _message(run: Sequence[str], translate: Callable[[str], str]) -> str:
 
 
 def _name_of(piece: str) -> str:
-    """``part_number`` for ``{{ item.part_number | bdi }}``, ``count`` for ``{{ plural(…) }}``, ``link``."""
+    """Return ``part_number`` for ``{{ item.part_number | bdi }}``, ``count`` for ``{{ plural(…) }}``,
+    ``link``.
+    """
     if piece.startswith("<"):
         tag = piece[1:].partition(" ")[0]
         return "link" if tag == "a" else tag
@@ -231,7 +236,7 @@ SWITCHED_OFF = ' disabled aria-describedby="closed" title="{}"'
 
 
 def quantity(value: float | None, unit: str | None = None) -> str:
-    """``12``, ``2.5 m``; a dash where there is none."""
+    """Return ``12``, ``2.5 m``; a dash where there is none."""
     if value is None:
         return "–"
     shown = str(int(value)) if value == int(value) and abs(value) < 1e15 else f"{value:.12g}"
@@ -239,14 +244,16 @@ def quantity(value: float | None, unit: str | None = None) -> str:
 
 
 def when(stamp: str | None) -> Markup | str:
-    """``2026-02-08 22:15`` (UTC, as stored) with its full form for machines; a dash where there is none."""
+    """Return ``2026-02-08 22:15`` (UTC, as stored) with its full form for machines; a dash where there is
+    none.
+    """
     if not stamp:
         return "–"
     return Markup('<time datetime="{}">{}</time>').format(wire(stamp), stamp[:16].replace("T", " "))
 
 
 def size(count: int | None) -> str:
-    """``812 bytes``, ``14 kB``, ``3.2 MB``, ``68.7 GB``."""
+    """Return ``812 bytes``, ``14 kB``, ``3.2 MB``, ``68.7 GB``."""
     if count is None:
         return ""
     if count < 1000:
@@ -265,12 +272,16 @@ _GRAMS = Decimal("0.001")
 
 
 def bdi(text: object) -> Markup:
-    """What somebody typed, as text whose direction ends with it. A bare ``<bdi>`` ends at a U+2069 inside."""
+    """Return what somebody typed, as text whose direction ends with it. A bare ``<bdi>`` ends at a U+2069
+    inside.
+    """
     return Markup(f"<bdi>{escape(closed(str(text)))}</bdi>")
 
 
 def isolate(text: str) -> str:
-    """As :func:`bdi`, for sentences that are no HTML; text from left to right stays as it is."""
+    """Isolate text as :func:`bdi` does, for sentences that are no HTML; text from left to right stays as it
+    is.
+    """
     plain = closed(text)
     if any(unicodedata.bidirectional(character) in _TURNED for character in plain):
         return f"\u2068{plain}\u2069"
@@ -278,7 +289,7 @@ def isolate(text: str) -> str:
 
 
 def closed(text: str) -> str:
-    """``text`` without characters that turn what follows it: isolates are closed, all others left out."""
+    """Return ``text`` without characters that turn what follows it: isolates are closed, all others left out."""
     if TURNING.search(text) is None:
         return text
     kept: list[str] = []
@@ -295,12 +306,12 @@ def closed(text: str) -> str:
 
 
 def grouped(value: Decimal) -> str:
-    """``12 345.6``: groups of three digits with a narrow space that does not break; no exponent."""
+    """Return ``12 345.6``: groups of three digits with a narrow space that does not break; no exponent."""
     return f"{value:,f}".replace(",", "\u202f")
 
 
 def mass(kilograms: float | Decimal | None) -> str:
-    """``20.7 t``, ``3 kg``, ``12.5 g``: four digits at most; a dash where there is none."""
+    """Return ``20.7 t``, ``3 kg``, ``12.5 g``: four digits at most; a dash where there is none."""
     if kilograms is None:
         return "–"
     exact = _rounded(as_decimal(kilograms))
@@ -313,7 +324,9 @@ def mass(kilograms: float | Decimal | None) -> str:
 
 
 def money(amount: float | Decimal | None, currency: str | None = None) -> str:
-    """``12 345.60 EUR``; parts of a cent keep their digits (``0.0042 EUR``). A dash where there is none."""
+    """Return ``12 345.60 EUR``; parts of a cent keep their digits (``0.0042 EUR``). A dash where there is
+    none.
+    """
     if amount is None:
         return "–"
     exact = as_decimal(amount)
@@ -323,19 +336,19 @@ def money(amount: float | Decimal | None, currency: str | None = None) -> str:
 
 
 def _rounded(value: Decimal) -> Decimal:
-    """To four digits, but never less than all of the whole ones; without zeros at the end."""
+    """Round to four digits, but never to less than all of the whole ones; without zeros at the end."""
     whole = value.quantize(Decimal(1), ROUND_HALF_EVEN)
     short = whole if abs(whole) >= 1000 else _FOUR_DIGITS.plus(value).normalize()
     return short.quantize(Decimal(1)) if short == short.to_integral_value() else short
 
 
 def sentence(text: str) -> str:
-    """A message as a sentence: a capital first, and a full stop where it has no end."""
+    """Return a message as a sentence: a capital first, and a full stop where it has no end."""
     return f"{text[:1].upper()}{text[1:]}{'' if not text or text.endswith(('.', '?', '!')) else '.'}"
 
 
 def segment(text: str) -> str:
-    """A part number as one segment of a path."""
+    """Return a part number as one segment of a path."""
     return quote(text, safe="")
 
 
@@ -345,7 +358,7 @@ class _Translated(Extension):
 
 
 def environment(language: str) -> Environment:
-    """What compiles the templates of a language."""
+    """Return what compiles the templates of a language."""
     made = Environment(
         loader=PackageLoader("silo_server.web", "templates"),
         extensions=[] if language == "en" else [_Translated],
@@ -366,8 +379,8 @@ _LINK = re.compile(r'(\s(?:href|src|action|formaction|data-events)=")/(?!/)')
 
 
 def _state(request: Request, waiting: int | None, actor: Actor | None) -> tuple[bool, int, int]:
-    """Whether the server takes no changes, how many BOMs wait, if the page does not say, and how much waits
-    for this person.
+    """Return whether the server takes no changes, how many BOMs wait, if the page does not say, and how much
+    waits for this person.
 
     Without its database these are unknown; the page says so.
     """
@@ -380,14 +393,14 @@ def _state(request: Request, waiting: int | None, actor: Actor | None) -> tuple[
 
 
 def page(call: Call, template: str, *, status: int = 200, **values: Any) -> Response:
-    """A page for somebody who is logged in; see :func:`page_for`."""
+    """Return a page for somebody who is logged in; see :func:`page_for`."""
     return page_for(call.request, call.actor, template, status=status, **values)
 
 
 def page_for(
     request: Request, actor: Actor | None, template: str, *, status: int = 200, **values: Any
 ) -> Response:
-    """A page. ``actor`` None: nobody is logged in. A notice that waits in its cookie is shown once.
+    """Return a page. ``actor`` None: nobody is logged in. A notice that waits in its cookie is shown once.
 
     Looks into the database for the server's mode, so not to be called on the event loop.
     """
@@ -439,17 +452,17 @@ class Address:
     params: Mapping[str, str] = field(default_factory=dict)
 
     def url(self, **changes: object) -> str:
-        """The address with these changes; None, "" and False leave a part out."""
+        """Return the address with these changes; None, "" and False leave a part out."""
         changed = {**self.params, **{name: "" if value is None else value for name, value in changes.items()}}
         kept = {name: str(value) for name, value in changed.items() if value not in ("", False)}
         return f"{self.path}?{urlencode(kept)}" if kept else self.path
 
     def query(self, **changes: object) -> str:
-        """The view alone, with its question mark; "" where all is as usual."""
+        """Return the view alone, with its question mark; "" if all is as usual."""
         return self.url(**changes)[len(self.path) :]
 
     def but(self, *names: str) -> Mapping[str, str]:
-        """The view without these parts: what a form must carry on beside its own fields."""
+        """Return the view without these parts: what a form must carry on beside its own fields."""
         return {name: value for name, value in self.params.items() if name not in names and value}
 
 
@@ -465,17 +478,17 @@ class Page(Generic[T]):
 
     @property
     def last(self) -> int:
-        """The number of the last page."""
+        """Return the number of the last page."""
         return max(1, -(-self.found // self.size))
 
     @property
     def start(self) -> int:
-        """How many rows stand before this page."""
+        """Return how many rows stand before this page."""
         return (self.number - 1) * self.size
 
     @property
     def words(self) -> str:
-        """``12 of 340 lines`` in numbers only: ``12 of 340``, ``1 to 100 of 340``."""
+        """Return ``12 of 340 lines`` in numbers only: ``12 of 340``, ``1 to 100 of 340``."""
         if self.found > self.size:
             first, last = self.start + 1, self.start + len(self.rows)
             shown = _("%(first)s to %(last)s of %(found)s", first=first, last=last, found=self.found)
@@ -486,14 +499,14 @@ class Page(Generic[T]):
 
 
 def page_of(rows: Sequence[T], total: int, number: int, size: int = PAGE_ROWS) -> Page[T]:
-    """The page with this number; the last one where there are fewer."""
+    """Return the page with this number; the last one where there are fewer."""
     last = max(1, -(-len(rows) // size))
     number = min(max(number, 1), last)
     return Page(rows[(number - 1) * size : number * size], total, len(rows), number, size)
 
 
 def arranged(rows: Sequence[T], sort: str, keys: Mapping[str, Callable[[T], Any]]) -> Sequence[T]:
-    """The rows by the column that ``sort`` names (``mass``, ``-mass`` for the largest first).
+    """Return the rows by the column that ``sort`` names (``mass``, ``-mass`` for the largest first).
 
     Equal rows stay in their order; rows without a value come last either way. Numbers in texts count as such:
     M3×6 comes before M3×10.
@@ -540,7 +553,7 @@ def part_of(
     before: int | None,
     after: int | None,
 ) -> ListPart[N]:
-    """The part before an id, or the nearest one after an id; the newest where neither is given.
+    """Return the part before an id, or the nearest one after an id; the newest where neither is given.
 
     read
         (limit, before, after) → rows, newest first.

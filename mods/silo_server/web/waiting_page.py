@@ -63,7 +63,9 @@ def waiting_page(
     sort: Annotated[str, Query(max_length=20)] = "",
     number: Annotated[int, Query(ge=1, le=10**7, alias="page")] = 1,
 ) -> Response:
-    """The table; ``folder`` is a project's folder or one in it, ``who`` settles the BOM (``-``: nobody)."""
+    """Return the table; ``folder`` is a project's folder or one in it, ``who`` settles the BOM (``-``:
+    nobody).
+    """
     view = {"q": q, "folder": folder, "kind": kind, "who": who, "sort": sort}
     view |= {"page": str(number) if number > 1 else ""}
     return _show(call, {name: value for name, value in view.items() if value})
@@ -71,7 +73,7 @@ def waiting_page(
 
 @router.post("/waiting/decide")
 def decide(call: Writer, form: Form) -> Response:
-    """One decision about all chosen BOMs. Each is a change of its own; what was not done is named.
+    """Decide about all chosen BOMs. Each decision is a separate change; what was not done is named.
 
     Nothing is done before a person has seen the list of lines that it removes.
     """
@@ -139,14 +141,14 @@ def assign(call: Writer, form: Form) -> Response:
 
 
 def _back_to(form: FormData, usual: str) -> str:
-    """The page of an item that a form came from."""
+    """Return the page of an item that a form came from."""
     path = text(form, "back", 400)
     return path if path.startswith("/items/") else usual
 
 
 @router.get("/mine")
 def mine_page(call: Reader) -> Response:
-    """The open BOMs that are the person's own, and what they follow, news first."""
+    """Return the open BOMs that are the person's own, and what they follow, news first."""
     with call.read() as tx:
         rows = waiting(tx)
         subjects = review.followed(tx, call.actor)
@@ -174,7 +176,7 @@ def follow(call: Reader, form: Form) -> Response:
 
 @router.post("/mine/seen")
 def seen(call: Reader, form: Form) -> Response:
-    """All news are seen."""
+    """Mark all news as seen."""
     with call.write(even_when_read_only=True) as tx:
         review.have_seen(tx)
     return back("/mine", _("All news is marked as seen."))
@@ -188,7 +190,7 @@ def _view_of(form: FormData) -> dict[str, str]:
 
 
 def _gone(call: Call, action: Action, chosen: Sequence[str]) -> dict[str, Sequence[Line]]:
-    """Part number → the lines that ``action`` would remove; what has changed since is left out here."""
+    """Return part number → the lines that ``action`` would remove; what has changed since is left out here."""
     result: dict[str, Sequence[Line]] = {}
     with call.read() as tx:
         for value in chosen:
@@ -274,6 +276,6 @@ def _show(
 
 
 def _folders(folder: str) -> list[str]:
-    """A folder and all that it lies in: ``robot/arm`` is in ``robot``."""
+    """Return a folder and all that it lies in: ``robot/arm`` is in ``robot``."""
     parts = folder.split("/")
     return ["/".join(parts[:end]) for end in range(1, len(parts) + 1)] if folder else []

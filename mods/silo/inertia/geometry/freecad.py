@@ -138,23 +138,23 @@ class ShapeSource(Protocol):
     (``silo.workbench.mass.shapes``)."""
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
-        """(4, 4) of an object's own placement; the identity where it has none."""
+        """Return (4, 4) of an object's own placement; the identity where it has none."""
         ...
 
     def places(self, obj: Any) -> list[Floats]:
-        """(4, 4) each, the object's own ``PlacementList``."""
+        """Return (4, 4) each, the object's own ``PlacementList``."""
         ...
 
     def shape(self, obj: Any) -> Any:
-        """A handle on the object's shape, to measure it; None where it has none, or an empty one."""
+        """Return a handle on the object's shape, to measure it; None if it has none, or an empty one."""
         ...
 
     def material(self, obj: Any) -> StatedMaterial:
-        """The material that the object itself states."""
+        """Return the material that the object itself states."""
         ...
 
     def problem(self, link: Any) -> LinkProblem | None:
-        """Why a link has no target, as far as that is known."""
+        """Return why a link has no target, as far as that is known."""
         ...
 
 
@@ -205,7 +205,7 @@ class Walk:
         )
 
     def problems(self) -> list[Note]:
-        """What was left out, or counted with a doubt."""
+        """Return what was left out, or counted with a doubt."""
         for finding in self._reader.notes.findings():
             if finding.code in _TOLD:
                 self._note(_TOLD[finding.code], finding.message)
@@ -219,7 +219,9 @@ class Walk:
     # --- products ------------------------------------------------------------------------------------------
 
     def top(self, document: Any, name: str | None) -> str:
-        """The key of what is to be measured: the named object, the assembly, or the document's own part."""
+        """Return the key of what is to be measured: the named object, the assembly, or the document's own
+        part.
+        """
         obj = document.getObject(name) if name is not None else None
         try:
             top = obj if obj is not None else choose_assembly(document, name)
@@ -241,7 +243,7 @@ class Walk:
         return self.product(top)
 
     def product(self, obj: Any, copies: Any = None) -> str:
-        """The key of the product ``obj``, in its own axes.
+        """Return the key of the product ``obj``, in its own axes.
 
         copies
             a flexible AssemblyLink of it; or the object itself, if its own shape is all that there is.
@@ -289,7 +291,7 @@ class Walk:
         self.nodes[key] = Node(key, self._name(obj), tuple(children))
 
     def _moved(self, link: Any) -> dict[str, Floats]:
-        """Member name in the real assembly → where a flexible AssemblyLink's copy of it stands."""
+        """Return member name in the real assembly → where a flexible AssemblyLink's copy of it stands."""
         places: dict[str, Floats] = {}
         for copy in (getattr(link, "Group", None) or ()) if link is not None else ():
             if (original := first_of(getattr(copy, "LinkedObject", None))) is not None:
@@ -348,7 +350,7 @@ class Walk:
     def _uses(
         self, container: Any, count: Count, contents: Contents, moved: dict[str, Floats]
     ) -> Iterator[_Placed]:
-        """Every instance of a component in the axes of the container."""
+        """Yield every instance of a component in the axes of the container."""
         shown = count.shown
         if count.quantity > MAX_ELEMENTS:
             words = f"{label_of(shown.obj)} claims {count.quantity} elements"
@@ -370,7 +372,7 @@ class Walk:
     def _placed(
         self, node: Contribution, key: Key, with_place: bool, moved: Floats | None = None
     ) -> Iterator[_Placed]:
-        """What an object shows of a component, in the axes around the object.
+        """Yield what an object shows of a component, in the axes around the object.
 
         with_place
             with the object's own placement; ``moved`` stands for it.
@@ -401,7 +403,7 @@ class Walk:
                 yield from _moved_by(outer, self._placed(inner, key, not is_copy))
 
     def _is_one_shape(self, obj: Any) -> bool:
-        """True for an array without links, which older FreeCADs save as one shape."""
+        """Return True for an array without links, which older FreeCADs save as one shape."""
         if kind_of(obj) is not Kind.DRAFT_ARRAY or self.facts.places(obj):
             return False
         return self.facts.shape(obj) is not None
@@ -450,7 +452,7 @@ class Walk:
                 yield from _moved_by(place, seen)
 
     def _along(self, steps: Sequence[Step], with_place: bool, moved: Floats | None) -> list[Floats]:
-        """(4, 4) of each instance that a chain of links shows."""
+        """Return (4, 4) of each instance that a chain of links shows."""
         around = [np.eye(4)]
         for number, step in enumerate(steps):
             obj = step.obj
@@ -468,13 +470,15 @@ class Walk:
         return around
 
     def _link_placement(self, link: Any) -> Floats:
-        """A link's own placement; ``Placement`` and ``LinkPlacement`` are equal if both exist."""
+        """Return a link's own placement; ``Placement`` and ``LinkPlacement`` are equal if both exist."""
         names = getattr(link, "PropertiesList", ())
         has_both = "Placement" in names or "LinkPlacement" not in names
         return self.facts.placement(link, "Placement" if has_both else "LinkPlacement")
 
     def _element_places(self, link: Any, index: int | None) -> list[Floats]:
-        """(4, 4) [mm] of each element of a link array that is not left out; one identity for a plain link."""
+        """Return (4, 4) [mm] of each element of a link array that is not left out; one identity for a plain
+        link.
+        """
         count = own(link, "ElementCount", 0)
         if not is_link(link) or not isinstance(count, int) or count <= 0:
             return [np.eye(4)]
@@ -502,7 +506,7 @@ def _moved_by(outer: Floats, placed: Any) -> Iterator[_Placed]:
 
 
 def _mirror(obj: Any) -> Floats:
-    """(4, 4) [mm] of the plane that a mirror image is mirrored at."""
+    """Return (4, 4) [mm] of the plane that a mirror image is mirrored at."""
     normal, base = (np.array(tuple(own(obj, name) or (0.0, 0.0, 0.0)), float) for name in ("Normal", "Base"))
     length = float(np.linalg.norm(normal))
     matrix = np.eye(4)
@@ -514,13 +518,13 @@ def _mirror(obj: Any) -> Floats:
 
 
 def file_of(obj: Any) -> str:
-    """The path of the object's file, with "/"; "" while it is unsaved."""
+    """Return the path of the object's file, with "/"; "" while it is unsaved."""
     name = getattr(getattr(obj, "Document", None), "FileName", "") or ""
     return name.replace("\\", "/")
 
 
 def scale(link: Any) -> Floats:
-    """(4, 4) diagonal of a link's scale. A zero would flatten the part; FreeCAD takes it as 1."""
+    """Return (4, 4) diagonal of a link's scale. A zero would flatten the part; FreeCAD takes it as 1."""
     vector = own(link, "ScaleVector")
     parts = list(vector) if vector is not None else []
     factor = own(link, "Scale")
@@ -538,7 +542,9 @@ def _diagonal(parts: list[float]) -> Floats:
 
 
 def product_key(path: str, name: str, designation: str, base: str) -> str:
-    """What identifies a product: a standard part by its designation, any other by its file and its object."""
+    """Return what identifies a product: a standard part by its designation, any other by its file and its
+    object.
+    """
     return f"{STANDARD_PARTS}{designation}" if designation else f"{relative(path, base)}#{name}"
 
 
@@ -551,7 +557,7 @@ Measure = Callable[[Sequence[Leaf], Callable[[int, int], Any]], Sequence[Measure
 def assembled(
     walk: Walk, top: str, source: str, options: ReadOptions, measure: Measure, report: Report
 ) -> Assembly:
-    """The assembly that the walk found below the product ``top``. InputError where it does not end."""
+    """Return the assembly that the walk found below the product ``top``. InputError if it does not end."""
     name = walk.nodes[top].name
     unfolded = unfold(walk.nodes, [Child(name, top)], options.max_instances)
     keys = unfolded.placed
@@ -566,7 +572,7 @@ def assembled(
 
 
 def one_by_one(measure: Callable[[Leaf], Measured]) -> Measure:
-    """One product after the other; ``measure`` raises DocumentError where the shapes cannot be had."""
+    """Return one product after the other; ``measure`` raises DocumentError if the shapes cannot be had."""
 
     def measured(leaves: Sequence[Leaf], done: Callable[[int, int], Any]) -> list[Measured | str]:
         result: list[Measured | str] = []

@@ -106,7 +106,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         return tree
 
     def _make_selecting(self) -> Any:
-        """Which files go along, all at once."""
+        """Return which files go along, all at once."""
         parts = [widgets.label(translate("Silo", "Select:"), wrap=False)]
         for name, text, wanted in (
             ("edited", translate("Silo", "edited"), lambda row: row.wanted),
@@ -150,11 +150,11 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         return box
 
     def text(self) -> str:
-        """The comment."""
+        """Return the comment."""
         return str(self.comment.toPlainText()).strip()
 
     def _fit(self, tree: Any, column: int) -> None:
-        """As wide as its texts, but not more than some thirty letters; tool tips have the rest."""
+        """Make it as wide as its texts, but not more than some thirty letters; tool tips have the rest."""
         tree.resizeColumnToContents(column)
         most = 32 * tree.fontMetrics().averageCharWidth()
         tree.setColumnWidth(column, min(tree.columnWidth(column) + 8, most))
@@ -213,7 +213,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         widgets.read(self, theirs.headline, line_texts(theirs))
 
     def _details(self, theirs: Theirs) -> list[tuple[str, str]]:
-        """The lines below a file, each with its tool tip."""
+        """Return the lines below a file, each with its tool tip."""
         lines = []
         if theirs.revision:
             when = time.strftime("%Y-%m-%d %H:%M", time.localtime(theirs.when)) if theirs.when else ""
@@ -242,13 +242,13 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self.commit.setText(only)
 
     def answer(self) -> CommitAnswer:
-        """What the person wants."""
+        """Return what the person wants."""
         chosen = self.chosen()
         registering = self.register.isChecked() and any(row.is_top for row in chosen)
         return CommitAnswer(chosen, self.text(), registering, self.choices())
 
     def choices(self) -> tuple[tuple[DocumentRow, Theirs, Choice], ...]:
-        """What to do about colleagues' files, beside committing."""
+        """Return what to do about colleagues' files, beside committing."""
         return tuple(
             (self._plan.rows[number], self._theirs[number], choice)
             for number, box in self._choices.items()
@@ -256,7 +256,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         )
 
     def chosen(self) -> tuple[DocumentRow, ...]:
-        """The documents to commit, in order."""
+        """Return the documents to commit, in order."""
         rows = []
         for number in range(self.files.topLevelItemCount()):
             item = self.files.topLevelItem(number)

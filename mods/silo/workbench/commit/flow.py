@@ -84,13 +84,13 @@ class Decisions:
         self._path = path or data_folder() / "same-parts.json"
 
     def accept(self, identity: str, files: Iterable[str]) -> None:
-        """These files are the same part, says a person."""
+        """Accept that these files are the same part."""
         accepted = self._read()
         accepted[identity.lower()] = sorted({*accepted.get(identity.lower(), ()), *files})
         write_memory(self._path, accepted)
 
     def without_accepted(self, extraction: Extraction) -> Extraction:
-        """The extraction without the copied-identity findings that a person has accepted."""
+        """Return the extraction without the copied-identity findings that a person has accepted."""
         if not any(f.code is FindingCode.COPIED_IDENTITY for f in extraction.findings):
             return extraction
         accepted_now = self._read()
@@ -126,7 +126,7 @@ class Choice(StrEnum):
 
 
 def choice_texts() -> dict[Choice, str]:
-    """The choices in words, the harmless one first."""
+    """Return the choices in words, the harmless one first."""
     return {
         Choice.LEAVE: translate("Silo", "leave out"),
         Choice.OPEN: translate("Silo", "open theirs beside mine"),
@@ -159,7 +159,7 @@ class Theirs:
 
     @property
     def headline(self) -> str:
-        """Who committed which revision, and what mine was made from."""
+        """Return who committed which revision, and what mine was made from."""
         if not self.revision:
             return translate("Silo", "the file on disk was changed since you opened it")
         if self.base is None:
@@ -177,12 +177,14 @@ class Theirs:
 
 
 def of_held(entry: QueueEntry) -> Theirs:
-    """The revision that a held commit of the outbox would undo, as it was when the commit was to be sent."""
+    """Return the revision that a held commit of the outbox would undo, as it was when the commit was to be
+    sent.
+    """
     return theirs_of(entry.path, entry.part_number, entry.newer)
 
 
 def theirs_of(path: str, part_number: str, newer: Mapping[str, Any]) -> Theirs:
-    """A revision that is newer than a file was made from, as plain values."""
+    """Return a revision that is newer than a file was made from, as plain values."""
     return Theirs(
         path,
         part_number,
@@ -194,7 +196,7 @@ def theirs_of(path: str, part_number: str, newer: Mapping[str, Any]) -> Theirs:
 
 
 def line_words(line: ThreeLines, *, known: bool = True) -> str:
-    """``Bolt: 6 → 4 by them, 8 by you``; ``known``: the base is."""
+    """Return ``Bolt: 6 → 4 by them, 8 by you``; ``known``: the base is."""
     base, theirs, mine = (quantity(value) for value in line.quantities)
     name = plain(display_name(line.entry) or line.entry.object_name, 60)
     if not known:
@@ -211,12 +213,12 @@ def line_words(line: ThreeLines, *, known: bool = True) -> str:
 
 
 def line_texts(theirs: Theirs, most: int | None = None) -> list[str]:
-    """Its lines in words; not more than ``most``."""
+    """Return the lines of a change in words; at most ``most`` of them."""
     return [line_words(line, known=theirs.base is not None) for line in theirs.lines[:most]]
 
 
 def more_text(left: int) -> str:
-    """The text of the button that shows the rest."""
+    """Return the text of the button that shows the rest."""
     return counted(left, translate("Silo", "… and {n} more line"), translate("Silo", "… and {n} more lines"))
 
 
@@ -236,7 +238,7 @@ def look(
     mine: Callable[[str], ComparedAssembly | None],
     cancelled: Cancel | None = None,
 ) -> dict[str, Theirs]:
-    """Path → what a colleague committed since, for the files where that is so. For a worker.
+    """Return path → what a colleague committed since, for the files where that is so. For a worker.
 
     mine
         the BOM of the document of a path as it is now.
@@ -257,7 +259,9 @@ def look(
 
 
 def gone(client: SiloClient, announced: Mapping[str, Newer], cancelled: Cancel | None = None) -> list[str]:
-    """The items of which the server no longer has the announced commit. For a worker: a request for each."""
+    """Return the items of which the server no longer has the announced commit. For a worker: a request for
+    each.
+    """
     from silo.api.files import newest_number
     from silo.api.transport import stop_if
 
@@ -278,8 +282,8 @@ def gone(client: SiloClient, announced: Mapping[str, Newer], cancelled: Cancel |
 def look_held(
     client: SiloClient, outbox: Store, entry: QueueEntry, cancelled: Cancel | None = None
 ) -> Theirs | None:
-    """The newest revision that a held commit would undo, with the BOM base → theirs → mine; None for a part,
-    for another server's, and where nothing would be undone any more. For a worker.
+    """Return the newest revision that a held commit would undo, with the BOM base → theirs → mine; None for a
+    part, for another server's, and where nothing would be undone any more. For a worker.
 
     Raises SiloError where the server or a file does not answer.
     """
@@ -307,7 +311,7 @@ class _File:
     origin: str
 
     def standing(self, client: SiloClient, outbox: Store) -> Standing | None:
-        """None where the file would undo nothing."""
+        """Return how the file stands; None if it would undo nothing."""
         from silo.api.files import is_newest, standing
 
         # The newest one decides it nearly always; an item may have hundreds.
@@ -384,19 +388,19 @@ class Desk(Protocol):
     def documents(self) -> Documents: ...
 
     def snapshot(self, doc: Any, /) -> Snapshot:
-        """Snapshot of a live document."""
+        """Return snapshot of a live document."""
 
     def find(self, path: str, /) -> Any | None:
-        """The open document of a file; None where it is not open."""
+        """Return the open document of a file; None if it is not open."""
 
     def save_as(self, doc: Any, /) -> None:
         """Let a person give a document its first name."""
 
     def identity(self, doc: Any, /) -> str | None:
-        """The item that a document belongs to, without looking at its components."""
+        """Return the item that a document belongs to, without looking at its components."""
 
     def ask(self, planned: CommitPlan, note: str, comment: str, look: Look, /) -> CommitAnswer | None:
-        """Which documents to commit, with which comment; None where the person does not want to.
+        """Return which documents to commit, with which comment; None if the person does not want to.
 
         comment
             what the person wrote before and is not in Silo yet.
@@ -405,7 +409,7 @@ class Desk(Protocol):
         """
 
     def warn(self, title: str, text: str, /) -> None:
-        """A message that a person must have seen."""
+        """Show a message that a person must have seen."""
 
     def later(self, call: Callable[[], None], /) -> None:
         """Run something in a turn of its own, once the present event is done."""
@@ -413,7 +417,7 @@ class Desk(Protocol):
     # -- files ------------------------------------------------------------------------------------------
 
     def open(self, path: str, /) -> Any:
-        """The document of a file, opened whole."""
+        """Return the document of a file, opened whole."""
 
     def close(self, doc: Any, /) -> None:
         """Close a document without saving."""
@@ -422,10 +426,10 @@ class Desk(Protocol):
         """Write a document, with its unsaved edits, to another file."""
 
     def open_paths(self) -> tuple[str, ...]:
-        """The files that this FreeCAD has open."""
+        """Return the files that this FreeCAD has open."""
 
     def is_open_elsewhere(self, path: str, /) -> bool:
-        """True where another FreeCAD of this user has the file open."""
+        """Return True if another FreeCAD of this user has the file open."""
 
     # -- previews ---------------------------------------------------------------------------------------
 
@@ -433,10 +437,10 @@ class Desk(Protocol):
         """Open the preview of a document."""
 
     def accounts(self, extraction: Extraction, /) -> Sequence[CountedSolids]:
-        """The solids that FreeCAD shows, for the assembly and each sub-assembly."""
+        """Return the solids that FreeCAD shows, for the assembly and each sub-assembly."""
 
     def why(self, doc: Any, assembly: str, parts: Collection[Key], /) -> list[str]:
-        """Why an assembly of a document has so many of a part: the number, then each chain to it."""
+        """Return why an assembly of a document has so many of a part: the number, then each chain to it."""
 
     def relink(self, finding: Finding, /) -> list[str]:
         """Set the live links of a finding to the file that was meant; their labels."""
@@ -456,7 +460,7 @@ class Desk(Protocol):
         """Open the Register Parts dialog of a document."""
 
     def look_at(self, paths: Iterable[str], /) -> dict[str, OpenedFile]:
-        """How the files of components stand."""
+        """Return how the files of components stand."""
 
     def write_identity(self, candidate: Candidate, identity: str, /) -> None:
         """Write an identity into a component's document and save it."""
@@ -469,7 +473,7 @@ class Desk(Protocol):
         """Give a component's file the identity that it had before it was registered, or none, and save it."""
 
     def unedited(self) -> list[Any]:
-        """The documents without unsaved edits, each after those that it links to."""
+        """Return the documents without unsaved edits, each after those that it links to."""
 
     def save_marked(self, doc: Any, /) -> None:
         """Save a document that was unedited, where FreeCAD has marked it for something below it."""
@@ -503,22 +507,22 @@ class CommitFlow:
 
     @property
     def running(self) -> bool:
-        """True while documents are being saved."""
+        """Return True while documents are being saved."""
         return bool(self._turns)
 
     def was_asked_for(self, key: str) -> bool:
-        """True for the commit of a document that a person committed, not one below it."""
+        """Return True for the commit of a document that a person committed, not one below it."""
         return key in self._asked_for
 
     def snapshot(self, doc: Any) -> Snapshot:
-        """A document as it is, without what a person has decided already (files that are one part)."""
+        """Return a document as it is, without what a person has decided already (files that are one part)."""
         taken = self._desk.snapshot(doc)
         if taken.extraction is None:
             return taken
         return replace(taken, extraction=self.decisions.without_accepted(taken.extraction))
 
     def accept(self, identity: str, files: Iterable[str]) -> None:
-        """A person says that these files are one part; the boxes of the pane ask no more."""
+        """Accept that these files are one part; the boxes of the pane no longer ask."""
         same = set(files)
         self.decisions.accept(identity, same)
         self._session.answered(
@@ -526,7 +530,7 @@ class CommitFlow:
         )
 
     def has_identity(self, doc: Any) -> bool:
-        """True for a document that belongs to Silo."""
+        """Return True for a document that belongs to Silo."""
         try:
             return bool(self._desk.snapshot(doc).identity)
         except SiloError:
@@ -593,7 +597,7 @@ class CommitFlow:
     def _along(
         self, path: str, skip: set[str], comment: str, over: Collection[str] = ()
     ) -> Iterator[CommittedDocument]:
-        """A turn after the documents are saved: what they link to goes along, if Silo does not have it."""
+        """Commit, a turn after the documents are saved, what they link to and Silo does not have."""
         how: dict[str, Any] = {"comment": comment, "over_newer": over}
         how["allow_missing"] = self._preferences.text("MissingLinks") == ALLOW
         title = translate("Silo", "Looking at the linked files")
@@ -622,16 +626,16 @@ class CommitFlow:
         yield from ()
 
     def _registering(self, path: str) -> Iterator[CommittedDocument]:
-        """A turn after the documents are saved."""
+        """Offer registering, a turn after the documents are saved."""
         self._register(path)
         yield from ()
 
     def comment_of(self, path: str) -> str:
-        """What a person wrote about a file when it had no item yet; told once."""
+        """Return what a person wrote about a file when it had no item yet; told once."""
         return self._comments.pop(path, "")
 
     def _heard(self, planned: CommitPlan) -> bool:
-        """True where the server has announced a colleague's commit of one of these documents."""
+        """Return True if the server has announced a colleague's commit of one of these documents."""
         return bool(self._session.shown.newer) and any(
             self._session.newer_than(check.identity, check.base.since)
             for check in self._files_to_check(planned)
@@ -714,8 +718,9 @@ class CommitFlow:
             self._session.keep(commit, failed=lambda error: self._tell_error(taken.label, str(error)))
 
     def made_from(self, commit: Commit, doc: Any) -> Commit:
-        """The commit of a BOM alone, with what its document was made from: it must not undo the BOM of a
-        colleague's newer file. ``doc``: None where the file is not open."""
+        """Return the commit of a BOM alone, with what its document was made from: it must not undo the BOM of
+        a colleague's newer file. ``doc``: None if the file is not open.
+        """
         from silo.files import sha256_of  # late: FreeCAD's start waits for this module
 
         if doc is None:
@@ -817,7 +822,7 @@ def commit_of(
     sync_bom: bool = True,
     allow_missing: bool = False,
 ) -> Commit | None:
-    """A snapshot as the outbox wants it; None where neither a file nor a BOM is to be sent."""
+    """Return a snapshot as the outbox wants it; None if neither a file nor a BOM is to be sent."""
     if file is None and (taken.extraction is None or not sync_bom):
         return None
     return Commit(
@@ -835,7 +840,7 @@ def commit_of(
 
 
 def not_in_silo(taken: Snapshot) -> PaneEntry:
-    """The box for a document that has no item yet."""
+    """Return the box for a document that has no item yet."""
     name = taken.label or os.path.basename(taken.path)
     text = taken.problem or translate("Silo", "It has no Silo part number yet, so it was not sent.")
     tone = Tone.PLAIN if taken.problem else Tone.WARNING

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def _stamp(path: str) -> Stamp | None:
-    """What changes when a file is written; None where there is none. FreeCAD's start does not import it."""
+    """Return what changes when a file is written; None if there is none. FreeCAD's start does not import it."""
     from silo.platform import stamp_of
 
     return stamp_of(path)
@@ -51,7 +51,7 @@ class Base:
         self._lock = threading.Lock()
 
     def settle(self, origins: Origins) -> str:
-        """The origin, determined if that is still to do. Any thread; reads the file once."""
+        """Return the origin, determined if that is still to do. Any thread; reads the file once."""
         with self._lock:
             if not self.origin:
                 from silo.outbox.entry import UNKNOWN
@@ -61,7 +61,7 @@ class Base:
             return self.origin
 
     def committed(self, sha256: str) -> None:
-        """A commit of the document has this content; what comes now is made from it.
+        """Note that a commit of the document has this content; later states are made from it.
 
         "" where another program has copied and sent it: then it is the file's, unless that was written since.
         """
@@ -71,7 +71,7 @@ class Base:
 
     @property
     def replaced(self) -> bool:
-        """True where somebody else has written the file since."""
+        """Return True if somebody else has written the file since."""
         now = _stamp(self.path)
         return self.stamp is not None and now is not None and now != self.stamp
 
@@ -107,14 +107,14 @@ class Opened:
         self._left.clear()
 
     def of(self, doc: Any) -> Base:
-        """The base of a document, also of one that was opened before we looked."""
+        """Return the base of a document, also of one that was opened before we looked."""
         base = self._bases.get(doc.Name)
         if base is None:
             base = self._bases[doc.Name] = Base(doc.FileName, _stamp(doc.FileName))
         return base
 
     def forget(self, doc: Any) -> None:
-        """The document is closed, or read again."""
+        """Forget a document that is closed, or read again."""
         self._bases.pop(doc.Name, None)
 
     def _later(self, call: Callable[[], object]) -> None:
@@ -129,7 +129,7 @@ class Opened:
     # FreeCAD calls these; an exception in them would only be printed.
 
     def slotChangedDocument(self, doc: Any, prop: str) -> None:
-        """FreeCAD names the file before it reads it."""
+        """Look at the file: FreeCAD names it before it reads it."""
         if prop != "FileName" or not doc.FileName:
             return
         base_now = self._bases.get(doc.Name)
@@ -146,17 +146,17 @@ class Opened:
             self._later(lambda: self._settle(base))
 
     def slotDeletedDocument(self, doc: Any) -> None:
-        """Another one may get its name."""
+        """Forget the document; FreeCAD may reuse its name."""
         self.forget(doc)
 
     def slotStartSaveDocument(self, doc: Any, filename: str) -> None:
-        """The file that it was made from is about to be replaced: look at it now, if nobody has."""
+        """Look at the file that it was made from, if nobody has: it is about to be replaced."""
         base = self._bases.get(doc.Name)
         if base is not None and base.path == filename and not base.origin:
             self._settle(base)
 
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
-        """The file is ours now."""
+        """Note that the file is ours now."""
         base = self._bases.get(doc.Name)
         if base is None or os.path.realpath(filename) != os.path.realpath(doc.FileName or ""):
             return

@@ -55,11 +55,11 @@ class Snapshot:
 
     @property
     def is_assembly(self) -> bool:
-        """True where there is a BOM to sync."""
+        """Return True if there is a BOM to sync."""
         return self.extraction is not None
 
     def is_as(self, other: Snapshot) -> bool:
-        """True where both are of one state: the same item, and the same BOM with all below it."""
+        """Return True if both are of one state: the same item, and the same BOM with all below it."""
         mine, its = (snapshot.extraction and to_plain(snapshot.extraction) for snapshot in (self, other))
         return (self.path, self.identity, mine) == (other.path, other.identity, its)
 
@@ -113,7 +113,7 @@ class Documents(Protocol):
 
 
 def is_edited(documents: Documents, doc: Any) -> bool:
-    """True where a document differs from its file; one that FreeCAD only marked does not."""
+    """Return True if a document differs from its file; one that FreeCAD only marked does not."""
     return documents.is_modified(doc) and documents.is_edited(doc, time.thread_time() + MOST_S)
 
 
@@ -156,18 +156,18 @@ class DocumentRow:
 
     @property
     def can_commit(self) -> bool:
-        """True where the file can be brought up to date and sent."""
+        """Return True if the file can be brought up to date and sent."""
         return self.state in (DocumentState.CHANGED, DocumentState.RECOMPUTED, DocumentState.SAVED)
 
     @property
     def wanted(self) -> bool:
-        """Checked to begin with? What was only recomputed is as it is in Silo."""
+        """Return True if it is checked to begin with; a document that was only recomputed is as in Silo."""
         asked = self.is_top or self.state is not DocumentState.RECOMPUTED
         return self.can_commit and asked and not self.replaced
 
     @property
     def note(self) -> str:
-        """The state in words."""
+        """Return the state in words."""
         lost = plain(", ".join(self.lost), 300)
         return _words()[self.state].replace("{lost}", lost)
 
@@ -210,17 +210,17 @@ class CommitPlan:
 
     @property
     def wanted(self) -> tuple[DocumentRow, ...]:
-        """What is committed unless a person says otherwise."""
+        """Return what is committed unless a person says otherwise."""
         return tuple(row for row in self.rows if row.wanted)
 
     @property
     def top(self) -> DocumentRow:
-        """The document that the person works in."""
+        """Return the document that the person works in."""
         return self.rows[-1]
 
     @property
     def is_simple(self) -> bool:
-        """True where there is nothing to ask: one document that can be committed, the others unchanged."""
+        """Return True if there is nothing to ask: one document that can be committed, the others unchanged."""
         others = all(row.state is DocumentState.RECOMPUTED for row in self.rows[:-1])
         replaced = any(row.replaced for row in self.rows)
         return others and self.top.can_commit and not self.unregistered and not replaced
@@ -246,7 +246,7 @@ def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> Commi
 
 
 def refusal(plan: CommitPlan) -> str:
-    """Why the document itself cannot be committed; "" where it can."""
+    """Return why the document itself cannot be committed; "" if it can."""
     top = plan.top
     if top.can_commit:
         return ""
@@ -257,7 +257,7 @@ def refusal(plan: CommitPlan) -> str:
 
 
 def leaves_first(top: Any) -> Iterable[Any]:
-    """A document and all that it links to, each once, linked ones before those that link to them.
+    """Return a document and all that it links to, each once, linked ones before those that link to them.
 
     Documents that link to each other in a ring come in the order in which they are found.
     """
@@ -305,7 +305,7 @@ def _state(doc: Any, documents: Documents, until: float) -> DocumentState:
 
 
 def _held(doc: Any, documents: Documents) -> DocumentState | None:
-    """Why a document cannot be saved; None where it can."""
+    """Return why a document cannot be saved; None if it can."""
     if documents.is_partial(doc):
         return DocumentState.PARTIAL
     if documents.lost_objects(doc):

@@ -166,7 +166,7 @@ class Overlay:
     # FreeCAD calls these.
 
     def addSelection(self, *_what: Any) -> None:
-        """Something else is selected."""
+        """Stop the highlighting when something else is selected."""
         if not self._is_ours and self._lit:
             qt.later(0, lambda: _remove(self._lit))  # the scene graph is in use now
 

@@ -58,51 +58,51 @@ class EditWatch:
         self._docs: dict[str, _Edits] = {}
 
     def begin(self, unmodified: list[Any]) -> None:
-        """What is open already; what has edits by now stays unknown."""
+        """Begin with the open documents; earlier edits stay unknown."""
         for doc in unmodified:
             self._docs.setdefault(doc.Name, _Edits())
 
     # -- FreeCAD calls these ----------------------------------------------------------------------------
 
     def slotCreatedDocument(self, doc: Any) -> None:
-        """A new one, or one that is being opened."""
+        """Watch a new document, or one that is being opened."""
         self._docs[doc.Name] = _Edits()
 
     def slotDeletedDocument(self, doc: Any) -> None:
-        """Another one may get its name."""
+        """Forget the document; FreeCAD may reuse its name."""
         self._docs.pop(doc.Name, None)
 
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
-        """The file has it all now; "Save a copy" writes another file."""
+        """Note that the file has all edits now; "Save a copy" writes another file."""
         if doc.Name in self._docs and os.path.realpath(filename) == os.path.realpath(doc.FileName):
             self._docs[doc.Name] = _Edits()
 
     def slotBeforeChangeObject(self, obj: Any, name: str) -> None:
-        """A property gets a value; this is its old one."""
+        """Note a property that gets a value; this is its old value."""
         # An object that is being deleted has no name any more.
         if name not in _OWN and obj.Name:
             self._remember(obj.Document, obj.Name, name, obj)
 
     def slotBeforeChangeDocument(self, doc: Any, name: str) -> None:
-        """A property of the document itself."""
+        """Note a changed property of the document itself."""
         if name not in _OWN:
             self._remember(doc, "", name, doc)
 
     def slotAppendDynamicProperty(self, owner: Any, name: str) -> None:
-        """A property that the file has not; an object's, or the document's. A view's document has no name."""
+        """Note a property that the file lacks; an object's, or the document's. A view's document has no name."""
         doc = getattr(owner, "Document", owner)
         edits = self._docs.get(getattr(doc, "Name", ""))
         if edits is not None and not doc.Restoring and name not in _SHOWN:
             edits.before.setdefault((owner.Name if doc is not owner else "", name), _ABSENT)
 
     def slotRemoveDynamicProperty(self, owner: Any, name: str) -> None:
-        """A property that the file has, unless it was added since."""
+        """Note a removed property that the file has, unless it was added since."""
         doc = getattr(owner, "Document", owner)
         if hasattr(doc, "Name"):
             self._remember(doc, owner.Name if doc is not owner else "", name, owner)
 
     def slotCreatedObject(self, obj: Any) -> None:
-        """A new object; an array makes its elements again."""
+        """Note a new object; an array makes its elements again."""
         edits = self._docs.get(obj.Document.Name)
         if edits is None or obj.Document.Restoring:
             return
@@ -112,7 +112,7 @@ class EditWatch:
             edits.made.add(obj.Name)
 
     def slotDeletedObject(self, obj: Any) -> None:
-        """An object less."""
+        """Note a deleted object."""
         edits = self._docs.get(obj.Document.Name)
         if edits is None:
             return
@@ -134,7 +134,7 @@ class EditWatch:
     # -- the question -----------------------------------------------------------------------------------
 
     def is_edited(self, doc: Any, until: float | None = None) -> bool:
-        """True where the document differs from its file.
+        """Return True if the document differs from its file.
 
         until
             the time (``time.thread_time``) from which on nothing more is compared.
@@ -142,7 +142,7 @@ class EditWatch:
         return next(self.differences(doc, until), None) is not None
 
     def differences(self, doc: Any, until: float | None = None) -> Iterator[str]:
-        """What differs, as far as it was looked for: "Pad.Length"."""
+        """Yield what differs, as far as it was looked for: "Pad.Length"."""
         edits = self._docs.get(doc.Name)
         if edits is None:
             yield "it had edits before anybody looked"
@@ -179,7 +179,7 @@ def _value(owner: Any, name: str) -> Any:
 
 
 def same(old: Any, new: Any) -> bool:
-    """True where two values of a property would be the same in a file."""
+    """Return True if two values of a property would be the same in a file."""
     if old is new:
         return old is not _ABSENT
     if type(old) is not type(new):
@@ -203,7 +203,9 @@ def same(old: Any, new: Any) -> bool:
 
 
 def _same_shape(old: Any, new: Any) -> bool:
-    """Two shapes that lie in the same place and have the same corners; a recompute makes each again."""
+    """Return True if two shapes lie in the same place and have the same corners; a recompute makes each
+    again.
+    """
     if old.isNull() or new.isNull():
         return bool(old.isNull() and new.isNull())
     if old.isSame(new):
@@ -323,7 +325,7 @@ class CommitHook:
             return
 
     def note(self, doc: Any, *, committed: bool = True) -> None:
-        """A commit of this document has ended, or is about to; or it was only saved."""
+        """Note that a commit of this document ends, or that it was only saved."""
         self._noted[doc.Name] = committed or self._noted.get(doc.Name, False)
         if not self._waiting:
             self._waiting = True
@@ -344,11 +346,11 @@ class _Observer:
         self._saved, self._activated = saved, activated
 
     def slotActivateDocument(self, _doc: Any) -> None:
-        """A person works in another document."""
+        """Look again when a person works in another document."""
         self._activated()
 
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
-        """A document is whole on disk."""
+        """Note that a document is whole on disk."""
         self._saved(doc, filename)
 
 
@@ -378,14 +380,14 @@ class FactCache:
         self.derived: dict[tuple[str, str], bool] = {}
 
     def object(self, real: Any) -> CachedObject:
-        """The view of an object."""
+        """Return the view of an object."""
         cached_object = self._objects.get(real)
         if cached_object is None:
             cached_object = self._objects[real] = CachedObject(real, self)
         return cached_object
 
     def document(self, real: Any) -> CachedDocument:
-        """The view of a document."""
+        """Return the view of a document."""
         name = real.Name
         cached_document = self._documents.get(name)
         if cached_document is None:
@@ -393,7 +395,9 @@ class FactCache:
         return cached_document
 
     def value(self, value: Any) -> Any:
-        """A value with views in the place of objects, also in lists and in pairs of object and sub-name."""
+        """Return a value with views in the place of objects, also in lists and in pairs of object and
+        sub-name.
+        """
         if self._is_object(value):
             return self.object(value)
         if isinstance(value, list):
@@ -428,7 +432,7 @@ class CachedObject:
         return value
 
     def isDerivedFrom(self, type_name: str, /) -> bool:
-        """As FreeCAD says, remembered by type."""
+        """Return FreeCAD's answer, remembered by type."""
         key = (self.TypeId, type_name)
         result: bool | None = self._cache.derived.get(key)
         if result is None:
@@ -453,32 +457,32 @@ class CachedDocument:
 
     @property
     def ProgramVersion(self) -> str:
-        """The FreeCAD that saved the document, "" while it is unsaved."""
+        """Return the FreeCAD that saved the document, "" while it is unsaved."""
         return self.real.getProgramVersion() or ""
 
     @property
     def Meta(self) -> dict[str, str]:
-        """The document's own notes."""
+        """Return the document's own notes."""
         if self._meta is None:
             self._meta = dict(self.real.Meta)
         return self._meta
 
     @property
     def Objects(self) -> list[CachedObject]:
-        """All objects, in document order."""
+        """Return all objects, in document order."""
         if self._objects is None:
             self._objects = [self._cache.object(obj) for obj in self.real.Objects]
         return self._objects
 
     def getObject(self, name: str) -> CachedObject | None:
-        """An object by its ``Name``."""
+        """Return an object by its ``Name``."""
         obj = self.real.getObject(name)
         return self._cache.object(obj) if obj is not None else None
 
     def imported(self, file: str) -> Any:
-        """The part that A2plus imported from a file, read from there: FreeCAD does not open it."""
+        """Return the part that A2plus imported from a file, read from there: FreeCAD does not open it."""
         return self._cache.imported(self.FileName, file)
 
     def getPropertyByName(self, name: str) -> Any:
-        """A property of the document; AttributeError where there is none, as in FreeCAD."""
+        """Return a property of the document; AttributeError if there is none, as in FreeCAD."""
         return self.real.getPropertyByName(name)

@@ -23,19 +23,19 @@ from silo.workbench.words import visible
 
 
 def gui() -> Any:
-    """The GUI module. The import succeeds headless as well, so ask :func:`has_gui` first."""
+    """Return the GUI module. The import succeeds headless as well, so ask :func:`has_gui` first."""
     import FreeCADGui
 
     return FreeCADGui
 
 
 def has_gui() -> bool:
-    """True where FreeCAD has a window."""
+    """Return True if FreeCAD has a window."""
     return bool(FreeCAD.GuiUp)
 
 
 def version() -> tuple[int, int]:
-    """Such as (1, 0)."""
+    """Return (major, minor), such as (1, 0)."""
     freecad_version = FreeCAD.Version()
     return int(freecad_version[0]), int(freecad_version[1])
 
@@ -53,43 +53,45 @@ def program() -> str:
 
 
 def user_data_folder() -> str:
-    """FreeCAD's folder for the user's data, add-ons and Python packages."""
+    """Return FreeCAD's folder for the user's data, add-ons and Python packages."""
     return str(FreeCAD.getUserAppDataDir())
 
 
 def packages_folder() -> str:
-    """Where this FreeCAD looks for additional Python packages (facts §7.3)."""
+    """Return where this FreeCAD looks for additional Python packages (facts §7.3)."""
     base = os.path.join(user_data_folder(), "AdditionalPythonPackages")
     return base if version() < (1, 0) else os.path.join(base, "py{}{}".format(*sys.version_info))
 
 
 def translate(context: str, text: str) -> str:
-    """FreeCAD's translation of a text."""
+    """Return FreeCAD's translation of a text."""
     return str(FreeCAD.Qt.translate(context, text))
 
 
 def message(text: str) -> None:
-    """A line in the report view. Like all of these, harmless to a terminal, no matter who wrote the text."""
+    """Print a line in the report view. Like all of these, harmless to a terminal, no matter who wrote the
+    text.
+    """
     FreeCAD.Console.PrintMessage(visible(text) + "\n")
 
 
 def warning(text: str) -> None:
-    """A warning in the report view."""
+    """Print a warning in the report view."""
     FreeCAD.Console.PrintWarning(visible(text) + "\n")
 
 
 def error(text: str) -> None:
-    """An error in the report view."""
+    """Print an error in the report view."""
     FreeCAD.Console.PrintError(visible(text) + "\n")
 
 
 def log(text: str) -> None:
-    """A line for those who look for the cause of a problem; hidden unless FreeCAD is set to show it."""
+    """Print a line for people who look for the cause of a problem; hidden unless FreeCAD is set to show it."""
     FreeCAD.Console.PrintLog(visible(text) + "\n")
 
 
 def parameters(group: str) -> Any:
-    """A group of FreeCAD's parameters."""
+    """Return a group of FreeCAD's parameters."""
     return FreeCAD.ParamGet(group)
 
 
@@ -118,7 +120,7 @@ class Pieces:
         self._known = {} if top is None else {(top.Document.Name, top.Name): (0, 0, 0)}
 
     def of(self, obj: Any, is_visible: bool = True) -> tuple[int, int, int]:
-        """The solids of an object. ``is_visible``: where it lies."""
+        """Return the solids of an object. ``is_visible``: where it lies."""
         obj = real(obj)
         target = obj.LinkedObject if obj.isDerivedFrom("App::Link") else None
         if isinstance(target, tuple) and not target[1].endswith("."):  # a face or an edge
@@ -149,12 +151,12 @@ class Pieces:
 
 
 def real(obj: Any) -> Any:
-    """FreeCAD's own object for one that is read once (:mod:`silo.workbench.freecad.facts`)."""
+    """Return FreeCAD's own object for a copy that is read once (:mod:`silo.workbench.freecad.facts`)."""
     return getattr(obj, "real", obj)
 
 
 def sub_objects(obj: Any) -> list[tuple[Any, bool]] | None:
-    """What an object shows within itself, and if it is visible there; None for a shape of its own."""
+    """Return what an object shows within itself, and if it is visible there; None for a shape of its own."""
     if {"BuildShape", "Freeze", "Group"}.issubset(obj.PropertiesList):
         return [each_obj for group in obj.Group for each_obj in _in_group(group)]
     names = obj.getSubObjects()
@@ -172,7 +174,7 @@ def sub_objects(obj: Any) -> list[tuple[Any, bool]] | None:
 
 
 def _in_group(group: Any) -> list[tuple[Any, bool]]:
-    """What a group of Assembly3 holds, with or without the add-on, and if it is visible.
+    """Return what a group of Assembly3 holds, with or without the add-on, and if it is visible.
 
     The add-on switches each of its groups off; what is shown stands in the group's own list.
     """
@@ -186,7 +188,7 @@ def _in_group(group: Any) -> list[tuple[Any, bool]]:
 
 
 def root_objects(document: Any) -> list[tuple[Any, bool]]:
-    """What FreeCAD shows at the root of a document: all that no part, link group, array or body holds."""
+    """Return what FreeCAD shows at the root of a document: all that no part, link group, array or body holds."""
     holders = [
         each_obj for each_obj in document.Objects if not each_obj.isDerivedFrom("App::DocumentObjectGroup")
     ]
@@ -216,22 +218,22 @@ def _solids(obj: Any) -> int:
 
 
 def documents() -> list[Any]:
-    """All open documents, also those that a link has loaded."""
+    """Return all open documents, also those that a link has loaded."""
     return list(FreeCAD.listDocuments().values())
 
 
 def is_object(value: Any) -> bool:
-    """True for an object of a document."""
+    """Return True for an object of a document."""
     return isinstance(value, FreeCAD.DocumentObject)
 
 
 def active_document() -> Any:
-    """The document that a person works in, or None."""
+    """Return the document that a person works in, or None."""
     return FreeCAD.ActiveDocument
 
 
 def documents_by_path() -> dict[str, Any]:
-    """The open documents by the paths of their files, each in the one spelling that its folder lists."""
+    """Return the open documents by the paths of their files, each in the one spelling that its folder lists."""
     from silo.platform import Spelling  # late: FreeCAD's start waits for this module
 
     real = Spelling().real
@@ -239,19 +241,19 @@ def documents_by_path() -> dict[str, Any]:
 
 
 def find_document(path: str) -> Any:
-    """The open document of a file, or None."""
+    """Return the open document of a file, or None."""
     from silo.platform import one_path
 
     return documents_by_path().get(one_path(path))
 
 
 def linked_documents(doc: Any) -> list[Any]:
-    """A document and all that it links to, directly or not, in no order."""
+    """Return a document and all that it links to, directly or not, in no order."""
     return list(doc.getDependentDocuments(False))
 
 
 def is_partial(doc: Any) -> bool:
-    """True where only the objects that links need are loaded: saving such a document writes nothing."""
+    """Return True if only the objects that links need are loaded: saving such a document writes nothing."""
     return bool(getattr(doc, "Partial", False))
 
 
@@ -267,7 +269,7 @@ def activate(doc: Any) -> None:
 
 @contextmanager
 def same_active_document() -> Iterator[None]:
-    """Whatever is opened inside, the person's document is the active one again afterwards."""
+    """Make the person's document the active one again after the block."""
     active = FreeCAD.ActiveDocument
     name = active.Name if active is not None else ""
     try:
@@ -299,12 +301,12 @@ def add_document_observer(observer: Any) -> None:
 
 
 def main_window() -> Any:
-    """FreeCAD's main window."""
+    """Return FreeCAD's main window."""
     return gui().getMainWindow()
 
 
 def view_of(doc: Any) -> Any:
-    """The GUI's half of a document (``Modified``, ``ActiveView``), or None."""
+    """Return the GUI's half of a document (``Modified``, ``ActiveView``), or None."""
     try:
         return gui().getDocument(doc.Name)
     except NameError:  # FreeCAD's own choice of exception for "no such document"
@@ -312,7 +314,7 @@ def view_of(doc: Any) -> Any:
 
 
 def has_command(name: str) -> bool:
-    """True where FreeCAD, or another add-on, has a command of this name."""
+    """Return True if FreeCAD, or another add-on, has a command of this name."""
     return gui().Command.get(name) is not None
 
 
@@ -330,24 +332,24 @@ def run_command(name: str) -> None:
 
 
 def command_actions(name: str) -> list[Any]:
-    """The QActions of a command; none until it stands in a menu or toolbar."""
+    """Return the QActions of a command; none until it stands in a menu or toolbar."""
     command = gui().Command.get(name)
     return list(command.getAction()) if command is not None else []
 
 
 def command_info(name: str) -> dict[str, str]:
-    """Menu text, tooltip and icon name of a command."""
+    """Return menu text, tooltip and icon name of a command."""
     command = gui().Command.get(name)
     return dict(command.getInfo()) if command is not None else {}
 
 
 def icon(name: str) -> Any:
-    """An icon by name, from FreeCAD's and the add-ons' folders."""
+    """Return an icon by name, from FreeCAD's and the add-ons' folders."""
     return gui().getIcon(name)
 
 
 def has_active_workbench() -> bool:
-    """False while FreeCAD is still loading add-ons."""
+    """Return False while FreeCAD is still loading add-ons."""
     try:
         return gui().activeWorkbench() is not None
     except AssertionError:  # FreeCAD's own choice of exception for "none yet"
@@ -394,7 +396,7 @@ def add_selection_observer(observer: Any) -> None:
 
 
 def selected() -> list[tuple[Any, str]]:
-    """Document and name of each selected object, and of each that lies on the way to it: once."""
+    """Return document and name of each selected object, and of each object on the way to it, once."""
     objects: dict[tuple[str, str], Any] = {}
     for selection in gui().Selection.getSelectionEx("*", 0):
         for name in (
@@ -406,14 +408,14 @@ def selected() -> list[tuple[Any, str]]:
 
 
 def active_assembly() -> Any:
-    """The container that is active in the 3D view (the one new parts go into), or None."""
+    """Return the container that is active in the 3D view (the one new parts go into), or None."""
     view = getattr(gui().ActiveDocument, "ActiveView", None)
     ask = getattr(view, "getActiveObject", None)
     return ask("part") if callable(ask) else None
 
 
 def origin_of(doc: Any) -> Any:
-    """The origin (Kindred Create) that a document belongs to, where FreeCAD has origins; else None."""
+    """Return the origin (Kindred Create) that a document belongs to, where FreeCAD has origins; else None."""
     ask: Callable[[Any], Any] | None = getattr(gui(), "getOrigin", None)
     if ask is None:
         return None

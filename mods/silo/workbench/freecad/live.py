@@ -51,12 +51,12 @@ ASSEMBLY_SINCE = (0, 22)
 
 
 def read(path: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
-    """The BOM of a file, opened in this FreeCAD (or found open). Raises DocumentError, InputError."""
+    """Return the BOM of a file, opened in this FreeCAD (or found open). Raises DocumentError, InputError."""
     return extract_live(saving.open_fully(path), assembly, hardware=hardware)
 
 
 def read_checked(path: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
-    """As :func:`read`, for files that nobody has looked at: what could harm FreeCAD is not opened.
+    """Read as :func:`read`, but do not open what could harm FreeCAD.
 
     Where FreeCAD only says that it cannot open a file, the error has the reason that our reader finds.
     """
@@ -71,7 +71,9 @@ def read_checked(path: str, assembly: str | None = None, *, hardware: bool = Tru
 
 
 def _refuse_entities(path: str) -> None:
-    """FreeCAD before its fix of CVE-2026-73235 follows external entities while it opens a document."""
+    """Refuse external entities: FreeCAD before its fix of CVE-2026-73235 follows them while it opens a
+    document.
+    """
     try:
         with zipfile.ZipFile(path) as file, file.open("Document.xml") as xml:
             beginning = xml.read(_BEFORE_ROOT)
@@ -84,7 +86,7 @@ def _refuse_entities(path: str) -> None:
 
 
 def extract_live(document: Any, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
-    """The BOM of an open document, as it stands in this session, saved or not.
+    """Return the BOM of an open document, as it stands in this session, saved or not.
 
     What this FreeCAD could load only without some of its objects is read from its file.
 
@@ -102,7 +104,7 @@ def extract_live(document: Any, assembly: str | None = None, *, hardware: bool =
 
 
 def cached_document(document: Any) -> CachedDocument:
-    """A live document for one walk: quick to ask, and never out of date for it is not kept."""
+    """Return a live document for one walk: quick to ask, and never out of date for it is not kept."""
     library: Any = None
 
     def imported(owner: str, file: str) -> Any:
@@ -116,7 +118,7 @@ def cached_document(document: Any) -> CachedDocument:
 
 
 def extract_object(assembly_obj: Any, *, hardware: bool = True) -> Extraction:
-    """The BOM of one assembly object, live or :func:`cached_document`."""
+    """Return the BOM of one assembly object, live or :func:`cached_document`."""
     return extract(assembly_obj, **_walking(), hardware=hardware)
 
 
@@ -169,18 +171,20 @@ class WholeDocuments:
 
 
 def canonical_paths() -> Callable[[str], str]:
-    """The one path of a file, remembered for one walk: a file opened by two paths is one file."""
+    """Return the one path of a file, remembered for one walk: a file opened by two paths is one file."""
     return Spelling().real
 
 
 def stored_target(link: Any, name: str = "LinkedObject") -> tuple[str, str] | None:
-    """File and object ``Name`` that a link has stored; ("", "") where it was never set, None where untold."""
+    """Return file and object ``Name`` that a link has stored; ("", "") where it was never set, None if
+    untold.
+    """
     stored = _stored(link, name)
     return None if stored is None else (stored.get("file", ""), stored.get("name", ""))
 
 
 def stored_sub_name(link: Any) -> str:
-    """The sub-name that a link has stored beside its target."""
+    """Return the sub-name that a link has stored beside its target."""
     return (_stored(link, "LinkedObject") or {}).get("sub", "")
 
 
@@ -209,7 +213,7 @@ class LinkInspector:
         self._damage: dict[tuple[str, str], LinkProblem | None] = {}
 
     def __call__(self, obj: Any) -> LinkProblem | None:
-        """None where that is not known, or where nothing is missing."""
+        """Return the problem; None if it is not known, or nothing is missing."""
         return self._of_link(obj) if is_link(obj) or is_assembly_link(obj) else self._of_target(obj)
 
     def _of_target(self, obj: Any) -> LinkProblem | None:
@@ -241,7 +245,7 @@ class LinkInspector:
         return self._look(owner, file, name) if owner else LinkProblem(FindingCode.BROKEN_LINK, file, name)
 
     def _look(self, owner: str, file: str, name: str) -> LinkProblem:
-        """What the reader of files says of the target, for it knows more than FreeCAD does."""
+        """Return what the reader of files says of the target, for it knows more than FreeCAD does."""
         from silo.fcstd import Library
         from silo.fcstd.properties import Ref
 
@@ -337,12 +341,12 @@ class SolidCount:
 
     @property
     def agrees(self) -> bool:
-        """True where every solid is explained, and every explained solid is there."""
+        """Return True if every solid is explained, and every explained solid is there."""
         return not self.differences
 
     @property
     def unexplained(self) -> tuple[str, ...]:
-        """The names of the objects that differ."""
+        """Return the names of the objects that differ."""
         return tuple(difference.object for difference in self.differences)
 
     def differ(self, obj: Any, shown: int, explained: int, why: str) -> None:
@@ -350,7 +354,7 @@ class SolidCount:
         self.differences.append(Difference(obj.Name, obj.Label, shown, explained, why))
 
     def sentence(self) -> str:
-        """For people."""
+        """Return the sentence for people."""
         solids = "1 solid" if self.shown == 1 else f"{self.shown} solids"
         text = f"{self.label}: the view has {solids}, the BOM explains {self.explained}"
         further = (
@@ -369,13 +373,13 @@ class SolidCount:
         return f"{text}. They differ; look at: {', '.join(texts)}."
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the data for JSON."""
         more = {"unexplained": list(self.unexplained), "agrees": self.agrees, "sentence": self.sentence()}
         return {**asdict(self), **more}
 
 
 def accounts(extraction: Extraction, *, hardware: bool = True) -> list[SolidCount]:
-    """The assembly and every sub-assembly, each once; their documents are open.
+    """Return the assembly and every sub-assembly, each once; their documents are open.
 
     hardware
         False where the extraction leaves standard parts out.
@@ -454,7 +458,7 @@ class _Witness:
         return account
 
     def _drawn(self, count: Count, tree: Tree | None) -> Any:
-        """The component; for one that is not open in FreeCAD, what stands for it in the assembly."""
+        """Return the component; for one that is not open in FreeCAD, what stands for it in the assembly."""
         if host.is_object(host.real(count.target)):
             return count.target
         return next(chains(count, tree))[-1][0]
@@ -479,7 +483,7 @@ class _Witness:
 def _members(
     listed: Sequence[tuple[Any, bool]], roles: Mapping[str, ObjectRole | None], visible: bool = True
 ) -> Iterator[tuple[Any, bool]]:
-    """Each object that is no mere holder, once for each path, and if it is visible there."""
+    """Yield each object that is no mere holder, once for each path, and if it is visible there."""
     for member, is_visible in listed:
         if roles.get(member.Name) is ObjectRole.HOLDER:
             yield from _members(host.sub_objects(member) or [], roles, visible and is_visible)
@@ -527,7 +531,7 @@ def _judge(
 
 
 def _is_used_by(obj: Any, others: Mapping[str, ObjectRole | None]) -> bool:
-    """True if one of these objects shows or consumes this one: a link, an array, a compound, a cut."""
+    """Return True if one of these objects shows or consumes this one: a link, an array, a compound, a cut."""
     for user in obj.InList:
         for name in _USERS if user.Document == obj.Document and user.Name in others else ():
             value = getattr(user, name, None) if name in user.PropertiesList else None

@@ -89,11 +89,11 @@ class SiloGroup:
     # FreeCAD calls these, once for each object; what is selected then is looked at once.
 
     def addSelection(self, *_what: Any) -> None:
-        """One more is selected."""
+        """Note one more selected object."""
         self._soon()
 
     def setSelection(self, *_what: Any) -> None:
-        """Others are selected."""
+        """Note that other objects are selected."""
         self._soon()
 
     def _soon(self) -> None:
@@ -135,7 +135,9 @@ def _put(obj: Any, name: str, value: str, tip: str) -> None:
 
 
 def look_at(paths: Iterable[str]) -> dict[str, OpenedFile]:
-    """How the files of components stand. GUI thread; what needs the disk's content is left to the worker."""
+    """Return how the files of components stand. GUI thread; what needs the disk's content is left to the
+    worker.
+    """
     documents = host.documents_by_path()
     own = next((str(doc.TransientDir) for doc in documents.values()), "")
     elsewhere = open_in_others(own)
@@ -203,7 +205,7 @@ def _objects(candidate: Candidate) -> tuple[str, ...]:
 
 
 def unedited() -> list[Any]:
-    """The documents without unsaved edits, each after those that it links to."""
+    """Return the documents without unsaved edits, each after those that it links to."""
     clean = {doc.Name: doc for doc in host.documents() if doc.FileName and not saving.is_modified(doc)}
     ordered: dict[str, Any] = {}
     for doc in clean.values():
@@ -274,7 +276,7 @@ class LossGuard:
     # FreeCAD calls these; an exception in them would only be printed.
 
     def slotChangedDocument(self, doc: Any, prop: str) -> None:
-        """FreeCAD names the file before it reads it; what it could not load is known after that."""
+        """Look at the file: FreeCAD names it before it reads it, and knows later what it could not load."""
         if prop == "FileName" and doc.FileName:
             name = doc.Name
             qt.later(0, lambda: self._opened(name))
@@ -289,7 +291,7 @@ class LossGuard:
             self._tell(doc, _words(text, doc, lost), advice)
 
     def slotStartSaveDocument(self, doc: Any, filename: str) -> None:
-        """The file is about to be replaced."""
+        """Look at the file before it is replaced."""
         if os.path.realpath(filename) != os.path.realpath(doc.FileName or ""):
             return
         if not (lost := saving.lost_objects(doc)):
@@ -367,7 +369,7 @@ class LiveDocuments:
         self.base = opened.of
 
     def is_damaged(self, doc: Any) -> bool:
-        """True where the document's file cannot be read to its end."""
+        """Return True if the document's file cannot be read to its end."""
         return saving.damage(doc.FileName) is not None
 
 
@@ -379,7 +381,7 @@ class LiveDesk:
         self.documents = LiveDocuments(opened)
 
     def snapshot(self, doc: Any) -> Snapshot:
-        """The assembly that is active in the 3D view decides between several."""
+        """Take a snapshot; the assembly that is active in the 3D view decides between several."""
         hardware = self._count_hardware()
         if (whole := live.in_file(doc)) is not None:
             return plan.take(whole, walk=partial(extract, hardware=hardware))
@@ -397,11 +399,11 @@ class LiveDesk:
     save_copy = staticmethod(saving.save_copy)
 
     def open_paths(self) -> tuple[str, ...]:
-        """The files that this FreeCAD has open."""
+        """Return the files that this FreeCAD has open."""
         return tuple(doc.FileName for doc in host.documents() if doc.FileName)
 
     def is_open_elsewhere(self, path: str) -> bool:
-        """True where another FreeCAD of this user has the file open."""
+        """Return True if another FreeCAD of this user has the file open."""
         return open_in_any().has_file(path)
 
     look_at = staticmethod(look_at)
@@ -412,12 +414,12 @@ class LiveDesk:
     save_marked = staticmethod(save_marked)
 
     def accounts(self, extraction: Extraction) -> list[SolidCount]:
-        """The solids that FreeCAD shows, against those that the BOM explains."""
+        """Return the solids that FreeCAD shows, against those that the BOM explains."""
         with qt.wait_cursor():
             return live.accounts(extraction, hardware=self._count_hardware())
 
     def why(self, doc: Any, assembly: str, parts: Collection[Key]) -> list[str]:
-        """Each chain from an assembly to a part of it."""
+        """Return each chain from an assembly to a part of it."""
         return live.why_object(doc, assembly, parts, hardware=self._count_hardware())
 
     def relink(self, finding: Finding) -> list[str]:
@@ -426,16 +428,18 @@ class LiveDesk:
         return relink(finding)
 
     def save_as(self, _doc: Any) -> None:
-        """FreeCAD's own dialog, for the active document."""
+        """Show FreeCAD's own dialog for the active document."""
         host.run_command("Std_Save")
 
     def identity(self, doc: Any) -> str | None:
-        """By the assembly that is active, where the document holds several. Each commit begins with this."""
+        """Return the identity of the active assembly, if the document holds several. Each commit begins with
+        this.
+        """
         cached = live.cached_document(doc)
         return file_item(cached, self._hint(doc, cached))
 
     def ask(self, planned: CommitPlan, note: str, comment: str, look: Look) -> CommitAnswer | None:
-        """The commit dialog."""
+        """Return the commit dialog."""
         from silo.workbench.commit.dialog import CommitDialog
 
         dialog = CommitDialog(planned, host.main_window(), note=note, comment=comment)
@@ -453,7 +457,7 @@ class LiveDesk:
             dialog.deleteLater()
 
     def preview_window(self, title: str, path: str, flow: PreviewFlow) -> Any:
-        """The preview window."""
+        """Return the preview window."""
         from silo.workbench.preview.dialog import PreviewDialog
 
         window = PreviewDialog(title, path, flow, host.main_window())
@@ -487,7 +491,7 @@ class LiveDesk:
         return Overlay()
 
     def register_window(self, title: str, path: str, flow: RegisterFlow, *, asks: bool) -> Any:
-        """The Register Parts dialog."""
+        """Return the Register Parts dialog."""
         from silo.workbench.register.dialog import RegisterDialog
 
         window = RegisterDialog(title, path, flow, host.main_window(), asks=asks)
@@ -495,11 +499,11 @@ class LiveDesk:
         return window
 
     def warn(self, title: str, text: str) -> None:
-        """A message box."""
+        """Show a message box."""
         from silo.workbench.gui import widgets
 
         widgets.warn(host.main_window(), title, text)
 
     def later(self, call: Callable[[], None]) -> None:
-        """In Qt's event loop."""
+        """Run it later, in Qt's event loop."""
         qt.later(0, call)

@@ -33,7 +33,7 @@ _REMEMBERED = 20_000
 
 
 def is_modified(doc: Any) -> bool:
-    """True where the document has edits that are not on disk."""
+    """Return True if the document has edits that are not on disk."""
     if not host.has_gui():
         return bool(doc.isTouched()) if hasattr(doc, "isTouched") else False
     view = host.view_of(doc)
@@ -42,7 +42,7 @@ def is_modified(doc: Any) -> bool:
 
 @cache
 def watch_edits() -> EditWatch:
-    """What is edited from now on is known by :func:`is_edited`."""
+    """Watch edits from now on; :func:`is_edited` knows them."""
     watch = EditWatch()
     watch.begin([doc for doc in host.documents() if not is_modified(doc)])
     host.add_document_observer(watch)
@@ -50,7 +50,7 @@ def watch_edits() -> EditWatch:
 
 
 def is_edited(doc: Any, until: float) -> bool:
-    """True where a modified document differs from its file; False where it was only recomputed.
+    """Return True if a modified document differs from its file; False if it was only recomputed.
 
     until
         (``time.thread_time``) what is not compared by then counts as edited.
@@ -59,7 +59,7 @@ def is_edited(doc: Any, until: float) -> bool:
 
 
 def open_fully(path: str) -> Any:
-    """The document of a file with all its objects, opened or completed where needed.
+    """Return the document of a file with all its objects, opened or completed where needed.
 
     FreeCAD completes a partly loaded document by closing and reading it again, so unsaved edits in it would
     be lost: then, and where the file cannot be read, :class:`DocumentError`.
@@ -81,7 +81,7 @@ def open_fully(path: str) -> Any:
 
 
 def damage(path: str, name: str = "") -> FcstdError | None:
-    """Why a file cannot be read as far as an object in it needs ("": to its end); None where it can.
+    """Return why a file cannot be read as far as an object in it needs ("": to its end); None if it can.
 
     FreeCAD reads a file from its beginning and opens what it finds: objects without shapes where the file is
     cut short, some of the objects where its Document.xml is damaged. It says so in the report view at most.
@@ -175,7 +175,8 @@ def _of_unknown_types(doc: Any) -> dict[str, tuple[str, str]]:
 
 
 def _is_made_again(obj: Any, unknown: list[Any]) -> bool:
-    """True for the point of an origin that nothing else refers to: FreeCAD 1.1 makes it when it is missing.
+    """Return True for the point of an origin that nothing else refers to: FreeCAD 1.1 makes it when it is
+    missing.
 
     Each origin of 1.1 has such a point, and so each file with a body.
     """
@@ -243,7 +244,7 @@ def mark_modified(name: str) -> None:
 
 @contextmanager
 def others_unmarked(doc: Any = None) -> Iterator[None]:
-    """Documents without edits stay so while this one is changed and saved; None for all of them.
+    """Keep other documents unmarked while this one is changed and saved; None for all of them.
 
     FreeCAD marks each document that links to a saved one, for the time of saving that it keeps of it (0.20
     does so whatever we do), and each that shows an axis cross, for the size of that. Nobody edited them.
@@ -267,7 +268,7 @@ def others_unmarked(doc: Any = None) -> Iterator[None]:
 
 @contextmanager
 def _unmarking(owner: Any, name: str) -> Iterator[None]:
-    """A change of this property does not mark the document as edited."""
+    """Keep a change of this property from marking the document as edited."""
     if name not in owner.PropertiesList:
         yield
         return
@@ -308,7 +309,7 @@ def save_marked(doc: Any) -> None:
 
 
 def is_writable(path: str) -> bool:
-    """True where the file may be replaced; a file marked read-only may not."""
+    """Return True if the file may be replaced; a file marked read-only may not."""
     folder = os.path.dirname(path) or "."
     if not os.path.exists(path):
         return os.access(folder, os.W_OK)

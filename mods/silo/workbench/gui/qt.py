@@ -70,7 +70,7 @@ class Relay(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
 
 
 def in_gui_thread() -> bool:
-    """True in the thread that may touch widgets and documents."""
+    """Return True in the thread that may touch widgets and documents."""
     return threading.current_thread() is threading.main_thread()
 
 
@@ -91,12 +91,12 @@ def open_url(url: str) -> bool:
 
 
 def tell_at_pointer(text: str) -> None:
-    """A word where the person has just clicked; it goes away by itself."""
+    """Show a text where the person has just clicked; it goes away by itself."""
     QtWidgets.QToolTip.showText(QtGui.QCursor.pos(), text)
 
 
 def ask_where_to_save(parent: Any, title: str, name: str) -> str:
-    """The path that a person chose for a new file; "" where none was chosen."""
+    """Return the path that a person chose for a new file; "" if none was chosen."""
     return str(QtWidgets.QFileDialog.getSaveFileName(parent, title, name)[0])
 
 
@@ -107,7 +107,7 @@ def copy(text: str) -> None:
 
 @contextmanager
 def wait_cursor() -> Iterator[None]:
-    """The cursor says that the window is busy."""
+    """Show the cursor of a busy window."""
     QtWidgets.QApplication.setOverrideCursor(QtCore.Qt.CursorShape.WaitCursor)
     try:
         yield

@@ -36,7 +36,7 @@ _COLOURS = {
 
 
 def is_dark(widget: Any) -> bool:
-    """True where the widget's ground is dark (FreeCAD's dark themes).
+    """Return True if the widget's ground is dark (FreeCAD's dark themes).
 
     Told by the colour of its text: a theme that is a style sheet leaves the palette's ground as it was.
     """
@@ -45,7 +45,7 @@ def is_dark(widget: Any) -> bool:
 
 
 def colour(tone: Tone, widget: Any) -> str:
-    """The colour of a tone, readable on the widget's ground; "" for the theme's own."""
+    """Return the colour of a tone, readable on the widget's ground; "" for the theme's own."""
     if tone is Tone.QUIET:
         widget.ensurePolished()
         text = widget.palette().color(QtGui.QPalette.ColorRole.WindowText)
@@ -59,7 +59,7 @@ def colour(tone: Tone, widget: Any) -> str:
 
 
 def label(text: str, tone: Tone = Tone.PLAIN, *, bold: bool = False, wrap: bool = True) -> Any:
-    """Plain text that wraps, and that can be selected and copied."""
+    """Return plain text that wraps, and that can be selected and copied."""
     made = QtWidgets.QLabel()
     made.setTextFormat(QtCore.Qt.TextFormat.PlainText)
     made.setText(words.breakable(text) if wrap else text)
@@ -88,7 +88,7 @@ def paint(made: Any, tone: Tone, *, bold: bool = False) -> None:
 
 
 def link_button(text: str, call: Callable[[], None], tip: str = "") -> Any:
-    """A button that looks like a link: it does not shout, and the keyboard reaches it."""
+    """Return a button that looks like a link: it does not shout, and the keyboard reaches it."""
     made = QtWidgets.QPushButton(text)
     made.setFlat(True)
     made.setCursor(QtCore.Qt.CursorShape.PointingHandCursor)
@@ -101,7 +101,7 @@ def link_button(text: str, call: Callable[[], None], tip: str = "") -> Any:
 
 
 def link_style(shade: str, more: str = "") -> str:
-    """The style sheet of a link; it has to undo what FreeCAD's themes do to buttons."""
+    """Return the style sheet of a link; it has to undo what FreeCAD's themes do to buttons."""
     return (
         f"QPushButton {{ color: {shade}; background: transparent; border: none; min-width: 0; min-height: 0;"
         f" margin: 0; padding: 1px 2px; text-align: left; {more} }}"
@@ -110,13 +110,13 @@ def link_style(shade: str, more: str = "") -> str:
 
 
 def brush(tone: Tone, widget: Any) -> Any:
-    """The colour of a tone for a cell; the theme's own where it has none."""
+    """Return the colour of a tone for a cell; the theme's own where it has none."""
     shade = colour(tone, widget)
     return QtGui.QBrush(QtGui.QColor(shade)) if shade else QtGui.QBrush()
 
 
 def button(text: str, name: str, call: Callable[[], object], tip: str = "", *, default: bool = False) -> Any:
-    """A push button; Return presses the default one of a window only."""
+    """Return a push button; Return presses the default one of a window only."""
     made = QtWidgets.QPushButton(text)
     made.setObjectName(name)
     made.setAutoDefault(default)
@@ -127,7 +127,7 @@ def button(text: str, name: str, call: Callable[[], object], tip: str = "", *, d
 
 
 def line(*parts: Any) -> Any:
-    """A layout of widgets in one line; what stands after None is at the right."""
+    """Return a layout of widgets in one line; what stands after None is at the right."""
     layout = QtWidgets.QHBoxLayout()
     for part in parts:
         layout.addStretch(1) if part is None else layout.addWidget(part)
@@ -151,7 +151,7 @@ def lay_out(window: Any, name: str, title: str, width: int, height: int, *, moda
 
 
 def tree(name: str, headings: Sequence[str], numbers: Sequence[int] = (), *, flat: bool = True) -> Any:
-    """A table of lines, or of lines below lines; the columns ``numbers`` are flush right."""
+    """Return a table of lines, or of lines below lines; the columns ``numbers`` are flush right."""
     made = QtWidgets.QTreeWidget()
     made.setObjectName(name)
     made.setRootIsDecorated(not flat)
@@ -162,7 +162,7 @@ def tree(name: str, headings: Sequence[str], numbers: Sequence[int] = (), *, fla
 
 
 def embolden(item: Any) -> None:
-    """The first cell of a line in bold letters."""
+    """Set the first cell of a line in bold letters."""
     # A line of a tree has a font for each column, a cell of a table its own.
     where = (0,) if isinstance(item, QtWidgets.QTreeWidgetItem) else ()
     font = item.font(*where)
@@ -171,7 +171,7 @@ def embolden(item: Any) -> None:
 
 
 def row(*widgets: Any, gap: int = 10) -> Any:
-    """A layout of widgets side by side, in several lines where the width ends."""
+    """Return a layout of widgets side by side, in several lines where the width ends."""
     layout = FlowLayout(gap)
     for widget in widgets:
         layout.addWidget(widget)
@@ -179,7 +179,7 @@ def row(*widgets: Any, gap: int = 10) -> Any:
 
 
 def picture(name: str, size: int = 16) -> Any:
-    """One of the add-on's own icons as a label."""
+    """Return one of the add-on's own icons as a label."""
     made = QtWidgets.QLabel()
     icon = host.icon(name)
     if icon is not None:
@@ -189,7 +189,7 @@ def picture(name: str, size: int = 16) -> Any:
 
 
 def broken(text: str, metrics: Any, width: int) -> str:
-    """A text with line ends where ``width`` pixels are full; a word that is wider stands alone."""
+    """Return a text with line ends where ``width`` pixels are full; a word that is wider stands alone."""
     lines = [""]
     for word in text.split():
         longer = f"{lines[-1]} {word}".strip()
@@ -261,15 +261,15 @@ class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no type
         self.setContentsMargins(0, 0, 0, 0)
 
     def addItem(self, item: Any) -> None:
-        """Qt hands over what :meth:`addWidget` was given."""
+        """Take what Qt hands over from :meth:`addWidget`."""
         self._items.append(item)
 
     def count(self) -> int:
-        """How many widgets there are."""
+        """Return how many widgets there are."""
         return len(self._items)
 
     def itemAt(self, number: int) -> Any:
-        """One of them, None beyond the last."""
+        """Return one of them, None beyond the last."""
         return self._items[number] if 0 <= number < len(self._items) else None
 
     def takeAt(self, number: int) -> Any:
@@ -277,11 +277,11 @@ class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no type
         return self._items.pop(number) if 0 <= number < len(self._items) else None
 
     def hasHeightForWidth(self) -> bool:
-        """The narrower, the higher."""
+        """Return the narrower, the higher."""
         return True
 
     def heightForWidth(self, width: int) -> int:
-        """Height that a width needs."""
+        """Return height that a width needs."""
         return self._place(QtCore.QRect(0, 0, width, 0), move=False)
 
     def setGeometry(self, area: Any) -> None:
@@ -290,11 +290,11 @@ class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no type
         self._place(area, move=True)
 
     def sizeHint(self) -> Any:
-        """As small as possible: the width comes from outside."""
+        """Return the smallest size: the width comes from outside."""
         return self.minimumSize()
 
     def minimumSize(self) -> Any:
-        """Room for the largest widget."""
+        """Return room for the largest widget."""
         size = QtCore.QSize()
         for item in self._items:
             size = size.expandedTo(item.minimumSize())
@@ -314,7 +314,7 @@ class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no type
 
 
 def choice_box(parent: Any, choices: Mapping[str, str], *, search: bool = False, name: str = "") -> Any:
-    """A list to choose from, no longer than the screen; ``search``: typed letters filter it."""
+    """Return a list to choose from, no longer than the screen; ``search``: typed letters filter it."""
     box = QtWidgets.QComboBox(parent)
     box.setObjectName(name)
     box.setMaxVisibleItems(14)
@@ -367,7 +367,7 @@ class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # Py
         self._choices, self._search = choices, search
 
     def createEditor(self, parent: Any, _option: Any, index: Any) -> Any:
-        """A list of the choices, opened at once."""
+        """Return a list of the choices, opened at once."""
         box = choice_box(parent, self._choices(index.row()), search=self._search)
         box.activated.connect(lambda _number: self._chosen(box))
 
@@ -393,7 +393,7 @@ class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # Py
             model.setData(index, key, QtCore.Qt.ItemDataRole.UserRole)
 
     def paint(self, painter: Any, option: Any, index: Any) -> None:
-        """The text, and an arrow where one can choose."""
+        """Paint the text, and an arrow if a person can choose."""
         super().paint(painter, option, index)
         if not index.flags() & QtCore.Qt.ItemFlag.ItemIsEditable:
             return
@@ -433,7 +433,7 @@ class CloseWatch(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
         window.installEventFilter(self)
 
     def eventFilter(self, _watched: Any, event: Any) -> bool:
-        """Never holds the event back."""
+        """Pass each event on."""
         if event.type() == QtCore.QEvent.Type.Close:
             self._before()
         return False
@@ -487,7 +487,7 @@ def save_in_view(doc: Any) -> None:
 
 @contextmanager
 def _passing_view(doc: Any) -> Iterator[None]:
-    """A 3D view that nobody gets to see."""
+    """Yield a 3D view that nobody gets to see."""
     window = host.main_window()
     area = window.findChild(QtWidgets.QMdiArea)
     window.setUpdatesEnabled(False)

@@ -100,7 +100,7 @@ class Waiting:
         self._window.deleteLater()
 
     def report(self, stage: str, done: int, total: int) -> None:
-        """Called for each part and each face; lets the window live now and then."""
+        """Report each part and each face; let the window draw now and then."""
         if stage == "measuring":
             self._part = translate("Silo", "Part {n} of {total}", n=done, total=total)
             self._window.setRange(0, total)
@@ -146,7 +146,7 @@ class MassDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
         layout.addLayout(widgets.line(copy, None, close))
 
     def headings(self) -> tuple[str, ...]:
-        """Of the columns."""
+        """Return the headings of the columns."""
         return (
             translate("Silo", "Part"),
             translate("Silo", "Quantity"),
@@ -176,6 +176,6 @@ class MassDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
         return item
 
     def _copy(self) -> None:
-        """The table on the clipboard has plain numbers in kg."""
+        """Copy the table to the clipboard, with plain numbers in kg."""
         name, quantity, each_mass, whole, *rest = self.headings()
         qt.copy(self._content.table((name, quantity, f"{each_mass}, kg", f"{whole}, kg", *rest)))

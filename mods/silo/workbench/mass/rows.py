@@ -23,7 +23,7 @@ class MassRow:
     doubtful: bool
 
     def cells(self) -> tuple[str, ...]:
-        """As text, in the order of the columns."""
+        """Return the cells as text, in the order of the columns."""
         return (
             self.name,
             str(self.quantity),
@@ -46,7 +46,7 @@ class MassView:
     notes: tuple[str, ...]
 
     def table(self, headings: tuple[str, ...]) -> str:
-        """For the clipboard: tab-separated, numbers in kg and cm³ that a spreadsheet reads."""
+        """Return the table for the clipboard: tab-separated, numbers in kg and cm³ that a spreadsheet reads."""
         lines = ["\t".join(headings)]
         for row in self.rows:
             numbers = (f"{row.each:.9g}", f"{row.total:.9g}", f"{row.volume_cm3:.9g}")
@@ -55,7 +55,7 @@ class MassView:
 
 
 def shown(report: InertiaReport) -> MassView:
-    """The window's content; the heaviest part first, those without a mass last."""
+    """Return the window's content; the heaviest part first, those without a mass last."""
     parts = [part for link in report.links.values() for part in link.parts]
     rows = sorted((_row(part) for part in parts), key=lambda row: (-row.total, row.name))
     unknown = [row for row in rows if row.each == 0]
@@ -106,7 +106,7 @@ def _row(part: PartResult) -> MassRow:
 
 
 def mass_text(mass: float) -> str:
-    """A mass [kg] with a unit that suits it: ``12.3 g``, ``1.2346 kg``; a dash for none."""
+    """Return a mass [kg] with a unit that suits it: ``12.3 g``, ``1.2346 kg``; a dash for none."""
     if mass == 0:
         return "–"
     return f"{mass * 1e3:.5g} g" if abs(mass) < 1 else f"{mass:.5g} kg"

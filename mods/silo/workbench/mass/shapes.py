@@ -82,7 +82,7 @@ _BOUNDARY = ("Forward", "Reversed")
 
 
 def faces_of(shape: Any) -> Iterator[Any]:
-    """The faces, each as the solid has it (``Faces`` would list a face that is used twice only once)."""
+    """Yield the faces, each as the solid has it (``Faces`` would list a face that is used twice only once)."""
     if shape.ShapeType == "Face":
         if shape.Orientation in _BOUNDARY:
             yield shape
@@ -93,13 +93,13 @@ def faces_of(shape: Any) -> Iterator[Any]:
 
 
 def face_of(face: Any) -> Face:
-    """A FreeCAD face as the integration takes it. ValueError where FreeCAD does not give enough of it."""
+    """Return a FreeCAD face as the integration takes it. ValueError where FreeCAD does not give enough of it."""
     wires = [wire for wire in face.childShapes() if wire.ShapeType == "Wire"]
     return Face(_surface(face), [_curve(face, edge) for wire in wires for edge in _edges(face, wire)])
 
 
 def _edges(face: Any, wire: Any) -> Iterator[Any]:
-    """The edges, with the face's own orientation in them, which distinguishes the two curves of a seam."""
+    """Yield the edges, with the face's own orientation in them, which distinguishes the two curves of a seam."""
     listed = [edge for edge in wire.childShapes() if edge.Orientation in _BOUNDARY]
     yield from listed
     for edge in listed:
@@ -121,7 +121,7 @@ def _curve(face: Any, edge: Any) -> Curve:
 
 
 def _fitted(curve: Any, basis: Basis) -> Callable[[Floats], Floats]:
-    """A line, circle or ellipse, from a few of its points."""
+    """Return a line, circle or ellipse, from a few of its points."""
     points = _sampled(curve)(basis.samples)
     coefficients = np.linalg.solve(basis.at(basis.samples), points)
     return lambda t: basis.at(t) @ coefficients
@@ -148,7 +148,7 @@ def _breaks(curve: Any, kind: str, first: float, last: float) -> Floats:
 
 
 def _surface(face: Any) -> Surface:
-    """The quickest form of the face's surface that is the same surface."""
+    """Return the quickest form of the face's surface that is the same surface."""
     surface = face.Surface
     kind = type(surface).__name__
     value = _values(face)
@@ -209,7 +209,7 @@ def _asker(face: Any) -> Callable[[float, float], Any]:
 
 
 def _extruded(curve: Any, face: Any, value: Value) -> Nurbs:
-    """A spline drawn along a straight line: a spline surface of degree 1 in that direction."""
+    """Return a spline drawn along a straight line: a spline surface of degree 1 in that direction."""
     if type(curve).__name__ == "BezierCurve":
         curve = curve.toBSpline()
     curve, periodic = curve.copy(), curve.isPeriodic()
@@ -252,7 +252,7 @@ AGREE = 0.02
 
 
 def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
-    """The geometry of an open document as it stands in this session, saved or not.
+    """Return the geometry of an open document as it stands in this session, saved or not.
 
     ``report`` is called for every product and every face; what it raises (CancelledError) ends the reading.
     Raises DocumentError, as the reader of files does, and InputError for too many or too deeply nested parts.
@@ -272,7 +272,7 @@ def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
 
 
 def measure(leaf: Leaf, eps: float, report: Report) -> Measured:
-    """All solids of a leaf whose handles are FreeCAD's shapes, in its axes."""
+    """Return all solids of a leaf whose handles are FreeCAD's shapes, in its axes."""
     return _Product(eps, report).measured(leaf)
 
 
@@ -283,20 +283,20 @@ class LiveFacts:
         self._inspect = live.LinkInspector()
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
-        """(4, 4) [mm] of an object's own placement; the identity where it has none."""
+        """Return (4, 4) [mm] of an object's own placement; the identity where it has none."""
         value = own(obj, name)
         return np.eye(4) if value is None else matrix_of(value)
 
     def places(self, obj: Any) -> list[Floats]:
-        """(4, 4) [mm] each, the object's own ``PlacementList``."""
+        """Return (4, 4) [mm] each, the object's own ``PlacementList``."""
         return [matrix_of(each_place) for each_place in own(obj, "PlacementList") or ()]
 
     def shape(self, obj: Any) -> Any:
-        """FreeCAD's shape of the object; None where it has none, or an empty one."""
+        """Return FreeCAD's shape of the object; None if it has none, or an empty one."""
         return obj.Shape if "Shape" in obj.PropertiesList and not obj.Shape.isNull() else None
 
     def material(self, obj: Any) -> StatedMaterial:
-        """The material object linked to it, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
+        """Return the material object linked to it, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
         linked = linked_material(obj)
         if linked is not None:
             return linked
@@ -306,12 +306,12 @@ class LiveFacts:
         return told_material(card.Name, _density(card))
 
     def problem(self, link: Any) -> LinkProblem | None:
-        """Why a link has no target."""
+        """Return why a link has no target."""
         return self._inspect(link)
 
 
 def _stored(obj: Any, name: str) -> Any:
-    """The value of a property, cut off from its object; None where the object has no such property.
+    """Return the value of a property, cut off from its object; None if the object has no such property.
 
     ``obj.ShapeMaterial.getPhysicalValue(…)`` marks the document as edited and touches all links to the object
     (measured in FreeCAD 1.0 and 1.1): FreeCAD takes every call of a value that it handed out as an attribute
@@ -324,7 +324,7 @@ def _stored(obj: Any, name: str) -> Any:
 
 
 def matrix_of(placement: Any) -> Floats:
-    """(4, 4) of a FreeCAD placement."""
+    """Return (4, 4) of a FreeCAD placement."""
     return np.array(placement.toMatrix().A, dtype=np.float64).reshape(4, 4)
 
 
@@ -353,7 +353,7 @@ class _Product:
     problems: list[Note] = field(default_factory=list)
 
     def measured(self, leaf: Leaf) -> Measured:
-        """All solids of a leaf, in its axes."""
+        """Return all solids of a leaf, in its axes."""
         shapes = [(ref.handle, ref.transform) for ref in leaf.shapes]
         # FreeCAD keeps an object's placement as the location of its shape; the walk's own takes its place.
         placed = [(shape, t @ np.linalg.inv(matrix_of(shape.Placement))) for shape, t in shapes]
@@ -382,7 +382,7 @@ class _Product:
         return Measured(settled.solids, tuple(self.problems), None, faces, wires)
 
     def _find(self, solid: Any, where: str) -> tuple[_Solid, Floats]:
-        """The solid or an equal one that was measured before, and (4, 4) [mm] from there to here."""
+        """Return the solid or an equal one that was measured before, and (4, 4) [mm] from there to here."""
         here = matrix_of(solid.Placement)
         for each_solid in self.known:
             if solid.isPartner(each_solid.shape) and solid.Orientation == each_solid.shape.Orientation:
@@ -416,7 +416,9 @@ class _Product:
         return _Solid(solid, props)
 
     def _integrated(self, solid: Any, centre: Floats, radius: float) -> Moments:
-        """By our integration; not finite where FreeCAD does not give the geometry in full."""
+        """Integrate the solid ourselves; the result is not finite where FreeCAD does not give the geometry in
+        full.
+        """
         faces = list(faces_of(solid))
 
         def told() -> Any:
@@ -466,7 +468,7 @@ def _meshed(shape: Any) -> Mesh:
 
 
 def _placed(solid_placed: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
-    """A measured solid after ``moved``; ``solid`` after ``matrix`` ((4, 4) [mm]) is the same."""
+    """Return a measured solid after ``moved``; ``solid`` after ``matrix`` ((4, 4) [mm]) is the same."""
     assert solid_placed.props is not None
     props, metres = solid_placed.props, in_metres(moved)
     volumes, coms, units = place([props.volume_m3], [props.com_m], [props.inertia_unit], [metres])
@@ -479,7 +481,7 @@ def _placed(solid_placed: _Solid, moved: Floats, solid: Any, matrix: Floats) -> 
 
 
 def _surfaces(shape: Any) -> tuple[list[Any], list[Any]]:
-    """The surfaces of a shape that stand in no solid: those that close, as solids, and the others."""
+    """Return the surfaces of a shape that stand in no solid: those that close, as solids, and the others."""
     inside = {shell.hashCode() for solid in shape.Solids for shell in solid.Shells}
     loose = [shell for shell in shape.Shells if shell.hashCode() not in inside]
     face_codes = {face.hashCode() for shell in shape.Shells for face in shell.Faces}
@@ -500,7 +502,7 @@ def _surfaces(shape: Any) -> tuple[list[Any], list[Any]]:
 
 
 def _common(body: Body, other: Body) -> SolidProps | None:
-    """What two solids have in common, by FreeCAD's boolean operation; None where that fails."""
+    """Return what two solids have in common, by FreeCAD's boolean operation; None if that fails."""
     try:
         both = _shape(body).common(_shape(other))
         least = min(body.props.volume_m3, other.props.volume_m3)

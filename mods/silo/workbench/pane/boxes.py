@@ -37,7 +37,7 @@ FIRST, MORE = 40, 60
 
 
 def _waits(shown: PaneState) -> object:
-    """What is drawn of what waits."""
+    """Return what is drawn of what waits."""
     return shown.waiting, shown.server, shown.theirs, shown.reason
 
 
@@ -105,7 +105,7 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
             self._draw_entries(gathered(shown.activity.entries))
 
     def changeEvent(self, event: Any) -> None:
-        """Another theme: what is coloured is made again."""
+        """Draw the colours again for another theme."""
         super().changeEvent(event)
         if event.type() in (QtCore.QEvent.Type.StyleChange, QtCore.QEvent.Type.PaletteChange):
             shown, self._shown = self._shown, None
@@ -149,7 +149,7 @@ OnAction = Callable[[Action], None]
 
 
 def buttons(actions: Iterable[Action], on_action: OnAction) -> Any:
-    """A row of link buttons."""
+    """Return a row of link buttons."""
     made = []
     for action in actions:
         address = action.target if action.do is Do.VIEW else ""
@@ -210,7 +210,7 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
 
 
 def _ground(widget: Any) -> str:
-    """The ground of a box. In a dark theme the palette may still be the light one."""
+    """Return the ground of a box. In a dark theme the palette may still be the light one."""
     return "rgba(255, 255, 255, 13)" if widgets.is_dark(widget) else "palette(base)"
 
 

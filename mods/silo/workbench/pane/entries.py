@@ -39,7 +39,7 @@ Page = Callable[[str], str]
 
 
 def of_sent(sent: Sent, page: Page, now: float | None = None) -> PaneEntry:
-    """The box of one commit."""
+    """Return the box of one commit."""
     lines = (*_revision_lines(sent), *_status_lines(sent), *_resolved_lines(sent), *_product_lines(sent))
     tone = max((line.tone for line in lines), key=_WEIGHT.__getitem__, default=Tone.GOOD)
     url = (sent.result.resolve_url if sent.result is not None else "") or sent.page
@@ -94,7 +94,7 @@ def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> Pan
 
 
 def _batch_of(sent: Sent, tone: Tone) -> Batch | None:
-    """A commit without anything that a person should see is one of many."""
+    """Return a commit without anything that a person should see is one of many."""
     quiet = tone not in (Tone.WARNING, Tone.ERROR)
     return Batch.COMMITTED if quiet and sent.status not in (Status.MERGED, Status.BLOCKED) else None
 
@@ -135,7 +135,7 @@ def _badges(sent: Sent) -> tuple[Line, ...]:
 
 
 def badges(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> tuple[Line, ...]:
-    """The counts of a merge, as the spec's box has them; what is zero is left out."""
+    """Return the counts of a merge, as the spec's box has them; what is zero is left out."""
     texts = count_texts(diff, warnings, translate)
     if not texts:
         return (Line(no_changes(translate), Tone.QUIET),)
@@ -192,7 +192,7 @@ def _status_lines(sent: Sent) -> tuple[Line, ...]:
 
 
 def _blocked_actions(path: str, missing: int) -> tuple[Action, ...]:
-    """What a person can do about components that are missing; nothing else is left out of a BOM."""
+    """Return what a person can do about components that are missing; nothing else is left out of a BOM."""
     if not missing:
         return ()
     singular, many = translate("Silo", "Sync without it"), translate("Silo", "Sync without them")
@@ -216,7 +216,9 @@ def _resolved_lines(sent: Sent) -> tuple[Line, ...]:
 
 
 def _product_lines(sent: Sent) -> tuple[Line, ...]:
-    """What is open in the sub-assemblies, and what the product weighs and costs, as the server keeps it."""
+    """Return what is open in the sub-assemblies, and what the product weighs and costs, as the server keeps
+    it.
+    """
     if sent.summary is None:
         return ()
     own = f"{sent.number}: "  # what is open in its own BOM is shown already
@@ -246,7 +248,7 @@ def _finding_lines(resolved: Resolved, base: str) -> list[Line]:
 
 
 def finding_actions(finding: Finding, resolved: Resolved) -> tuple[Action, ...]:
-    """What a person can do about a finding: see the objects, or decide about a copied identity."""
+    """Return what a person can do about a finding: see the objects, or decide about a copied identity."""
     top = resolved.assembly.doc_path
     if finding.code is FindingCode.COPIED_IDENTITY:
         files = tuple(dict.fromkeys(place.doc_path for place in finding.where))
@@ -259,7 +261,7 @@ def finding_actions(finding: Finding, resolved: Resolved) -> tuple[Action, ...]:
 
 
 def _identity_at(finding: Finding, resolved: Resolved) -> str:
-    """The identity that the files of a finding share."""
+    """Return the identity that the files of a finding share."""
     places = {(place.doc_path, place.obj) for place in finding.where}
     entries = walk_entries((resolved.assembly, *resolved.entries))
     return next((e.silo_uuid for e in entries if e.key in places and e.silo_uuid), "")
@@ -290,7 +292,7 @@ def _show(entry: BomEntry | None, resolved: Resolved) -> tuple[Action, ...]:
 
 
 def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
-    """``⚠ 2 components have no Silo part number [Register Parts…]``, and which they are."""
+    """Return ``⚠ 2 components have no Silo part number [Register Parts…]``, and which they are."""
     count = len(resolved.unresolved)
     if not count:
         return ()
@@ -307,7 +309,7 @@ def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
 
 
 def of_event(event: ServerEvent, page: Page, now: float | None = None) -> PaneEntry | None:
-    """The box of one event; None for those that people need not see."""
+    """Return the box of one event; None for those that people need not see."""
     when = time.time() if now is None else now
     if event.merge is not None:
         return of_merge(event.merge, page, when, event.id)
@@ -331,7 +333,9 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> PaneEn
 
 
 def commit_of_event(event: ServerEvent) -> tuple[str, Newer] | None:
-    """The identity and the commit that an event announces; None for any other, and for mere properties."""
+    """Return the identity and the commit that an event announces; None for any other, and for mere
+    properties.
+    """
     data = event.data if isinstance(event.data, dict) else {}
     revision, identity = data.get("revision_number"), data.get("id")
     if event.type != "revision.created" or not isinstance(revision, int) or not isinstance(identity, str):
@@ -343,7 +347,7 @@ def commit_of_event(event: ServerEvent) -> tuple[str, Newer] | None:
 
 
 def of_gap(when: float) -> PaneEntry:
-    """The box for what was not heard: the server lost its log, or counts again."""
+    """Return the box for what was not heard: the server lost its log, or counts again."""
     text = translate("Silo", "The server no longer has the events since then. See its own activity page.")
     return PaneEntry(
         key="gap",
@@ -355,7 +359,7 @@ def of_gap(when: float) -> PaneEntry:
 
 
 def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = None) -> PaneEntry:
-    """The box of a merge that the server announced (spec §5, SSE Event)."""
+    """Return the box of a merge that the server announced (spec §5, SSE Event)."""
     lines = badges(merge.diff, merge.warnings)
     return PaneEntry(
         key=f"sync:{merge.sync_id}" if merge.sync_id else f"event:{event_id}:{MERGE}",
@@ -370,7 +374,7 @@ def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = 
 
 
 def _moment(moment: datetime | None, now: float) -> float:
-    """When an event happened: as the server says where it is an old one, else now.
+    """Return when an event happened: for an old event as the server says, else now.
 
     Servers send whole seconds, and their clocks are a little off: just now, the order of arrival is truer.
     """
@@ -379,7 +383,7 @@ def _moment(moment: datetime | None, now: float) -> float:
 
 
 def _event_words(kind: str, number: str, data: dict[str, Any]) -> tuple[str, str]:
-    """Title and key of an event; the key of a revision is that of our own upload of it."""
+    """Return title and key of an event; the key of a revision is that of our own upload of it."""
     revision = data.get("revision_number", data.get("revision"))
     if kind == "revision.created" and isinstance(revision, int):
         if revision == 1 and _text(data, "comment") in ("", "created"):

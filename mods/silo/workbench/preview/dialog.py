@@ -144,14 +144,14 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
     # -- what is shown ----------------------------------------------------------------------------------
 
     def busy(self) -> None:
-        """A comparison is under way."""
+        """Show that a comparison is under way."""
         self._problem.hide()
         self._summary.setText(translate("Silo", "Comparing with Silo…"))
         self._preview = None
         self._enable()
 
     def fail(self, error: SiloError) -> None:
-        """The comparison did not come about."""
+        """Show why there is no comparison."""
         self._summary.setText("")
         self._tell(str(error))
         self._enable()
@@ -186,7 +186,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         return "\n".join(lines)
 
     def tell_view(self, text: str, *, agrees: bool | None) -> None:
-        """What a comparison with the 3D view found, or why a line counts so many (``agrees`` None)."""
+        """Show the result of a comparison with the 3D view, or why a line counts so many (``agrees`` None)."""
         self._view_text.setText(plain(text, 2000) if "\n" not in text else text)
         widgets.paint(self._view_text, {True: Tone.GOOD, False: Tone.ERROR, None: Tone.PLAIN}[agrees])
         self._view_text.show()
@@ -213,7 +213,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self._wrap()
 
     def _spread(self, item: Any) -> None:
-        """Sentences take the whole width; what is short enough is opened."""
+        """Give sentences the whole width; open what is short enough."""
         kind = item.data(1, QtCore.Qt.ItemDataRole.UserRole)
         item.setFirstColumnSpanned(kind in _WIDE)
         item.setExpanded(item.childCount() <= 12)
@@ -221,7 +221,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             self._spread(item.child(number))
 
     def resizeEvent(self, event: Any) -> None:
-        """Sentences are broken again for the new width."""
+        """Break the sentences again for the new width."""
         super().resizeEvent(event)
         QtCore.QTimer.singleShot(0, self._wrap)
 

@@ -95,7 +95,7 @@ class Compared:
 
     @property
     def is_new(self) -> bool:
-        """True where a sync would send it, and the server has no line of it yet."""
+        """Return True if a sync would send it, and the server has no line of it yet."""
         return self.to_send and not self.lines
 
 
@@ -126,22 +126,22 @@ class Preview:
 
     @property
     def number(self) -> str:
-        """Part number of the assembly; "" while it has none."""
+        """Return part number of the assembly; "" while it has none."""
         return self.top.resolved.assembly.part_number or ""
 
     @property
     def unregistered(self) -> tuple[BomEntry, ...]:
-        """Components without a part number, the assembly itself included."""
+        """Return components without a part number, the assembly itself included."""
         return self.top.resolved.unregistered
 
     @property
     def movable(self) -> tuple[Finding, ...]:
-        """The broken links for which one file fits."""
+        """Return the broken links for which one file fits."""
         return tuple(finding for finding in self.broken if finding.did_you_mean)
 
     @property
     def to_send_below(self) -> int:
-        """Sub-assemblies whose sync has something to send."""
+        """Return sub-assemblies whose sync has something to send."""
         return sum(1 for compared in self.compared[:-1] if compared.to_send)
 
 
@@ -183,7 +183,7 @@ MOST_ROWS = 3000
 
 
 def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[PreviewRow, ...]:
-    """The table: the lines of the assembly, then what is left out and why.
+    """Return the table: the lines of the assembly, then what is left out and why.
 
     most
         so many rows of sub-assemblies at most, each of which gets its share; one row sums up the rest.
@@ -229,7 +229,7 @@ def _share(room: int, entries: Sequence[BomEntry]) -> int:
 def _assembly_rows(
     compared: Compared, lines: Known, names: Mapping[str, str], above: Keys, room: int
 ) -> Iterator[PreviewRow]:
-    """The assembly's own lines in its own order, then those that only the server has.
+    """Yield the assembly's own lines in its own order, then those that only the server has.
 
     room
         so many rows may stand below them.
@@ -270,7 +270,7 @@ def _assembly_rows(
 def _below(
     entry: BomEntry, lines: Known, names: Mapping[str, str], above: Keys, room: int
 ) -> Iterator[PreviewRow]:
-    """The lines of a sub-assembly; none where it stands above itself (a loop is reported as a finding)."""
+    """Yield the lines of a sub-assembly; none where it stands above itself (a loop is reported as a finding)."""
     compared = lines.get(entry.key) if entry.is_assembly and entry.key not in above else None
     if compared is None:
         return
@@ -282,7 +282,7 @@ def _below(
 
 
 def _states(diff: BomDiff) -> dict[str, tuple[RowKind, str, str]]:
-    """Part number → kind, the server's quantity, and what a sync does."""
+    """Return part number → kind, the server's quantity, and what a sync does."""
     notes = _notes()
     states: dict[str, tuple[RowKind, str, str]] = {}
     for line in diff.unchanged:
@@ -317,7 +317,7 @@ def _notes() -> dict[RowKind, str]:
 
 
 def _own_words(compared: Compared) -> str:
-    """Whether the BOM of a sub-assembly is in Silo."""
+    """Return whether the BOM of a sub-assembly is in Silo."""
     if compared.is_new:
         return translate("Silo", "its own BOM is not in Silo yet")
     return translate("Silo", "its own BOM differs from Silo") if compared.to_send else ""
@@ -340,7 +340,7 @@ def _unregistered_row(entry: BomEntry, preview: Preview, children: tuple[Preview
 
 
 def _counted(entry: BomEntry, head: BomEntry) -> dict[str, Any]:
-    """The fields of a row for what stands in the model, directly below an assembly."""
+    """Return the fields of a row for what stands in the model, directly below an assembly."""
     return {
         "document": head.doc_path,
         "objects": entry.instances,
@@ -367,7 +367,7 @@ def _finding_row(finding: Finding, preview: Preview, base: str) -> PreviewRow:
 
 
 def summary(preview: Preview) -> str:
-    """One line over the table."""
+    """Return one line over the table."""
     diff = preview.top.diff
     parts = (
         (len(diff.added), translate("Silo", "{n} to add")),
@@ -406,7 +406,7 @@ def summary(preview: Preview) -> str:
 
 
 def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:
-    """Snapshots whose BOMs a sync sends, children before parents; without ``below`` the top one only."""
+    """Return snapshots whose BOMs a sync sends, children before parents; without ``below`` the top one only."""
     snapshots = []
     for compared in preview.compared[:-1] if below else ():
         if compared.to_send:
@@ -415,7 +415,7 @@ def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:
 
 
 def _part_of(snapshot: Snapshot, resolved: Resolved) -> Snapshot:
-    """A sub-assembly as a snapshot of its own, cut from that of its parent."""
+    """Return a sub-assembly as a snapshot of its own, cut from that of its parent."""
     head = resolved.assembly
     original = _find(snapshot.extraction, head.key)
     mine = tuple(f for f in resolved.findings if any(place.doc_path == head.doc_path for place in f.where))
@@ -504,7 +504,7 @@ class PreviewFlow:
             self._ask(taken)
 
     def _taken_again(self, path: str) -> Snapshot | None:
-        """The document of an open window as it is now; the window says where it was closed."""
+        """Return the document of an open window as it is now; the window says where it was closed."""
         doc = self._opened(path, path)
         return None if doc is None else self._take(doc)
 
@@ -535,7 +535,7 @@ class PreviewFlow:
         self._open[taken.path] = self._desk.preview_window(taken.label or name, taken.path, self)
 
     def closed(self, path: str) -> None:
-        """The window of this document is gone."""
+        """Forget the closed window of this document."""
         self._open.pop(path, None)
         self._to_mend.discard(path)
 

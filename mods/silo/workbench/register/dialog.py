@@ -155,7 +155,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         return widgets.row(self.words, self.only, *self.checks.values(), gap=6)
 
     def _make_bulk(self) -> Any:
-        """One value for all chosen rows."""
+        """Make the row of buttons that set one value for all chosen rows."""
         self.bulk: dict[str, Any] = {
             "sourcing": widgets.choice_box(None, self._sources),
             "category": widgets.choice_box(None, {}, search=True),
@@ -216,7 +216,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
 
     @property
     def rows(self) -> Sequence[EditedRow]:
-        """The rows as they stand."""
+        """Return the rows as they stand."""
         return self._rows
 
     def fill(self, offer: Offer) -> None:
@@ -256,7 +256,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.resizeRowsToContents()
 
     def _lay_out(self) -> None:
-        """A heading before each section; none where there is only the one of components."""
+        """Lay out the rows with a heading before each section; without it if there is only that of
+        components.
+        """
         texts = headings(self._rows)
         # No heading if there are only components of one folder.
         with_headings = len(set(texts)) > 1 or any(row.section for row in self._rows)
@@ -298,7 +300,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             self.table.setCellWidget(number, NO_PART, no_part)
 
     def fail(self, error: SiloError) -> None:
-        """The components could not be looked up."""
+        """Show why the components could not be looked up."""
         self._text.setText("")
         self.tell(str(error))
 
@@ -308,7 +310,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._problem.setVisible(bool(text))
 
     def registered(self, order: Order, result: Registration) -> None:
-        """One component is registered, or could not be."""
+        """Show that a component is registered, or could not be."""
         for row in self._rows:
             if row.candidate is order.candidate:
                 row.result, row.running = result, False
@@ -316,7 +318,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._refresh()
 
     def undeclared(self, row: EditedRow, *, no_part: bool) -> None:
-        """It is no component any more: no part, or undecided."""
+        """Show that the object was undeclared: no part, or undecided."""
         if row in self._rows:
             article = row.candidate.article
             if article is not None:
@@ -325,7 +327,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             self._refresh()
 
     def taken_back(self, order: Order, error: SiloError | None) -> None:
-        """One registration is undone, or could not be."""
+        """Show that a registration is undone, or could not be."""
         for row in self._rows:
             if row.candidate is order.candidate:
                 row.result = Registration(order.proposal, error=error) if error is not None else None
@@ -342,13 +344,13 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._filling = False
 
     def stopped(self) -> None:
-        """Nothing is being registered any more."""
+        """Show that registering has ended."""
         for row in self._rows:
             row.running = False
         self._refresh()
 
     def set_number(self, category: str, number: str) -> None:
-        """The next number of a category is known."""
+        """Show the next number of a category."""
         self._offer = replace(self._offer, numbers={**self._offer.numbers, category: number})
         self._refresh()
 
@@ -419,7 +421,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         return [row for place, row in pairs if not self.table.isRowHidden(place)]
 
     def selected(self) -> list[EditedRow]:
-        """The rows that a person has chosen, from above."""
+        """Return the rows that a person has chosen, from above."""
         places = sorted({index.row() for index in self.table.selectionModel().selectedRows()})
         chosen = [self._rows[self._row_at[place]] for place in places if place in self._row_at]
         visible = self._visible()
@@ -480,7 +482,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             box.clearEditText()
 
     def fill_down(self) -> None:
-        """All chosen rows get what the first of them has in the column of the current cell."""
+        """Copy the first chosen row's value in the current column to all chosen rows."""
         rows, column = self.selected(), _CELLS.get(self.table.currentColumn(), "category")
         if rows:
             self._set(rows[1:], column, getattr(rows[0], column))
@@ -545,7 +547,7 @@ def _button_text(row: EditedRow) -> str:
 
 
 def _flags(row: EditedRow, column: int) -> Any:
-    """What a person can do with a cell."""
+    """Return what a person can do with a cell."""
     flag = QtCore.Qt.ItemFlag
     flags = flag.ItemIsEnabled | flag.ItemIsSelectable
     is_supply = column in (SUPPLIER, SUPPLIER_NUMBER)

@@ -42,7 +42,7 @@ APART = "apart"
 
 
 def section_words() -> dict[str, str]:
-    """The sections of the dialog for people."""
+    """Return the sections of the dialog for people."""
     return {
         "": translate("Silo", "Components"),
         "standard": translate("Silo", "Standard parts"),
@@ -53,7 +53,7 @@ def section_words() -> dict[str, str]:
 
 
 def type_words() -> dict[str, str]:
-    """Item types for people."""
+    """Return item types for people."""
     return {
         "part": translate("Silo", "Part"),
         "assembly": translate("Silo", "Assembly"),
@@ -63,7 +63,7 @@ def type_words() -> dict[str, str]:
 
 
 def source_words() -> dict[str, str]:
-    """Where a part comes from, for people."""
+    """Return where a part comes from, for people."""
     return {
         "manufactured": translate("Silo", "made here"),
         "purchased": translate("Silo", "bought"),
@@ -81,7 +81,7 @@ class Filter(StrEnum):
 
 
 def filter_words() -> dict[Filter, str]:
-    """The filters for people."""
+    """Return the filters for people."""
     return {
         Filter.ALL: translate("Silo", "all rows"),
         Filter.UNSURE: translate("Silo", "unsure"),
@@ -91,7 +91,7 @@ def filter_words() -> dict[Filter, str]:
 
 
 def state_words() -> dict[ComponentState, str]:
-    """The states for people."""
+    """Return the states for people."""
     return {
         ComponentState.READY: "",
         ComponentState.EDITED: translate("Silo", "its unsaved edits are saved too"),
@@ -139,7 +139,7 @@ class EditedRow:
 
     @classmethod
     def of(cls, candidate: Candidate, file: str = "") -> EditedRow:
-        """A row as it is offered."""
+        """Return a row as it is offered."""
         return cls(
             candidate,
             **{name: getattr(candidate.proposal, name) for name in CHOSEN},
@@ -150,54 +150,56 @@ class EditedRow:
 
     @property
     def section(self) -> str:
-        """The section that the row stands in, a key of :func:`section_words`."""
+        """Return the section that the row stands in, a key of :func:`section_words`."""
         if (article := self.candidate.article) is not None:
             return "no part" if article.no_part else "declared" if article.declared else "modelled"
         return "standard" if self.candidate.entry.is_standard else ""
 
     @property
     def finished(self) -> bool:
-        """True where it has its number."""
+        """Return True if it has its number."""
         return self.result is not None and self.result.error is None
 
     @property
     def editable(self) -> bool:
-        """True while something can still be chosen."""
+        """Return True while something can still be chosen."""
         usable = self.candidate.state.usable and not self.candidate.decided
         return usable and not self.finished and not self.running
 
     @property
     def can_undeclare(self) -> bool:
-        """True if it is modelled in the file and the decision about it can be taken back."""
+        """Return True if it is modelled in the file and the decision about it can be taken back."""
         return self.candidate.decided and self.candidate.state.usable and not self.running
 
     @property
     def can_be_no_part(self) -> bool:
-        """True where a person can say that it is no part."""
+        """Return True if a person can say that it is no part."""
         return self.section == "modelled" and self.editable
 
     @property
     def can_choose(self) -> bool:
-        """True while its number can be chosen; a copied identity can be kept without writing to the file."""
+        """Return True while its number can be chosen; a copied identity can be kept without writing to the
+        file.
+        """
         return self.editable or (bool(self.candidate.same_as) and not self.finished and not self.running)
 
     @property
     def can_register(self) -> bool:
-        """True where pressing Register gives it a number."""
+        """Return True if pressing Register gives it a number."""
         return self.editable and bool(self.name.strip()) and self.number not in (SAME, ASK)
 
     @property
     def can_keep(self) -> bool:
-        """True where pressing the button keeps the identity that it has."""
+        """Return True if pressing the button keeps the identity that it has."""
         return self.can_choose and self.number == SAME
 
     def keep(self) -> None:
-        """It stays what it is."""
+        """Leave the row as it is."""
         self.result = Registration(self.candidate.proposal, part_number=self.candidate.same_as)
         self.checked = False
 
     def order(self) -> Order:
-        """The row as an order for the worker."""
+        """Return the row as an order for the worker."""
         existing = next((s for s in self.candidate.similar if s.part_number == self.number), None)
         chosen = {name: getattr(self, name).strip() for name in CHOSEN}
         if self.sourcing != "purchased":
@@ -205,7 +207,7 @@ class EditedRow:
         return Order(self.candidate, existing=existing, apart=self.number == APART, **chosen)
 
     def fits(self, only: Filter, words: str) -> bool:
-        """True where a filter shows the row, and all of these words are in it."""
+        """Return True if a filter shows the row, and all of these words are in it."""
         text = f"{self.component()} {self.name} {self.category} {self.supplier} {self.note()[0]}".casefold()
         similar = bool(self.candidate.similar or self.candidate.twin or self.candidate.same_as)
         shown = {
@@ -218,14 +220,14 @@ class EditedRow:
 
     @property
     def guesses(self) -> bool:
-        """True while its category is one that nobody has looked at."""
+        """Return True while its category is one that nobody has looked at."""
         same = self.category == self.candidate.proposal.category
         return (
             self.candidate.proposal.is_guess and same and not (self.checked or self.finished or self.running)
         )
 
     def component(self) -> str:
-        """Which component this is."""
+        """Return which component this is."""
         return self._component
 
     @cached_property
@@ -240,7 +242,9 @@ class EditedRow:
         return plain(f"{self.file} · {entry.label}" if self.candidate.shares_file else self.file, 80)
 
     def number_text(self, numbers: Mapping[str, str], taken: int) -> str:
-        """The number that it has, or would get; ``taken`` rows before it want one of the same category."""
+        """Return the number that it has, or would get; ``taken`` rows before it want one of the same
+        category.
+        """
         if self.finished and self.result is not None:
             return self.result.part_number or ""
         if self.number == SAME:
@@ -262,7 +266,7 @@ class EditedRow:
         return text.replace("{number}", following)
 
     def choices(self) -> dict[str, str]:
-        """What can be chosen as its number."""
+        """Return what can be chosen as its number."""
         result = {}
         if self.candidate.same_as:
             result[SAME] = translate("Silo", "same part: keep {number}", number=self.candidate.same_as)
@@ -277,7 +281,7 @@ class EditedRow:
         return result
 
     def note(self) -> tuple[str, Tone]:
-        """The last column: what happened, what is in the way, or what to look at."""
+        """Return the last column: what happened, what is in the way, or what to look at."""
         if self.result is not None and self.result.error is not None:
             return plain(str(self.result.error), 300), Tone.ERROR
         if self.finished:
@@ -338,7 +342,7 @@ def _similar_words(similar: Similar) -> str:
 
 
 def group(rows: Sequence[EditedRow], row: EditedRow) -> list[EditedRow]:
-    """The rows that carry the same identity as this one, itself among them."""
+    """Return the rows that carry the same identity as this one, itself among them."""
     if not row.candidate.same_as:
         return [row]
     return [other for other in rows if other.candidate.same_as == row.candidate.same_as]
@@ -376,7 +380,9 @@ def set_all(rows: Iterable[EditedRow], column: str, value: str, categories: Mapp
 
 
 def grouped(candidates: Iterable[Candidate]) -> list[Candidate]:
-    """Components by folder, in the order of their first ones, the assembly's folder last; then the others."""
+    """Return components by folder, in the order of their first ones, the assembly's folder last; then the
+    others.
+    """
     plain_ones = [candidate for candidate in candidates if _folder_of(candidate)]
     folders = list(dict.fromkeys(_folder_of(candidate) for candidate in plain_ones))
     if plain_ones:
@@ -392,7 +398,9 @@ def _folder_of(candidate: Candidate) -> str:
 
 
 def headings(rows: Sequence[EditedRow]) -> list[str]:
-    """The heading that each row stands under; components have that of their folder if there are several."""
+    """Return the heading that each row stands under; components have that of their folder if there are
+    several.
+    """
     folders = {_folder_of(row.candidate) for row in rows} - {""}
     words = section_words()
     base = os.path.dirname(os.path.commonpath(folders)) if folders else ""
@@ -415,7 +423,7 @@ def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> Non
 
 
 def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]:
-    """The number column of all rows."""
+    """Return the number column of all rows."""
     taken: dict[str, int] = {}
     texts = []
     for row in rows:
@@ -426,7 +434,9 @@ def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]
 
 
 def notices(offer: Offer) -> str:
-    """About the whole offer: mistakes in the site's rules, and that nobody looked for look-alikes."""
+    """Return the notices about the whole offer: mistakes in the site's rules, and that nobody looked for
+    look-alikes.
+    """
     value = [rules_text(getattr(offer.categories, "problem", ""), translate)]
     if offer.unsearched:
         value.append(
@@ -440,7 +450,7 @@ def notices(offer: Offer) -> str:
 
 
 def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
-    """What the dialog says above its rows; ``more`` of them do not fit in."""
+    """Return what the dialog says above its rows; ``more`` of them do not fit in."""
     components = [row for row in rows if row.candidate.article is None]
     if not components:
         return translate(
@@ -562,12 +572,12 @@ class RegisterFlow:
         self._open[taken.path] = self._desk.register_window(taken.label, taken.path, self, asks=asks)
 
     def closed(self, path: str) -> None:
-        """The dialog of this document is gone."""
+        """Forget the closed dialog of this document."""
         self._open.pop(path, None)
         self._last.pop(path, None)
 
     def ask_again(self, on: bool) -> None:
-        """Whether a person wants to be asked after each commit."""
+        """Set if a person wants to be asked after each commit."""
         self._preferences.set("AskRegister", on)
 
     def _with_dialog(self, path: str, call: Callable[[RegisterWindow], None]) -> None:
@@ -601,7 +611,7 @@ class RegisterFlow:
         self._save_parents(clean, lambda: self._send(path, [row.candidate]))
 
     def same(self, rows: Sequence[EditedRow]) -> None:
-        """The person leaves these as they are: files that are one part on purpose."""
+        """Accept that these files are one part on purpose."""
         files: dict[str, list[str]] = {}
         for row in rows:
             if identity := row.candidate.entry.silo_uuid:
@@ -653,7 +663,7 @@ class RegisterFlow:
         self._session.ask(translate("Silo", "Registering"), run, done=finished, failed=failed)
 
     def can_take_back(self, path: str) -> bool:
-        """True where the last press of Register did something that can be undone."""
+        """Return True if the last press of Register did something that can be undone."""
         return any(not order.candidate.entry.is_standard for order, _ in self._last.get(path, ()))
 
     def take_back(self, path: str) -> None:
@@ -733,7 +743,7 @@ class RegisterFlow:
 
 
 def whole(taken: Snapshot) -> Extraction:
-    """The extraction of a snapshot; for a part, one that holds nothing but the part."""
+    """Return the extraction of a snapshot; for a part, one that holds nothing but the part."""
     if taken.extraction is not None:
         return taken.extraction
     label = taken.label or os.path.basename(taken.path)

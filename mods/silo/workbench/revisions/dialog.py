@@ -39,7 +39,7 @@ _DATA = QtCore.Qt.ItemDataRole.UserRole
 
 
 def revision_texts(revision: Revision) -> list[str]:
-    """Number, time, who, comment."""
+    """Return number, time, who, comment."""
     when = revision.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if revision.created_at else ""
     return [
         str(revision.revision_number),
@@ -94,7 +94,7 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         self.more.hide()
 
     def _finish(self, *actions: Any) -> None:
-        """The lower end of the window."""
+        """Build the lower end of the window."""
         for action in actions:
             action.setEnabled(False)
         close = widgets.button(translate("Silo", "Close"), "close", self.reject)
@@ -103,7 +103,7 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         self._layout.addLayout(widgets.line(None, *actions, close))
 
     def _first(self, lines: Sequence[str], most: int) -> Sequence[str]:
-        """The first lines; a button shows all of them."""
+        """Return the first lines; a button shows all of them."""
         self._all = lines
         self.more.setText(more_text(len(lines) - most))
         self.more.setVisible(len(lines) > most)
@@ -113,16 +113,16 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         self._closed = True
 
     def _alive(self, call: Callable[[Any], None]) -> Callable[[Any], None]:
-        """An answer that comes after the window was closed is nobody's."""
+        """Return True while the window is open: an answer that comes later is dropped."""
         return lambda result: None if self._closed else call(result)
 
     def say(self, text: str, tone: Tone = Tone.QUIET) -> None:
-        """The line of news."""
+        """Show a line of news."""
         self.news.setText(text)
         widgets.paint(self.news, tone)
 
     def fail(self, error: SiloError) -> None:
-        """What went wrong."""
+        """Show what went wrong."""
         self.say(str(error), Tone.ERROR)
 
     def fetch(self, part_number: str, revision: int | None, folder: Path) -> None:
@@ -245,7 +245,7 @@ class OpenDialog(_Window):
         return str(row.data(0, _DATA)) if row is not None else ""
 
     def _offer_newest(self, folder: str, here: str) -> None:
-        """A press fetches what is newer, with all that it links to."""
+        """Offer to fetch what is newer, with all that it links to."""
         number = self._number()
         self.newest.setVisible(True)
         self._newest = lambda: self.fetch(number, None, Path(folder).expanduser())
@@ -519,6 +519,6 @@ def mark_in_tree(states: Mapping[str, tuple[str, Tone]]) -> None:
 
 
 def ask_folder(parent: Any, start: str) -> str:
-    """The folder that a person chose; "" where none was chosen."""
+    """Return the folder that a person chose; "" if none was chosen."""
     title = translate("Silo", "Choose a folder")
     return str(QtWidgets.QFileDialog.getExistingDirectory(parent, title, start))

@@ -36,7 +36,9 @@ _was_on = False
 
 @contextmanager
 def collection_off() -> Iterator[None]:
-    """No automatic collection inside, in any thread. May be nested, and held by several threads at once."""
+    """Switch automatic collection off inside, in any thread. May be nested, and held by several threads at
+    once.
+    """
     global _holding, _was_on
     with _lock:
         if _holding == 0:
@@ -157,7 +159,7 @@ class Worker:
                 self._current[1].cancelled.set()
 
     def left(self, seconds: float = 0.0) -> int:
-        """How many jobs run or wait, after at most so many seconds for them to become none."""
+        """Return how many jobs run or wait, after at most so many seconds for them to become none."""
         with self._change:
             self._change.wait_for(lambda: self._current is None and not self._waiting, seconds)
             return len(self._waiting) + (self._current is not None)
@@ -177,7 +179,7 @@ class Worker:
 
     @property
     def idle(self) -> bool:
-        """True where nothing runs and nothing waits, and the end of each job was handed to ``deliver``."""
+        """Return True if nothing runs and nothing waits, and the end of each job was handed to ``deliver``."""
         return not self.left()
 
     def _next(self) -> tuple[Job, Control] | None:
@@ -225,7 +227,7 @@ class Worker:
 
 
 def in_gui(deliver: Deliver, call: Callable[[], Any], control: Control) -> Any:
-    """For a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
+    """Run for a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
     from silo.bom.errors import SiloError
 
     finished = threading.Event()

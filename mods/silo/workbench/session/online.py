@@ -57,7 +57,7 @@ class Online:
 
     @property
     def client(self) -> SiloClient:
-        """The client; :class:`ConfigError` where no server is configured."""
+        """Return the client; :class:`ConfigError` if no server is configured."""
         if self._client is None:
             raise ConfigError(
                 translate("Silo", "No Silo server is set up yet. Enter its address in the Silo preferences.")
@@ -66,7 +66,7 @@ class Online:
 
     @property
     def address(self) -> str:
-        """The server in use; "" where none is configured."""
+        """Return the server in use; "" if none is configured."""
         return self._client.base_url if self._client is not None else ""
 
     def another(self) -> SiloClient:
@@ -107,7 +107,7 @@ class Online:
         _ = self.client
 
     def pause(self) -> Pause | None:
-        """Why nothing is sent to the server now; None where nothing keeps it."""
+        """Return why nothing is sent to the server now; None if nothing keeps it."""
         pause = self._outbox.pause(self.address) if self.address else None
         return pause if pause is not None and pause.left(self._outbox.clock()) else None
 
@@ -203,7 +203,7 @@ def _client(server: Server) -> SiloClient:
 
 
 def file_server() -> object | None:
-    """The server in the configuration file of the command line; None where there is none."""
+    """Return the server in the configuration file of the command line; None if there is none."""
     # The environment is looked at before; here it is only asked where the file is.
     env = {name: value for name, value in os.environ.items() if not name.startswith("SILO_")}
     try:
@@ -225,7 +225,7 @@ class LastIds:
         self._due = 0.0
 
     def get(self, url: str) -> str | None:
-        """Where to resume; None for a server that was never listened to."""
+        """Return where to resume; None for a server that was never listened to."""
         return self._known.get(url)
 
     def set(self, url: str, event_id: str) -> None:

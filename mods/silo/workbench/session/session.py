@@ -111,7 +111,7 @@ class Colleagues:
         self._unsure: dict[str, Newer] = {}
 
     def sending(self, identity: str) -> None:
-        """A commit of this item is on its way to the server."""
+        """Note that a commit of this item is on its way to the server."""
         self._going.add(identity.lower())
 
     def forget_own(self) -> None:
@@ -119,7 +119,7 @@ class Colleagues:
         self._mine.clear()
 
     def gone(self, seen: Mapping[str, Newer], identities: Iterable[str]) -> None:
-        """The server has nothing newer of these items; what was announced after ``seen`` stays."""
+        """Note that the server has nothing newer of these items; what was announced after ``seen`` stays."""
         stale = {
             identity
             for identity in map(str.lower, identities)
@@ -128,7 +128,7 @@ class Colleagues:
         self.newer = {key: identity for key, identity in self.newer.items() if key not in stale}
 
     def heard(self, identity: str, newer: Newer) -> None:
-        """The server announced a commit."""
+        """Note that the server announced a commit."""
         if newer.revision <= self._mine.get(identity, 0):
             return  # Ours, or one that ours was made from or sent on top of.
         if identity in self._going:
@@ -137,7 +137,7 @@ class Colleagues:
             self.newer = {**self.newer, identity: newer}
 
     def arrived(self, identity: str, revision: int) -> None:
-        """The server has our commit of an item, as this revision."""
+        """Note that the server has our commit of an item, as this revision."""
         identity = identity.lower()
         self._mine[identity] = max(revision, self._mine.get(identity, 0))
         newer = self.newer.get(identity)
@@ -145,8 +145,9 @@ class Colleagues:
             self.newer = {key: each_newer for key, each_newer in self.newer.items() if key != identity}
 
     def sent(self, still_going: Iterable[str]) -> None:
-        """A run of sending has ended. What was announced meanwhile and is not ours is a colleague's. Of
-        ``still_going`` something is still on its way."""
+        """Note that a run of sending has ended. What was announced meanwhile and is not ours is a
+        colleague's. Of ``still_going`` something is still on its way.
+        """
         unsure, self._unsure, self._going = self._unsure, {}, set()
         for identity, newer in unsure.items():
             self.heard(identity, newer)
@@ -222,7 +223,7 @@ class Session:
         return self.outbox.entries(), self._online.pause() if self._online is not None else None
 
     def _need_online(self) -> Online:
-        """Made in the worker: its import is what would hold up FreeCAD's start."""
+        """Make it in the worker, because its import would hold up FreeCAD's start."""
         if self._online is None:
             from silo.workbench.session.online import Online
 
@@ -342,7 +343,7 @@ class Session:
         self._show(newer=self._colleagues.newer)
 
     def _look_again(self) -> None:
-        """After a restore of the server, a colleague's commit that was announced may be gone."""
+        """Look after a restore of the server if an announced commit of a colleague is gone."""
         if seen := self.shown.newer:
             from silo.workbench.commit.flow import gone  # late, as all that a start does not need
 
@@ -355,7 +356,7 @@ class Session:
             )
 
     def no_news(self, seen: Mapping[str, Newer], identities: Iterable[str]) -> None:
-        """The server has nothing newer of these items; ``seen``: what was shown when it was asked."""
+        """Note that the server has nothing newer of these items; ``seen``: what was shown when it was asked."""
         self._colleagues.gone(seen, identities)
         self._show(newer=self._colleagues.newer)
 
@@ -391,7 +392,7 @@ class Session:
         self._models.submit(Job(title, run, done=done))
 
     def tick(self) -> None:
-        """Called now and then: what waits is tried again when its time has come."""
+        """Try what waits again when its time has come; a timer calls this."""
         # A log-in by the command line ends the pause of a wrong token.
         is_refused = self.shown.connection == "refused"
         if (self.shown.waiting or self._owed or is_refused) and self._net.idle:
@@ -499,13 +500,14 @@ class Session:
         self._looks.submit(Job("Reading files", lambda _control: work()))
 
     def newer_than(self, identity: str, since: float) -> Newer | None:
-        """What a colleague has committed of an item since then (:func:`time.monotonic`), as far as the server
-        announced it."""
+        """Return what a colleague has committed of an item since then (:func:`time.monotonic`), as far as the
+        server announced it.
+        """
         newer = self.shown.newer.get(identity.lower())
         return newer if newer is not None and newer.at > since else None
 
     def in_gui(self, call: Callable[[], Any], control: Control) -> Any:
-        """For a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
+        """Run for a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
         return in_gui(self._deliver, call, control)
 
     def cancel(self) -> None:
@@ -513,7 +515,8 @@ class Session:
         self._net.cancel()
 
     def close(self, wait: Callable[[Callable[[float], int]], object] = lambda left: left(60.0)) -> None:
-        """FreeCAD ends: wait for the disk, never for the network. What is not sent waits for the next time.
+        """Close when FreeCAD ends: wait for the disk, never for the network. What is not sent waits for the
+        next time.
 
         wait
             is given a function that waits for so many seconds and returns how much the disk still has to
@@ -533,7 +536,7 @@ class Session:
 
     @property
     def idle(self) -> bool:
-        """True where no worker has anything to do."""
+        """Return True if no worker has anything to do."""
         return self._rows.idle and self._disk.idle and self._net.idle
 
     # -- what is shown ----------------------------------------------------------------------------------
@@ -543,7 +546,7 @@ class Session:
         self._show(activity=self.shown.activity.add(entry))
 
     def answered(self, is_answered: Callable[[Action], bool]) -> None:
-        """Questions of the boxes have their answer (:meth:`Entry.without_questions`)."""
+        """Note that questions of the boxes have their answer (:meth:`Entry.without_questions`)."""
         self._show(activity=self.shown.activity.answered(is_answered))
 
     def _busy(self, busy: Busy | None) -> None:

@@ -57,11 +57,11 @@ class Preferences:
         self._group = group
 
     def text(self, name: str) -> str:
-        """A text setting."""
+        """Return a text setting."""
         return self._group.GetString(name, str(_default(name, str)))
 
     def flag(self, name: str) -> bool:
-        """A yes/no setting."""
+        """Return a yes/no setting."""
         return self._group.GetBool(name, bool(_default(name, bool)))
 
     def set(self, name: str, value: str | bool) -> None:

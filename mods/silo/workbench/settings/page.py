@@ -328,7 +328,7 @@ _open: list[Any] = []
 
 
 def stub_commands(missing: Sequence[str]) -> dict[str, Command]:
-    """The one command that works without packages."""
+    """Return the one command that works without packages."""
 
     return {
         INSTALL: Command(

@@ -41,7 +41,7 @@ class Keyring:
         self._module = module
 
     def name(self) -> str:
-        """What the keyring calls itself; "" where there is none that can be trusted."""
+        """Return what the keyring calls itself; "" if there is none that can be trusted."""
         module = self._load()
         if module is None:
             return ""
@@ -56,7 +56,7 @@ class Keyring:
         return str(getattr(backend, "name", "") or type(backend).__name__)
 
     def get(self, url: str) -> str:
-        """The token kept for a server; "" where there is none."""
+        """Return the token kept for a server; "" if there is none."""
         if not self.name():
             return ""
         try:
@@ -114,7 +114,7 @@ class Server:
 
     @property
     def configured(self) -> bool:
-        """True where there is a server to talk to."""
+        """Return True if there is a server to talk to."""
         return bool(self.url)
 
 
@@ -134,7 +134,7 @@ class ServerPreferences:
 
 
 def read_known(preferences: Preferences) -> ServerPreferences:
-    """The server settings of the preference page."""
+    """Return the server settings of the preference page."""
     certificate = preferences.text("SslCertPath").strip()
     verify: bool | str = certificate or True
     return ServerPreferences(
@@ -150,7 +150,7 @@ def choose_server(
     env: Mapping[str, str] = os.environ,
     file_server: Any = None,
 ) -> Server:
-    """The server to use.
+    """Return the server to use.
 
     file_server
         what :func:`silo.api.config.resolve_server` found in the configuration file (``url``, ``token``,
@@ -184,7 +184,7 @@ def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
 
 
 def look(preferences: ServerPreferences, keyring: Keyring) -> tuple[Server, str]:
-    """The server in use, and the keyring's name ("" for none). Worker: a keyring may take its time."""
+    """Return the server in use, and the keyring's name ("" for none). Worker: a keyring may take its time."""
     from silo.workbench.session.online import file_server
 
     return choose_server(preferences, keyring, file_server=file_server()), keyring.name()
@@ -238,7 +238,7 @@ def begin_login(wanted: ServerPreferences, preferences: ServerPreferences) -> Br
 
 
 def is_let_in(login: BrowserLogin, wanted: ServerPreferences, preferences: ServerPreferences) -> bool:
-    """True once the user has let FreeCAD in. Worker."""
+    """Return True once the user has let FreeCAD in. Worker."""
     from silo.api.client import SiloClient
 
     with SiloClient(wanted.url or preferences.url, login.token, verify=wanted.verify) as client:
@@ -250,7 +250,7 @@ def is_let_in(login: BrowserLogin, wanted: ServerPreferences, preferences: Serve
 
 
 def in_use(server: Server, env: Mapping[str, str]) -> str:
-    """Which server and token are in use, and where they come from."""
+    """Return which server and token are in use, and where they come from."""
     if not server.configured:
         return translate("Silo", "No server is set up. To try it out, run: silo-mod serve")
     where = translate("Silo", "In use: {url} ({from}).", url=plain(server.url, 100))

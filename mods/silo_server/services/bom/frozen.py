@@ -119,7 +119,7 @@ def _record(
 
 
 def _files(tx: Tx, items: Mapping[int, Item]) -> dict[int, dict[str, dict[str, Any]]]:
-    """By item and document: the newest files that the item is in, and all that these link to."""
+    """Return by item and document the newest files that the item is in, and all that these link to."""
     row = document_items.c
     query = select(row.item_id, row.document_id).where(one_of(tx, row.item_id, items.keys()))
     holding: dict[int, set[int]] = {item_id: set() for item_id in items}
@@ -256,7 +256,7 @@ Records = Mapping[str, Mapping[str, Any]]
 
 
 def _differences(root: str, before: Records, after: Records) -> Iterator[Happened]:
-    """What differs between two products, as records by the UUID of their item."""
+    """Yield what differs between two products, as records by the UUID of their item."""
     sides = (before, after)
     owned = [_own_files(side) for side in sides]
     for uuid in before.keys() & after.keys():
@@ -287,7 +287,7 @@ def _in_all(made: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _past(made: Mapping[str, Any], side: Records) -> list[PastLine]:
-    """The lines of a record, each under its part and relation, of which a BOM has one."""
+    """Return the lines of a record, each under its part and relation, of which a BOM has one."""
     return [
         PastLine(
             f"{line['item']} {line['state'].get('rel_type')}",
@@ -300,7 +300,7 @@ def _past(made: Mapping[str, Any], side: Records) -> list[PastLine]:
 
 
 def _own_files(side: Records) -> dict[str, list[Mapping[str, Any]]]:
-    """Of each item the files that are not those of a part in it."""
+    """Return for each item the files that are not those of a part in it."""
     files = {}
     for uuid, made in side.items():
         below = {

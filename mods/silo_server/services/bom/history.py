@@ -94,14 +94,14 @@ class Difference:
 def list_changes(
     tx: Tx, parent: Item, limit: int = 50, before: int | None = None, after: int | None = None
 ) -> list[Change]:
-    """The BOM's changes, newest first; ``before`` and ``after`` are change ids to page on and back."""
+    """Return the BOM's changes, newest first; ``before`` and ``after`` are change ids to page on and back."""
     return _changes(tx, [bom_changes.c.parent_id == parent.id], limit, before, after)
 
 
 def lines_of_changes(
     tx: Tx, change_ids: Collection[int], most: int = 2**31 - 1
 ) -> dict[int, list[ChangedLine]]:
-    """The first ``most`` lines of each of these changes, in one question."""
+    """Return the first ``most`` lines of each of these changes, in one question."""
     place = func.row_number().over(
         partition_by=bom_change_lines.c.change_id, order_by=bom_change_lines.c.position
     )
@@ -120,7 +120,7 @@ def lines_of_changes(
 
 
 def get_change(tx: Tx, parent: Item, change_id: int) -> tuple[Change, list[ChangedLine]]:
-    """One change with its lines; NotFoundError where this BOM has no such change."""
+    """Return one change with its lines; NotFoundError if this BOM has no such change."""
     changes = _changes(tx, [bom_changes.c.parent_id == parent.id, bom_changes.c.id == change_id], 1)
     if not changes:
         raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
@@ -130,7 +130,9 @@ def get_change(tx: Tx, parent: Item, change_id: int) -> tuple[Change, list[Chang
 def stories(
     tx: Tx, parent: Item, line_ids: Collection[str], after: int = 0
 ) -> dict[str, list[tuple[Change, ChangedLine]]]:
-    """What happened to these lines after change ``after``, newest first; lines without a story are absent."""
+    """Return what happened to these lines after change ``after``, newest first; lines without a story are
+    absent.
+    """
     if not line_ids:
         return {}
     rows = tx.conn.execute(
@@ -154,13 +156,15 @@ def stories(
 
 
 def last_merge(tx: Tx, parent: Item) -> Change | None:
-    """The newest merge, None where there was none."""
+    """Return the newest merge, None if there was none."""
     conditions = [bom_changes.c.parent_id == parent.id, bom_changes.c.kind == ChangeKind.MERGE.value]
     return next(iter(_changes(tx, conditions, 1)), None)
 
 
 def change_at(tx: Tx, parent: Item, when: str) -> int:
-    """The change that made the BOM what it was at ``when`` (as stored: ISO 8601, UTC); 0 before the first."""
+    """Return the change that made the BOM what it was at ``when`` (as stored: ISO 8601, UTC); 0 before the
+    first.
+    """
     value = tx.conn.scalar(
         select(func.max(bom_changes.c.id)).where(
             bom_changes.c.parent_id == parent.id, bom_changes.c.at <= when
@@ -170,7 +174,7 @@ def change_at(tx: Tx, parent: Item, when: str) -> int:
 
 
 def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
-    """The BOM as change ``change_id`` left it; NotFoundError where this BOM has no such change."""
+    """Return the BOM as change ``change_id`` left it; NotFoundError if this BOM has no such change."""
     if change_id != 0:
         get_own_change(tx, parent, change_id)
     newest = (
@@ -197,7 +201,7 @@ def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
 
 
 def get_own_change(tx: Tx, parent: Item, change_id: int) -> int:
-    """``change_id`` where it is a change of this BOM; NotFoundError otherwise."""
+    """Return ``change_id`` where it is a change of this BOM; NotFoundError otherwise."""
     owner = tx.conn.scalar(select(bom_changes.c.parent_id).where(bom_changes.c.id == change_id))
     if owner != parent.id:
         raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
@@ -205,7 +209,7 @@ def get_own_change(tx: Tx, parent: Item, change_id: int) -> int:
 
 
 def compare(before: Sequence[PastLine], after: Sequence[PastLine]) -> list[Difference]:
-    """Two states side by side, in the order of the later one, what is gone last; pure."""
+    """Compare two states side by side, in the order of the later one, what is gone last; pure."""
     old = {line.line_id: line.state for line in before}
     new = {line.line_id for line in after}
     rows = [_difference(line.child, old.get(line.line_id), line.state) for line in after]
@@ -339,7 +343,9 @@ def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
 
 
 def what_changed(tx: Tx, root: Item, since: str, until: str) -> list[Happened]:
-    """What differs in a product between two times, by item; what was added or removed is not looked into."""
+    """Return what differs in a product between two times, by item; what was added or removed is not looked
+    into.
+    """
     since, until = sorted((since, until))
     walked = _Walked(tx, since, until)
     happenings: list[Happened] = []
@@ -356,7 +362,7 @@ def what_changed(tx: Tx, root: Item, since: str, until: str) -> list[Happened]:
 
 
 def in_order(happenings: Iterable[Happened]) -> list[Happened]:
-    """By BOM or item."""
+    """Sort by BOM or item."""
     return sorted(
         happenings, key=lambda change: (change.within or change.part_number, change.part_number, change.what)
     )
@@ -372,7 +378,7 @@ class _Walked:
         self.changed: dict[int, tuple[str, str]] = {}
 
     def reached(self, root: int, side: int) -> set[int]:
-        """All items that the product has at the one time (0) or the other (1)."""
+        """Return all items that the product has at the one time (0) or the other (1)."""
         seen, level = {root}, {root}
         while level:
             self._load(level - self._children.keys())

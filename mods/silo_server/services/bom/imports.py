@@ -141,7 +141,8 @@ class Layout:
 
 
 def read_csv(data: bytes, max_rows: int, layout: Layout | None = None, of: Table = BOM) -> list[Record]:
-    """The rows that say anything; RejectedError if it is no such table, TooLargeError beyond ``max_rows``.
+    """Return the rows that say anything; RejectedError if it is no such table, TooLargeError beyond
+    ``max_rows``.
 
     Needs no database: to be called before a transaction begins, which others would wait for.
     """
@@ -177,7 +178,7 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None, of: Table
 
 
 def _designated(cell: str) -> int:
-    """How many places reference designators name: three in ``R1, R3-R4``."""
+    """Return how many places reference designators name: three in ``R1, R3-R4``."""
     spans = [(designator, _RANGE.fullmatch(designator)) for designator in designators(cell)]
     return sum(
         max(1, int(span[4]) - int(span[2]) + 1) if span and span[3] in ("", span[1]) else 1
@@ -227,7 +228,9 @@ def _sheet_text(grid: workbook.Grid) -> bytes:
 
 
 def first_lines(data: bytes, delimiter: str, count: int = 8) -> list[list[str]]:
-    """The first lines of a file as cells, as far as they can be read; for a person to say what each is."""
+    """Return the first lines of a file as cells, as far as they can be read; for a person to say what each
+    is.
+    """
     lines: list[list[str]] = []
     with suppress(csv.Error):
         lines.extend(row[:MAX_COLUMNS] for row in islice(_rows(_decode(data), delimiter), count))
@@ -235,13 +238,15 @@ def first_lines(data: bytes, delimiter: str, count: int = 8) -> list[list[str]]:
 
 
 def likely_delimiter(data: bytes) -> str:
-    """The separator that makes the most columns of the first lines."""
+    """Return the separator that makes the most columns of the first lines."""
     widths = {mark: max(map(len, first_lines(data, mark)), default=0) for mark in DELIMITERS}
     return max(widths, key=lambda mark: widths[mark])
 
 
 def guess(text: str, of: Table = BOM) -> Layout:
-    """Header and columns by the delimiter with which there is a header; RejectedError where there is none."""
+    """Return header and columns by the delimiter with which there is a header; RejectedError if there is
+    none.
+    """
     broken: csv.Error | None = None
     near = ""
     for delimiter in DELIMITERS:
@@ -268,7 +273,7 @@ def guess(text: str, of: Table = BOM) -> Layout:
 
 
 def guess_of(data: bytes, of: Table = BOM) -> Layout | None:
-    """As :func:`guess`, None where there is no header that we know."""
+    """Guess as :func:`guess`; None if there is no header that we know."""
     try:
         return guess(_decode(data), of)
     except RejectedError:
@@ -276,7 +281,7 @@ def guess_of(data: bytes, of: Table = BOM) -> Layout | None:
 
 
 def _refuse_flat(header: Sequence[str], body: Sequence[Sequence[str]], part_number: int) -> None:
-    """Our flat export has totals over all levels; as the lines of one level they would be wrong."""
+    """Refuse our flat export: its totals over all levels would be wrong as the lines of one level."""
     source, total = _column(header, _SOURCE), _column(header, _TOTAL)
     lines = [cells for cells in body if _cell(cells, part_number)]
     if source is None or total is None or not lines:
@@ -291,7 +296,7 @@ def _refuse_flat(header: Sequence[str], body: Sequence[Sequence[str]], part_numb
 def _refuse_clashes(
     header: Sequence[str], body: Sequence[Sequence[str]], layout: Layout, single: Sequence[Role]
 ) -> None:
-    """Which of two columns counts is a person's to say, not the order of the file."""
+    """Refuse two columns of one role: a person says which one counts, not the order of the file."""
     header = header[:MAX_COLUMNS]
     seconds = second_columns(header, single, layout.columns)
     problems = [
@@ -312,7 +317,7 @@ def _cell(cells: Sequence[str], index: int | None) -> str:
 
 
 def _with_exact_quantities(records: list[Record], layout: Layout) -> list[Record]:
-    """Quantities as plain numerals where they can be read; what is wrong with one stands beside it.
+    """Return quantities as plain numerals where they can be read; what is wrong with one stands beside it.
 
     The whole column decides what "1,234" means; in a file separated by commas, a point is a decimal point.
     """
@@ -394,15 +399,15 @@ class ImportPlan:
 
     @property
     def new(self) -> list[NewItem]:
-        """The parts that are made, each once."""
+        """Return the parts that are made, each once."""
         return [row.new for row in self.rows if row.new]
 
     def count(self, status: str) -> int:
-        """How many rows have this status."""
+        """Return how many rows have this status."""
         return sum(row.status == status for row in self.rows)
 
     def could(self, what: str) -> int:
-        """How many rows a person could allow."""
+        """Return how many rows a person could allow."""
         return sum(row.could == what for row in self.rows)
 
 
@@ -446,18 +451,18 @@ def plan_import(
 
 
 def _key(record: Mapping[str, str]) -> str:
-    """What the rows of one part share."""
+    """Return what the rows of one part share."""
     return (record.get("part_number") or f"\n{record.get('unknown')}").casefold()
 
 
 def _name_of(record: Mapping[str, str]) -> str:
-    """What a row calls its part: the name; or the value with the footprint, without KiCad's library."""
+    """Return what a row calls its part: the name; or the value with the footprint, without KiCad's library."""
     value = " ".join(filter(None, (record.get("value"), record.get("footprint", "").rpartition(":")[2])))
     return record.get("name") or (value if record.get("value") else record.get("description", ""))
 
 
 def _identified(tx: Tx, records: Iterable[Record]) -> Iterator[Record]:
-    """The rows with the numbers of the parts that they mean; ``unknown`` names a part that is not here."""
+    """Yield the rows with the numbers of the parts that they mean; ``unknown`` names a part that is not here."""
     nameless = [record for _, record in records if not record.get("part_number")]
     row, by_name, by_maker = items.c, dict[str, list[str]](), dict[str, list[str]]()
     query = select(row.name, row.part_number).where(row.archived_at.is_(None)).order_by(row.part_number_key)
@@ -490,7 +495,7 @@ _BESIDE = ("rel_type", "level", "unit", "child_revision", "not_fitted")
 
 
 def _added_up(records: Sequence[Record]) -> tuple[list[Record], dict[int, int]]:
-    """Rows of one part as the first of them; and by number of each other row, that of the first."""
+    """Return rows of one part as the first of them; and by number of each other row, that of the first."""
     first: dict[tuple[str, ...], tuple[int, dict[str, str]]] = {}
     made: list[Record] = []
     added: dict[int, int] = {}
@@ -608,7 +613,7 @@ def _plan_row(
 
 
 def _new_item(record: Mapping[str, str], category: str, problems: list[str]) -> NewItem:
-    """The part that a row speaks of; bought, if it says a maker, a supplier or a value."""
+    """Return the part that a row speaks of; bought, if it says a maker, a supplier or a value."""
     said = {role.value: record[role] for role in _BOUGHT if record.get(role)}
     bought = said or record.get("value")
     try:
@@ -627,7 +632,7 @@ def _new_item(record: Mapping[str, str], category: str, problems: list[str]) -> 
 
 
 def _as_written(before: LineState, field: str, value: Any) -> bool:
-    """True where a file says what the line says; it drops spaces at the ends, and parts designators."""
+    """Return True if a file says what the line says; it drops spaces at the ends, and parts designators."""
     value_before = getattr(before, field)
     if field == "reference_designators":
         return bool(designators(" ".join(value_before)) == value)

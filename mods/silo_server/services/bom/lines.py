@@ -38,7 +38,7 @@ STATE_COLUMNS = [
 
 
 def select_lines() -> Select[*tuple[Any, ...]]:
-    """The query that :func:`to_line` understands."""
+    """Return the query that :func:`to_line` understands."""
     return select(
         bom_lines.c.id,
         bom_lines.c.parent_id,
@@ -56,7 +56,7 @@ def select_lines() -> Select[*tuple[Any, ...]]:
 
 
 def to_line(row: Any, child: tuple[Any, ...] = ()) -> Line:
-    """A frozen line from a row of :func:`select_lines`; by position, which is what makes it quick.
+    """Return a frozen line from a row of :func:`select_lines`; by position, which is what makes it quick.
 
     ``child``: what another line says of the same child (:func:`child_of`).
     """
@@ -64,7 +64,7 @@ def to_line(row: Any, child: tuple[Any, ...] = ()) -> Line:
 
 
 def child_of(row: Any) -> tuple[Any, ...]:
-    """What a row of :func:`select_lines` says of its child."""
+    """Return what a row of :func:`select_lines` says of its child."""
     return (*row[4:10], row[10] is not None)
 
 
@@ -81,7 +81,7 @@ def _state(*columns: Any) -> LineState:
 
 
 def lines_of(tx: Tx, parent: Item) -> list[Line]:
-    """The parent's lines in their order."""
+    """Return the parent's lines in their order."""
     query = select_lines().where(bom_lines.c.parent_id == parent.id).order_by(bom_lines.c.position)
     return [to_line(row) for row in tx.conn.execute(query)]
 
@@ -91,7 +91,7 @@ MOST_LINES_AT_ONCE = 10_000
 
 
 def check_line_count(tx: Tx, parent_ids: Sequence[int]) -> None:
-    """TooLargeError if several BOMs, each as often as it is named, have more lines than one answer may."""
+    """Raise TooLargeError if several BOMs, each as often as it is named, have more lines than one answer may."""
     row = bom_lines.c.parent_id
     query = select(row, func.count()).where(one_of(tx, row, set(parent_ids))).group_by(row)
     counts: dict[int, int] = dict(tx.conn.execute(query).all())
@@ -102,7 +102,7 @@ def check_line_count(tx: Tx, parent_ids: Sequence[int]) -> None:
 
 
 def lines_of_many(tx: Tx, parent_ids: Collection[int]) -> dict[int, list[Line]]:
-    """The lines of all these parents, by parent, each in their order."""
+    """Return the lines of all these parents, by parent, each in their order."""
     query = (
         select_lines()
         .where(one_of(tx, bom_lines.c.parent_id, parent_ids))
@@ -122,7 +122,7 @@ class LineId:
 
 
 def line_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
-    """The line with this id, or the one line of this child.
+    """Return the line with this id, or the one line of this child.
 
     Raises NotFoundError where there is none, ConflictError where a child has several: somebody would reach
     the wrong one.
@@ -146,7 +146,7 @@ def line_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
 
 
 def component_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
-    """As :func:`line_of`; of several lines of a child the component, which is the one that CAD speaks of."""
+    """Find a line as :func:`line_of`; of several lines of a child the component, which CAD means."""
     lines = list(lines)
     if isinstance(which, str):
         key = which.casefold()
@@ -156,7 +156,7 @@ def component_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Li
 
 
 def state_to_json(state: LineState) -> dict[str, Any]:
-    """A line's state as history stores it; only what is set."""
+    """Return a line's state as history stores it; only what is set."""
     fields = ((name, getattr(state, name)) for name in names_of(LineState))
     return {
         name: value
@@ -166,7 +166,7 @@ def state_to_json(state: LineState) -> dict[str, Any]:
 
 
 def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
-    """What a person saw of a line, as a short mark: another state has another one.
+    """Return what a person saw of a line, as a short mark: another state has another one.
 
     cad_quantity
         what a conflict says beside the line.
@@ -176,7 +176,7 @@ def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
 
 
 def stored_state(text: str) -> LineState:
-    """The state that :func:`state_to_json` gave and history stored."""
+    """Return the state that :func:`state_to_json` gave and history stored."""
     values = dict(json.loads(text))
     if "reference_designators" in values:
         values["reference_designators"] = tuple(values["reference_designators"])
@@ -184,7 +184,7 @@ def stored_state(text: str) -> LineState:
 
 
 def state_columns(state: LineState) -> dict[str, Any]:
-    """A line's state as columns of the table."""
+    """Return a line's state as columns of the table."""
     return {name: getattr(state, name) for name in names_of(LineState)} | {
         "quantity": float(state.quantity),
         "reference_designators": dumps(list(state.reference_designators)),
@@ -193,7 +193,9 @@ def state_columns(state: LineState) -> dict[str, Any]:
 
 
 def line_to_wire(line: Line, parent_part_number: str) -> dict[str, Any]:
-    """A line as ``GET …/bom`` sends it: the contract's keys, and ours for overrides and newer revisions."""
+    """Return a line as ``GET …/bom`` sends it: the contract's keys, and ours for overrides and newer
+    revisions.
+    """
     return {
         "id": line.id,
         "parent_part_number": parent_part_number,
@@ -204,7 +206,7 @@ def line_to_wire(line: Line, parent_part_number: str) -> dict[str, Any]:
 
 
 def child_to_wire(line: Line) -> dict[str, Any]:
-    """What a line says of its child."""
+    """Return what a line says of its child."""
     return {
         "child_part_number": line.child_part_number,
         "child_id": line.child_uuid,
@@ -216,12 +218,12 @@ def child_to_wire(line: Line) -> dict[str, Any]:
 
 
 def line_state_to_wire(state: LineState) -> dict[str, Any]:
-    """What a line says of itself."""
+    """Return what a line says of itself."""
     return to_wire(state) | {"quantity": plain(state.quantity), "cad_quantity": plain(state.cad_quantity)}
 
 
 def revisions_to_wire(line: Line) -> dict[str, Any]:
-    """Which revision of the child is meant, and whether there is a newer one."""
+    """Return which revision of the child is meant, and whether there is a newer one."""
     pinned, newest = line.state.child_revision, line.child_current_revision
     return {
         "effective_revision": pinned if pinned is not None else newest,
@@ -230,7 +232,7 @@ def revisions_to_wire(line: Line) -> dict[str, Any]:
 
 
 def newer_exists(line: Line) -> bool:
-    """True if the line names an older revision of its child than the newest."""
+    """Return True if the line names an older revision of its child than the newest."""
     pinned = line.state.child_revision
     return pinned is not None and pinned < line.child_current_revision
 
@@ -285,12 +287,12 @@ class ChangeNote:
 
 
 def new_line_id() -> str:
-    """A line's stable id."""
+    """Return a line's stable id."""
     return str(uuids.uuid4())
 
 
 def parent_to_change(tx: Tx, part_number: str, expected: int | None) -> Item:
-    """The item whose BOM is to be changed, locked, and with the ``expected`` version of the BOM."""
+    """Return the item whose BOM is to be changed, locked, and with the ``expected`` version of the BOM."""
     parent = locked_parent(tx, part_number)
     check_version(parent, expected)
     return parent
@@ -364,7 +366,8 @@ def check_no_cycle(tx: Tx, parent: Item, child_ids: Collection[int]) -> None:
 
 
 def find_rings(tx: Tx, parent: Item, child_ids: Collection[int]) -> dict[int, list[str]]:
-    """Those of the children that contain the parent, or are it, each with the part numbers of the ring.
+    """Return those of the children that contain the parent, or are it, each with the part numbers of the
+    ring.
 
     Looks upwards from the parent: its ancestors are few where its children may be thousands.
     """
@@ -438,7 +441,7 @@ def _write_lines(tx: Tx, parent: Item, changes: Sequence[LineChange]) -> None:
 
 
 def history_row(change: LineChange) -> dict[str, Any]:
-    """A changed line as the history stores it."""
+    """Return a changed line as the history stores it."""
     return {
         "line_id": change.line_id,
         "child_id": change.child_id,

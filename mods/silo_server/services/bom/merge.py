@@ -97,7 +97,7 @@ class MergeOrder:
 
     @property
     def missing(self) -> list[tuple[str, str]]:
-        """The components that the assembly has lost."""
+        """Return the components that the assembly has lost."""
         return [
             (part.get("file", ""), part.get("object", ""))
             for part in self.left_out
@@ -106,7 +106,7 @@ class MergeOrder:
 
 
 def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
-    """The order in a decoded JSON body; RejectedError where the body as a whole is unusable.
+    """Return the order in a decoded JSON body; RejectedError if the body as a whole is unusable.
 
     Unknown keys are ignored. Whatever ``source`` says, the entries are an assembly's.
     """
@@ -144,7 +144,7 @@ def text_problem(value: Any, longest: int) -> str | None:
 
 
 def sha256_or_none(name: str, value: Any) -> str | None:
-    """A SHA-256 in small hex digits, or None; RejectedError, naming the field, for anything else."""
+    """Return a SHA-256 in small hex digits, or None; RejectedError, naming the field, for anything else."""
     if value is None:
         return None
     if isinstance(value, str) and re.fullmatch("[0-9A-Fa-f]{64}", value):
@@ -153,7 +153,7 @@ def sha256_or_none(name: str, value: Any) -> str | None:
 
 
 def quantity_problem(value: Any) -> str | None:
-    """What is wrong with a quantity, None where nothing is."""
+    """Return what is wrong with a quantity, None if nothing is."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"wanted a number, got {_shortened(value)}"
     # A huge integer has no float; comparing it does no harm where converting it would.
@@ -163,7 +163,7 @@ def quantity_problem(value: Any) -> str | None:
 
 
 def _sums_too_large(entries: Sequence[OrderEntry]) -> list[tuple[int, str]]:
-    """A child that is named several times counts as the sum, which has the limit that one entry has."""
+    """Find children whose sum over several entries exceeds the limit of one entry."""
     sums: dict[str, Decimal] = {}
     problems = []
     for entry in entries:
@@ -257,7 +257,7 @@ def _shortened(value: Any) -> str:
 
 
 def event_of(tx: Tx, parent: Item, diff: BomDiff, answer: Mapping[str, Any]) -> dict[str, Any]:
-    """The spec's event; ``warnings`` only where there is a conflict, which the diff does not say."""
+    """Return the spec's event; ``warnings`` only where there is a conflict, which the diff does not say."""
     diff_json = dict(answer["diff"])
     if len(diff_json["unchanged"]) > EVENT_UNCHANGED_LINES:
         diff_json["unchanged_count"] = len(diff_json["unchanged"])
@@ -301,7 +301,7 @@ class LastSync:
 
     @property
     def gaps(self) -> list[dict[str, Any]]:
-        """Everything that is not in the BOM, a refused merge too."""
+        """Return everything that is not in the BOM, a refused merge too."""
         gaps = [dict(part) for part in self.left_out]
         if self.refused_at:
             gaps.append({"reason": Reason.REFUSED.value, "message": self.refusal})
@@ -309,11 +309,11 @@ class LastSync:
 
     @property
     def words(self) -> str:
-        """``2 missing, 1 unregistered``; "" where nothing was left out."""
+        """Return ``2 missing, 1 unregistered``; "" if nothing was left out."""
         return in_words(self.gaps)
 
     def to_wire(self) -> dict[str, Any]:
-        """As the API sends it."""
+        """Return it as the API sends it."""
         return {"at": wire(self.at), "left_out": self.gaps}
 
 
@@ -321,12 +321,12 @@ NEVER = LastSync()
 
 
 def last_sync(tx: Tx, parent: Item) -> LastSync:
-    """The last sync of one assembly."""
+    """Return the last sync of one assembly."""
     return last_syncs(tx, [parent.id]).get(parent.id, NEVER)
 
 
 def last_syncs(tx: Tx, parent_ids: Collection[int]) -> dict[int, LastSync]:
-    """The last syncs of all these assemblies; those that were never synced (nor refused) are absent."""
+    """Return the last syncs of all these assemblies; those that were never synced (nor refused) are absent."""
     rows = tx.conn.execute(select(bom_last_syncs).where(one_of(tx, bom_last_syncs.c.parent_id, parent_ids)))
     return {row.parent_id: _read(row) for row in rows}
 
@@ -385,7 +385,7 @@ def _insert(tx: Tx, parent: Item, row: Mapping[str, Any]) -> None:
 
 
 def in_sentences(gaps: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What was left out, each in a sentence."""
+    """Return what was left out, each in a sentence."""
     return [_sentence(gap) for gap in gaps]
 
 
@@ -422,7 +422,7 @@ class _Prepared:
 
 
 def preview_merge(tx: Tx, part_number: str, order: MergeOrder, expected: int | None) -> MergeOutcome:
-    """The answer that :func:`merge_bom` would give, without changing anything."""
+    """Return the answer that :func:`merge_bom` would give, without changing anything."""
     parent = get_item(tx, part_number)
     check_version(parent, expected)
     prepared = _prepare(tx, parent, order)
@@ -509,7 +509,7 @@ def _prepare(tx: Tx, parent: Item, order: MergeOrder) -> _Prepared:
 
 
 def _children(tx: Tx, order: MergeOrder, lines: Sequence[Line]) -> tuple[dict[str, int], dict[str, str]]:
-    """(part number → item id, key → part number) of every child; RejectedError lists all bad entries."""
+    """Return (part number → item id, key → part number) of every child; RejectedError lists all bad entries."""
     child_ids = {line.child_part_number: line.child_id for line in lines}
     names = {line.child_part_number.casefold(): line.child_part_number for line in lines}
     asked = {entry.key for entry in order.entries if entry.key not in names}

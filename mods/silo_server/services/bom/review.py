@@ -165,7 +165,7 @@ def remove_line(
 
 
 def edited_state(before: LineState, changes: Mapping[str, Any]) -> LineState:
-    """The state after a person's edit; pure, so that the import's preview says the same."""
+    """Return the state after a person's edit; pure, so that the import's preview says the same."""
     after = replace(before, **changes)
     if "source" in changes:
         if after.source == "assembly":
@@ -269,7 +269,7 @@ class Review:
 
 
 def review(tx: Tx, part_number: str) -> Review:
-    """What is open on the BOM of this item."""
+    """Return what is open on the BOM of this item."""
     parent = get_item(tx, part_number)
     lines = lines_of(tx, parent)
     return Review(
@@ -288,8 +288,9 @@ def open_conflicts(tx: Tx, parent: Item, lines: Sequence[Line]) -> list[Conflict
 
 
 def told_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[int, float]]:
-    """What the last merge said of people's lines: parent → child → quantity (internal ids); 0: not in the
-    assembly."""
+    """Return what the last merge said of people's lines: parent → child → quantity (internal ids); 0: not in
+    the assembly.
+    """
     rows = tx.conn.execute(
         select(bom_conflicts.c.parent_id, bom_conflicts.c.child_id, bom_conflicts.c.cad_quantity).where(
             one_of(tx, bom_conflicts.c.parent_id, parent_ids)
@@ -350,7 +351,7 @@ def resolve(
 
 
 def marks_of(lines: Sequence[Line], conflicts: Mapping[str, Conflict]) -> dict[str, str]:
-    """Line id → mark of what a page shows of it: its state, and what CAD says where they differ."""
+    """Return line id → mark of what a page shows of it: its state, and what CAD says where they differ."""
     quantities = {line_id: conflict.cad_quantity for line_id, conflict in conflicts.items()}
     return {line.id: mark_of(line.state, quantities.get(line.id)) for line in lines}
 
@@ -441,17 +442,17 @@ class Waiting(NamedTuple):
 
     @property
     def conflicts(self) -> int:
-        """How many lines CAD has another quantity for."""
+        """Return how many lines CAD has another quantity for."""
         return len(self.told)
 
     @property
     def mark(self) -> str:
-        """What a decision is about: the BOM's version, and what CAD says of its conflicts."""
+        """Return what a decision is about: the BOM's version, and what CAD says of its conflicts."""
         return _mark(self.version, self.told)
 
 
 def waiting(tx: Tx) -> list[Waiting]:
-    """All BOMs that wait, by part number; archived assemblies wait for nobody.
+    """Return all BOMs that wait, by part number; archived assemblies wait for nobody.
 
     Reads only what a list of them is filtered and sorted by: there may be thousands.
     """
@@ -481,17 +482,17 @@ def waiting(tx: Tx) -> list[Waiting]:
 
 
 def waiting_count(tx: Tx) -> int:
-    """How many BOMs wait."""
+    """Return how many BOMs wait."""
     return _count(tx, lambda _: true())
 
 
 def open_among(tx: Tx, item_ids: Collection[int]) -> int:
-    """How many of these BOMs wait."""
+    """Return how many of these BOMs wait."""
     return _count(tx, lambda element: one_of(tx, element, item_ids))
 
 
 def waiting_in(tx: Tx, folder: str) -> int:
-    """How many BOMs wait in a project folder and those in it."""
+    """Return how many BOMs wait in a project folder and those in it."""
     last = bom_last_syncs.c
     inside = or_(last.folder == folder, last.folder.startswith(f"{folder}/", autoescape=True))
     return _count(tx, lambda element: element.in_(select(last.parent_id).where(inside)))
@@ -555,7 +556,7 @@ def _unreferenced(tx: Tx) -> Counter[int]:
 
 
 def _gaps(tx: Tx) -> dict[int, tuple[int, int]]:
-    """By BOM how much its last sync left out: what is registered or cannot be, and what is not yet."""
+    """Count by BOM how much its last sync left out: what is registered or cannot be, and what is not yet."""
     row = bom_last_syncs.c
     query = select(row.parent_id, row.left_out, row.refused_at).where(text(f"({INCOMPLETE})"))
     gaps: dict[int, tuple[int, int]] = {}
@@ -658,7 +659,7 @@ def followed(tx: Tx, actor: Actor, *, whole: bool = True) -> list[Followed]:
 
 
 def _newest_in(tx: Tx, folder: str, after: int, but: str) -> LastChange | None:
-    """The newest event of somebody else in the BOMs of a folder."""
+    """Return the newest event of somebody else in the BOMs of a folder."""
     event, last = event_log.c, bom_last_syncs.c
     query = (
         select(event.at, event.username, items.c.part_number)
@@ -695,7 +696,7 @@ def editors(tx: Tx) -> list[str]:
 
 
 def badge(tx: Tx, actor: Actor) -> int:
-    """How much waits for one person: the open BOMs that are theirs, and the news of what they follow."""
+    """Return how much waits for one person: the open BOMs that are theirs, and the news of what they follow."""
     theirs = select(assignees.c.item_id).where(assignees.c.user_id == actor.own_id)
     ids = list(tx.conn.scalars(theirs))
     mine = open_among(tx, ids) if ids else 0
@@ -703,7 +704,7 @@ def badge(tx: Tx, actor: Actor) -> int:
 
 
 def last_look(tx: Tx, user_id: int, item: Item) -> str | None:
-    """When this person looked at the product before; another look within the hour is the same one."""
+    """Return when this person last looked at the product; looks within one hour count as one."""
     row = tx.conn.execute(select(product_looks).where(_look_of([(user_id, item.id)]))).one_or_none()
     if row is None:
         return None

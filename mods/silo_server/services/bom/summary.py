@@ -71,13 +71,13 @@ class OpenBom(NamedTuple):
 
     @property
     def questions(self) -> str:
-        """What a person has to decide there, in words."""
+        """Return what a person has to decide there, in words."""
         counts = ((self.unreferenced, "unreferenced line"), (self.conflicts, "conflict"))
         return ", ".join(counted(count, word) for count, word in counts if count)
 
     @property
     def words(self) -> str:
-        """All of it, in words."""
+        """Return all of it, in words."""
         return ", ".join(filter(None, (self.questions, self.incomplete)))
 
 
@@ -150,17 +150,17 @@ class Summary:
 
     @property
     def stands_alone(self) -> bool:
-        """True if it states its mass for parts that state none."""
+        """Return True if it states its mass for parts that state none."""
         return self.as_part.mass_whole and not self.worth.mass_whole
 
     @property
     def questions(self) -> int:
-        """How many lines wait for a person."""
+        """Return how many lines wait for a person."""
         return sum(bom.unreferenced + bom.conflicts for bom in self.open.values())
 
     @property
     def incomplete(self) -> int:
-        """How many BOMs do not hold all that they should."""
+        """Return how many BOMs do not hold all that they should."""
         return sum(bool(bom.incomplete) for bom in self.open.values())
 
 
@@ -195,12 +195,12 @@ class Unmade(NamedTuple):
 
 
 def summary_of(tx: Tx, item: Item) -> Summary:
-    """The summary of one product. Raises CycleError, BusyError (it is too large, and made meanwhile)."""
+    """Return the summary of one product. Raises CycleError, BusyError (it is too large, and made meanwhile)."""
     return summaries(tx, [item.id])[item.id]
 
 
 def summaries(tx: Tx, item_ids: Collection[int]) -> dict[int, Summary]:
-    """The summaries of these items, by internal id: what is kept, and what is made for it."""
+    """Return the summaries of these items, by internal id: what is kept, and what is made for it."""
     wanted = set(item_ids)
     by_item = dict(_stored(tx, wanted))
     made = _make(tx, wanted - by_item.keys(), tx.settings.max_expanded_rows)
@@ -274,7 +274,7 @@ def _followed(line: Line) -> bool:
 def _lines_below(
     tx: Tx, wanted: Collection[int], most: int | None
 ) -> tuple[dict[int, list[Line]], dict[int, _Node]]:
-    """The lines of these items and of all below them, down to what is kept; and the latter."""
+    """Return the lines of these items and of all below them, down to what is kept; and the latter."""
     lines: dict[int, list[Line]] = {}
     nodes: dict[int, _Node] = {}
     level, seen, count = set(wanted), set(wanted), 0
@@ -334,14 +334,14 @@ def _own(tx: Tx, item_ids: Collection[int]) -> dict[int, _Own]:
 
 
 def own_worth(properties: Mapping[str, Any]) -> MassAndCost:
-    """What an item states of itself."""
+    """Return what an item states of itself."""
     mass, cost = (positive_number(properties, name) for name in ("mass_kg", "standard_cost"))
     costs = {currency_of(properties): as_decimal(cost)} if cost is not None else {}
     return MassAndCost(None if mass is None else as_decimal(mass), mass is not None, costs, bool(costs))
 
 
 def _open(tx: Tx, lines: Mapping[int, Sequence[Line]], own: Mapping[int, _Own]) -> dict[int, OpenBom]:
-    """What is open in each of these BOMs itself."""
+    """Return what is open in each of these BOMs itself."""
     ids = {item_id for item_id in own if item_id in lines or own[item_id].is_assembly}
     syncs, conflicts = last_syncs(tx, ids), conflicts_in(tx, lines)
     boms: dict[int, OpenBom] = {}
@@ -358,7 +358,7 @@ def _open(tx: Tx, lines: Mapping[int, Sequence[Line]], own: Mapping[int, _Own]) 
 
 
 def _bom_changes(tx: Tx, parent_ids: Collection[int]) -> dict[int, tuple[str, str]]:
-    """When each of these BOMs came to what it is, and by whom."""
+    """Return when each of these BOMs last changed, and by whom."""
     row = bom_changes.c
     query = select(row.parent_id, row.at, row.username).join(
         items, (items.c.id == row.parent_id) & (items.c.bom_version == row.version)
@@ -370,7 +370,9 @@ def _bom_changes(tx: Tx, parent_ids: Collection[int]) -> dict[int, tuple[str, st
 def _children_first(
     below: Mapping[int, Sequence[int]], wanted: Iterable[int], names: Mapping[int, str]
 ) -> Iterator[int]:
-    """The wanted items, and what is below them and has something below, children first; else CycleError."""
+    """Yield the wanted items, and what is below them and has something below, children first; else
+    CycleError.
+    """
     done: set[int] = set()
     for first in wanted:
         way: dict[int, Iterator[int]] = {} if first in done else {first: iter(below.get(first, ()))}
@@ -586,7 +588,7 @@ def _keep_below(
 
 
 def _parts(order: Iterable[int], counts: Mapping[int, int]) -> Iterator[list[int]]:
-    """The assemblies, as many at a time as have :data:`BATCH_LINES` lines in all."""
+    """Yield the assemblies, as many at a time as have :data:`BATCH_LINES` lines in all."""
     part: list[int] = []
     lines = 0
     for item_id in order:

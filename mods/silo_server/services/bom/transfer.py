@@ -125,7 +125,7 @@ def export(
     item_type: str = "",
     release: str = "",
 ) -> Export:
-    """The BOM of an item, with the totals for so many ``pieces`` of it.
+    """Return the BOM of an item, with the totals for so many ``pieces`` of it.
 
     words, item_type
         the filter: only parts that it finds, and in the other views than the flat one what leads to them.
@@ -221,7 +221,7 @@ _CHANGES |= {"before": "Before", "after": "After", "at": "At", "username": "By"}
 
 
 def export_changes(tx: Tx, part_number: str, since: str, until: str) -> Export:
-    """What changed in a product between two moments, to be written as a table."""
+    """Return what changed in a product between two moments, to be written as a table."""
     root = get_item(tx, part_number)
     first, last, happenings = changes_of(tx, root, since, until)
     rows = ({title: getattr(change, name) for name, title in _CHANGES.items()} for change in happenings)
@@ -230,7 +230,7 @@ def export_changes(tx: Tx, part_number: str, since: str, until: str) -> Export:
 
 
 def _values(worth: MassAndCost, amount: Exact) -> Row:
-    """Mass and cost, of one and of all, where nothing of them is unknown and there is one currency."""
+    """Return mass and cost, of one and of all, where nothing of them is unknown and there is one currency."""
     row: Row = {}
     count = as_decimal(amount)
     if worth.mass is not None and worth.mass_whole:
@@ -242,7 +242,9 @@ def _values(worth: MassAndCost, amount: Exact) -> Row:
 
 
 def _gap_rows(tx: Tx, root: Item, open_ones: Mapping[int, OpenBom], view: View) -> list[Row]:
-    """What the last syncs left out: rows without a part number, after all others; missing is a line too."""
+    """Return what the last syncs left out: rows without a part number, after all others; missing is a line
+    too.
+    """
     shown = {root.id} if view is View.SINGLE else open_ones.keys()
     ids = [item_id for item_id, said in open_ones.items() if said.incomplete and item_id in shown]
     return [
@@ -350,7 +352,9 @@ def to_json(made: Export, out: IO[bytes]) -> None:
 
 
 def _row(bare: _Bare, part: RolledItem, amount: Exact, *, of_a_line: bool) -> Row:
-    """A row's cells; ``of_a_line`` False: not those of a line, as a part may be in the tree on several."""
+    """Return a row's cells; ``of_a_line`` False: not those of a line, as a part may be in the tree on
+    several.
+    """
     line, state, properties = bare.line, bare.line.state, part.properties
     row: Row = {
         "Item": bare.item,

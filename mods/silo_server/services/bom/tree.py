@@ -70,12 +70,12 @@ class Graph:
         return result
 
     def names(self) -> dict[int, str]:
-        """Internal id → part number, of the root and of all below it."""
+        """Return internal id → part number, of the root and of all below it."""
         below = {line.child_id: line.child_part_number for lines in self.lines.values() for line in lines}
         return below | {self.root.id: self.root.part_number}
 
     def components(self, item_id: int) -> list[Line]:
-        """The lines that are followed."""
+        """Return the lines that are followed."""
         return [line for line in self.lines.get(item_id, ()) if line.state.rel_type == "component"]
 
 
@@ -124,7 +124,7 @@ class Usage:
 
 
 def load_graph(tx: Tx, root: Item, depth: int | None = None, *, bare: bool = False) -> Graph:
-    """All lines below ``root``, each once; of the first ``depth`` levels only, where that is given.
+    """Return all lines below ``root``, each once; of the first ``depth`` levels only, where that is given.
 
     bare
         without UUID, name and description of the children, for who reads them with what is shown.
@@ -203,7 +203,7 @@ def sought(words: str, item_type: str, parts: Mapping[int, RolledItem]) -> Calla
 
 
 def found_below(tx: Tx, graph: Graph, words: str, item_type: str) -> Callable[[Line], bool]:
-    """As :func:`sought` in all of a graph, whose parts are read some at a time and not kept."""
+    """Search as :func:`sought` in all of a graph, whose parts are read some at a time and not kept."""
     lines = {line.child_id: line for below in graph.lines.values() for line in below}
     found: set[int] = set()
     for some in portions(lines.values()):
@@ -213,7 +213,7 @@ def found_below(tx: Tx, graph: Graph, words: str, item_type: str) -> Callable[[L
 
 
 def portions(rows: Iterable[R]) -> Iterator[list[R]]:
-    """The rows, :data:`PORTION` at a time."""
+    """Yield the rows, :data:`PORTION` at a time."""
     left = iter(rows)
     while some := list(islice(left, PORTION)):
         yield some
@@ -253,7 +253,7 @@ def ids_below(root: Item) -> Select[tuple[int]]:
 
 
 def _reach(root: Item, depth: int | None) -> Select[tuple[int]]:
-    """The ids of the items whose lines belong to the first ``depth`` levels, or to all."""
+    """Return the ids of the items whose lines belong to the first ``depth`` levels, or to all."""
     first = select(literal(root.id, items.c.id.type).label("item_id"), literal(1).label("level"))
     reach = first.cte("reach", recursive=True)
     # Without an end the level stays 1, so that every item is visited once, and a ring ends.
@@ -265,7 +265,7 @@ def _reach(root: Item, depth: int | None) -> Select[tuple[int]]:
 
 
 def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
-    """The tree as rows, parents before their children. CycleError where it never ends, TooLargeError."""
+    """Yield the tree as rows, parents before their children. CycleError if it never ends, TooLargeError."""
     order_of(graph)  # finds a cycle before it is walked
     count = 0
     graph_lines = graph.lines
@@ -292,7 +292,7 @@ def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
 
 
 def flatten(graph: Graph, closed: Collection[int] = ()) -> list[FlatRow]:
-    """The leaf parts with their total quantities, in the order the tree shows them first.
+    """Return the leaf parts with their total quantities, in the order the tree shows them first.
 
     closed
         assemblies (internal ids) that count as parts.
@@ -333,7 +333,9 @@ def _exact(quantity: float) -> Exact:
 
 
 def multiplied(factor: Exact, line: Line) -> Exact:
-    """So much of the line's child for ``factor`` of its parent; ConflictError above :data:`MAX_TOTAL`."""
+    """Return how much of the line's child is in ``factor`` of its parent; ConflictError above
+    :data:`MAX_TOTAL`.
+    """
     return _counted(factor * _exact(line.state.quantity), line)
 
 
@@ -349,7 +351,7 @@ def _counted(amount: Exact, line: Line) -> Exact:
 def where_used(
     tx: Tx, item: Item, *, indirect: bool = False, limit: int = 1000, offset: int = 0
 ) -> tuple[list[Usage], int]:
-    """A page of an item's parents, and how many there are in all.
+    """Return a page of an item's parents, and how many there are in all.
 
     With ``indirect`` also their parents, the nearest first, each line once; by part number in each level.
     """
@@ -365,13 +367,13 @@ def where_used(
 
 
 def use_counts(tx: Tx, item_ids: Collection[int]) -> dict[int, int]:
-    """On how many BOM lines each item is; those on none are absent."""
+    """Count the BOM lines that each item is on; items on no line are absent."""
     query = select(bom_lines.c.child_id, func.count()).where(one_of(tx, bom_lines.c.child_id, item_ids))
     return {row[0]: row[1] for row in tx.conn.execute(query.group_by(bom_lines.c.child_id))}
 
 
 def _levels_above(tx: Tx, item: Item, levels: int) -> Iterator[list[int]]:
-    """The item, then what uses it, then what uses that; each item in its nearest level only."""
+    """Yield the item, then what uses it, then what uses that; each item in its nearest level only."""
     seen = {item.id}
     level = [item.id]
     for depth in range(1, levels + 1):
@@ -400,7 +402,7 @@ def _uses(tx: Tx, of_level: ColumnElement[bool], depth: int, limit: int, offset:
 
 
 def order_of(graph: Graph) -> list[int]:
-    """The assemblies (internal ids), parents before their children; CycleError where there is a ring."""
+    """Return the assemblies (internal ids), parents before their children; CycleError if there is a ring."""
     done: list[int] = []
     state: dict[int, bool] = {graph.root.id: False}  # False = being walked, True = done
     stack = [(graph.root.id, iter(graph.components(graph.root.id)))]
@@ -486,12 +488,12 @@ class RolledItem(NamedTuple):
 
 
 def parts_of(tx: Tx, graph: Graph) -> dict[int, RolledItem]:
-    """Everything in the graph, by internal id, read once for both roll-ups."""
+    """Return everything in the graph, by internal id, read once for both roll-ups."""
     return some_parts(tx, graph.names())
 
 
 def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, RolledItem]:
-    """These items, by internal id."""
+    """Return these items, by internal id."""
     rows = tx.conn.execute(
         select(
             items.c.id,
@@ -526,12 +528,12 @@ def with_supplier(
 
 
 def currency_of(properties: Mapping[str, Any]) -> str:
-    """The currency of an item's cost."""
+    """Return the currency of an item's cost."""
     return str(properties.get("currency") or DEFAULT_CURRENCY)
 
 
 def roll_up_cost(graph: Graph, parts: Mapping[int, RolledItem]) -> CostRollup:
-    """Flat BOM times standard cost."""
+    """Multiply the flat BOM with the standard cost."""
     flat = flatten(graph)
     rows, totals, missing = [], dict[str, Decimal](), []
     for row in flat:
@@ -549,7 +551,7 @@ def roll_up_cost(graph: Graph, parts: Mapping[int, RolledItem]) -> CostRollup:
 
 
 def roll_up_mass(graph: Graph, parts: Mapping[int, RolledItem], assemblies: Collection[int]) -> MassRollup:
-    """Masses from the leaves up; those ``assemblies`` stand for all that is in them with their own."""
+    """Add up masses from the leaves; those ``assemblies`` stand for all that is in them with their own."""
     amounts: dict[int, Exact] = {}
     for row in flatten(graph, assemblies):
         item_id = row.line.child_id
@@ -567,7 +569,7 @@ def roll_up_mass(graph: Graph, parts: Mapping[int, RolledItem], assemblies: Coll
 
 
 def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
-    """A property as a number of at least 0, None where it is absent or no such number."""
+    """Return a property as a number of at least 0, None if it is absent or no such number."""
     value = properties.get(name)
     if isinstance(value, str):
         value = read_number(value, points_are_decimal=True).value
