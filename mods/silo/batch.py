@@ -89,7 +89,9 @@ class TopResult:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Return everything worth a report, each once: of the walk, and of each comparison with the server."""
+        """Return everything worth a report, each once: of the walk, and of each comparison with the
+        server.
+        """
         unique: dict[Finding, None] = dict.fromkeys(self.whole.findings if self.whole is not None else ())
         for outcome in self.outcomes:
             unique.update(dict.fromkeys(outcome.resolved.findings))
@@ -153,7 +155,9 @@ def _lacks_files(resolved: Resolved) -> bool:
 
 
 def ask_for_moved(whole: Resolved, api: SyncApi) -> Resolved:
-    """Return :func:`suggest_by_identity`, with the lines that the server has of assemblies that lack files."""
+    """Return :func:`suggest_by_identity`, with the lines that the server has of assemblies that lack
+    files.
+    """
     lacking = [assembly for assembly in assemblies(whole) if _lacks_files(assembly)]
     return suggest_by_identity(whole, [(resolved, server_lines(resolved, api)) for resolved in lacking])
 

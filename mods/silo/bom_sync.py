@@ -74,7 +74,9 @@ class Memory:
         self.path = path or data_folder() / "standard-items.json"
 
     def known(self, server: str) -> dict[str, str]:
-        """Return what is known of a server; nothing where the file cannot be read, which only costs a search."""
+        """Return what is known of a server; nothing where the file cannot be read, which only costs a
+        search.
+        """
         return self._read().get(server, {})
 
     def remember(self, server: str, items: Mapping[str, str]) -> None:

@@ -477,7 +477,9 @@ class Locator:
         return self._spelling.is_plain(path)
 
     def _respelt(self, recorded: str, folders: tuple[str, ...]) -> FoundFile | NotFound:
-        """Find a file that Windows or macOS would open (``part.FCStd`` for ``Part.FCStd``), if only one fits."""
+        """Find a file that Windows or macOS would open (``part.FCStd`` for ``Part.FCStd``), if only one
+        fits.
+        """
         for path in _candidates(recorded, folders):
             matches = list(self._spellings(path))
             if len(matches) > 1:

@@ -218,7 +218,9 @@ def _events(tx: Tx) -> int:
 
 
 def _history(tx: Tx) -> int:
-    """Fold, for one BOM, the changes older than ``history_days`` into one, which has the state they led to."""
+    """Fold, for one BOM, the changes older than ``history_days`` into one, which has the state they
+    led to.
+    """
     before = _days("history_days")(tx)
     if before is None:
         return 0

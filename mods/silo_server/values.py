@@ -312,7 +312,9 @@ def names_of(kind: Any) -> Iterable[str]:
 
 
 def from_row(kind: type[T], row: Any, /, **given: Any) -> T:
-    """Return a frozen value from a row whose columns have the names of its fields; ``given`` wins over them."""
+    """Return a frozen value from a row whose columns have the names of its fields; ``given`` wins over
+    them.
+    """
     return kind(**given, **{name: getattr(row, name) for name in names_of(kind) if name not in given})
 
 

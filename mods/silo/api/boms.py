@@ -57,13 +57,13 @@ NOT_ATOMIC = "not_atomic"
 
 
 def unusual(result: MergeResult | None) -> list[str]:
-    """What a person must know about a merge that was not a usual one, in sentences."""
+    """Return what a person must know about a merge that was not a usual one, in sentences."""
     warnings = result.warnings if result is not None else ()
     return [warning.message for warning in warnings if warning.type in (UNCLEAR, NOT_ATOMIC)]
 
 
 def merge_result(reply: Reply) -> MergeResult | None:
-    """The answer to a merge, read strictly: only what says what it did counts as success.
+    """Return the answer to a merge, read strictly: only what says what it did counts as success.
 
     None: neither success nor failure can be read from it. Raises :class:`ServerFaultError` for an answer
     that is a failure by its own words, whatever its status.
@@ -98,13 +98,13 @@ _LISTS = {"added", "removed", "quantity_changed", "unchanged"}
 
 
 def result_of(diff: BomDiff, part_number: str, request: MergeRequest) -> MergeResult:
-    """The answer of spec §5 for a planned merge."""
+    """Return the answer of spec §5 for a planned merge."""
     left_out = [part.model_dump() for part in request.left_out or ()]
     return MergeResult.model_validate(answer_of(diff, part_number, request.sync_id, left_out))
 
 
 def read_back(api: BomCalls, part_number: str, request: MergeRequest, host: str) -> MergeResult:
-    """The result of a merge whose answer says neither success nor failure, as the BOM shows it."""
+    """Return the result of a merge whose answer says neither success nor failure, as the BOM shows it."""
     sent = f"{host}: the BOM of {part_number} was sent, but the answer was not understood"
     if request.dry_run:
         raise ServerFaultError(f"{sent}; nothing was to be changed")
@@ -159,7 +159,7 @@ def without_manual(
 def merge_by_lines(
     api: BomCalls, part_number: str, request: MergeRequest, host: str, *, cancelled: Cancel | None = None
 ) -> MergeResult:
-    """The merge as single calls. Raises :class:`RejectedError` with all children that were refused.
+    """Return the merge as single calls. Raises :class:`RejectedError` with all children that were refused.
 
     Raises :class:`RouteMissingError` where the server has no calls for single lines either.
     """
@@ -234,14 +234,14 @@ class BomCalls(Caller):
     """Reading and merging BOMs."""
 
     def get_bom(self, part_number: str, /) -> list[BomLine]:
-        """The BOM lines directly below an item."""
+        """Return the BOM lines directly below an item."""
         pages = self._all(BomLine, f"the BOM of {part_number}", *_bom(part_number))
         return _checked(part_number, [line for page, _ in pages for line in page])
 
     def get_boms(
         self, part_numbers: Iterable[str], /, *, cancelled: Cancel | None = None
     ) -> dict[str, list[BomLine]]:
-        """The BOM lines directly below each of these items; items that are not known are left out.
+        """Return the BOM lines directly below each of these items; items that are not known are left out.
 
         One request per 1000 where the server offers that, else one each.
         """
@@ -263,7 +263,7 @@ class BomCalls(Caller):
         return self._many("boms", part_numbers, batch, single, cancelled)
 
     def get_summary(self, part_number: str, /) -> ProductSummary | None:
-        """What the server keeps of a product over all levels; None from a server that keeps nothing.
+        """Return what the server keeps of a product over all levels; None from a server that keeps nothing.
 
         Raises :class:`BusyError` while the server sums up a very large product.
         """
@@ -274,15 +274,16 @@ class BomCalls(Caller):
         return reply.model(ProductSummary)
 
     def get_changes(self, part_number: str, since: str, until: str = "", /) -> ProductChanges:
-        """What changed in a product over all levels between two points: days, times, ``r3`` or released
-        revisions; ``until`` "": now. Raises :class:`RouteMissingError` from a server that compares nothing.
+        """Return what changed in a product over all levels between two points: days, times, ``r3`` or
+        released revisions; ``until`` "": now. Raises :class:`RouteMissingError` from a server that compares
+        nothing.
         """
         query = {"from": since, **({"to": until} if until else {})}
         where = (f"what changed in {part_number}", *_bom(part_number), "changes")
         return self._get(*where, params=query).model(ProductChanges)
 
     def get_bom_version(self, part_number: str, /) -> str | None:
-        """The version of the BOM as it is now, for ``if_match``; None where the server keeps none."""
+        """Return the version of the BOM as it is now, for ``if_match``; None if the server keeps none."""
         return self._get(f"the BOM of {part_number}", *_bom(part_number)).version()
 
     def merge_bom(
@@ -400,7 +401,7 @@ class BomCalls(Caller):
 
 
 def _checked(part_number: str, lines: list[BomLine]) -> list[BomLine]:
-    """The lines; :class:`ServerFaultError` where they say that they are another item's."""
+    """Return the lines; :class:`ServerFaultError` if they say that they are another item's."""
     for line in lines:
         if line.parent_part_number and line.parent_part_number.casefold() != part_number.strip().casefold():
             raise ServerFaultError(

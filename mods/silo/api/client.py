@@ -478,7 +478,9 @@ class SiloClient(ItemCalls, BomCalls):
         return self._address.web(path)
 
     def whoami(self) -> User:
-        """Return who the token belongs to; raises :class:`silo.bom.errors.AuthError` if it is not accepted."""
+        """Return who the token belongs to; raises :class:`silo.bom.errors.AuthError` if it is not
+        accepted.
+        """
         return self._get("who we are", "auth", "me").model(User)
 
     def begin_login(self, program: str) -> BrowserLogin | None:
@@ -497,7 +499,9 @@ class SiloClient(ItemCalls, BomCalls):
 
     @property
     def keeps_item_ids(self) -> bool:
-        """Return True if the server says that a new item gets the UUID that we propose, or was seen to do it."""
+        """Return True if the server says that a new item gets the UUID that we propose, or was seen to do
+        it.
+        """
         if not self.abilities.keeps_item_ids and not self._asked_for_item_ids:
             self._asked_for_item_ids = True
             with suppress(SiloError):

@@ -307,7 +307,9 @@ def _text(table: Mapping[str, Any], key: str, path: Path) -> str | None:
 def first_of(
     *candidates: tuple[Source, str | Callable[[], str | None] | None],
 ) -> tuple[str | None, Source | None]:
-    """Return the first setting that says anything, and who said so; a callable is asked when its turn comes."""
+    """Return the first setting that says anything, and who said so; a callable is asked when its turn
+    comes.
+    """
     for source, value in candidates:
         said = value() if callable(value) else value
         if said is not None and said.strip():
@@ -316,7 +318,9 @@ def first_of(
 
 
 def same_server(url: str, other: str | None) -> bool:
-    """Return True if two addresses, as people write them, mean one server: a token for one is for the other."""
+    """Return True if two addresses, as people write them, mean one server: a token for one is for the
+    other.
+    """
     if not url or not other:
         return False
     try:

@@ -630,7 +630,9 @@ def _one_by_one(keys: Sequence[K], single: Callable[[K], T | None], cancelled: C
 
 
 def _without(data: Any, keys: Sequence[str]) -> Any:
-    """Return the data without these keys, here and in lists of objects; what a user put into a value stays."""
+    """Return the data without these keys, here and in lists of objects; what a user put into a value
+    stays.
+    """
     if not keys or not isinstance(data, dict):
         return data
     return {

@@ -347,7 +347,9 @@ def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) 
 
 
 def summary(diff: BomDiff) -> str:
-    """Return the sentence of the spec's event: ``BOM updated: 1 added, 1 quantity changed, 1 unreferenced``."""
+    """Return the sentence of the spec's event: ``BOM updated: 1 added, 1 quantity changed, 1
+    unreferenced``.
+    """
     parts = [
         f"{len(diff.added)} added",
         f"{len(diff.quantity_changed)} quantity changed",
@@ -518,7 +520,9 @@ class AssemblyChange:
 
     @property
     def kind(self) -> str:
-        """Return ``added``, ``removed``, ``changed``, or ``moved`` where only its file or object is another."""
+        """Return ``added``, ``removed``, ``changed``, or ``moved`` where only its file or object is
+        another.
+        """
         if self.old is None:
             return "added"
         if self.new is None:

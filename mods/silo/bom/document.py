@@ -107,7 +107,9 @@ def property_names(obj: object) -> frozenset[str] | tuple[str, ...] | None:
 
 
 def first_of(linked: Any) -> Any:
-    """Return the object of a ``LinkedObject``, which is a tuple (object, sub-name) where there is a sub-name."""
+    """Return the object of a ``LinkedObject``, which is a tuple (object, sub-name) where there is a
+    sub-name.
+    """
     return linked[0] if isinstance(linked, tuple) else linked
 
 
@@ -149,7 +151,9 @@ def label_of(obj: object) -> str:
 
 
 def document_property(doc: object, name: str) -> Any:
-    """Return a property of the document, None if there is none (FreeCAD 0.20 has no such properties at all)."""
+    """Return a property of the document, None if there is none (FreeCAD 0.20 has no such properties at
+    all).
+    """
     ask = getattr(doc, "getPropertyByName", None)
     if callable(ask):
         try:

@@ -61,7 +61,9 @@ def exit_of(error: BaseException) -> Exit:
 
 
 def did_you_mean(given: str, candidates: Iterable[str]) -> str:
-    """Return the end of a sentence about an unknown name: the known ones that look like it; "" if none does."""
+    """Return the end of a sentence about an unknown name: the known ones that look like it; "" if none
+    does.
+    """
     near = difflib.get_close_matches(given, list(candidates), 2, 0.7)
     return f"; did you mean {' or '.join(near)}?" if near else ""
 

@@ -414,7 +414,9 @@ class Rings:
         return other in self._members.get(key, ())
 
     def closes(self, entry: Key, here: Key, there: Key) -> bool:
-        """Return True if the link from ``here`` to ``there`` is cut, in a ring that was entered at ``entry``."""
+        """Return True if the link from ``here`` to ``there`` is cut, in a ring that was entered at
+        ``entry``.
+        """
         if not self.same_ring(here, there):
             return False
         ways = self._outwards(entry)

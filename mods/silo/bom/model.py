@@ -131,7 +131,9 @@ class BomEntry:
 
     @property
     def key(self) -> tuple[str, str]:
-        """Return what a component is: (file, object), or the designation of a standard part. Never a label."""
+        """Return what a component is: (file, object), or the designation of a standard part. Never a
+        label.
+        """
         if self.is_standard:
             return (STANDARD_PARTS, self.standard or "")
         return (self.doc_path, self.object_name)
@@ -254,7 +256,9 @@ class BomDiff:
         return self.findings_at()
 
     def findings_at(self, parent: BomEntry | None = None) -> tuple[Finding, ...]:
-        """Report unreferenced lines in one finding, each conflict in one. ``parent``: the assembly compared."""
+        """Report unreferenced lines in one finding, each conflict in one. ``parent``: the assembly
+        compared.
+        """
         places = (Place(parent.doc_path, parent.object_name),) if parent is not None else ()
         findings = []
         if self.removed:

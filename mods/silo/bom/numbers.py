@@ -147,7 +147,9 @@ def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool
 
 
 def read_count(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
-    """Read a number as :func:`read_number` does; the text may name what it counts: "4 pcs", "4x", "4 Stk."."""
+    """Read a number as :func:`read_number` does; the text may name what it counts: "4 pcs", "4x", "4
+    Stk.".
+    """
     counted = _COUNT_WORD.fullmatch(text.strip())
     return read_number(counted["number"] if counted else text, mark, points_are_decimal=points_are_decimal)
 
@@ -218,7 +220,9 @@ def plain(value: None) -> None: ...
 @overload
 def plain(value: float | Decimal) -> int | float: ...
 def plain(value: float | Decimal | None) -> int | float | None:
-    """Return ``value`` as JSON and people should see it: a count as a count (12, not 12.0); None stays None."""
+    """Return ``value`` as JSON and people should see it: a count as a count (12, not 12.0); None stays
+    None.
+    """
     if isinstance(value, float):
         return int(value) if value.is_integer() and abs(value) < 1e16 else value
     if isinstance(value, Decimal):

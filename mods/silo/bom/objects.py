@@ -267,7 +267,9 @@ def elements(link: object) -> tuple[Any, ...]:
 
 
 def array_count(link: object) -> int:
-    """Return instances of one link object: 1, or the elements of its array that are not left out one by one."""
+    """Return instances of one link object: 1, or the elements of its array that are not left out one by
+    one.
+    """
     if not is_array(link):
         return 1
     count: int = own(link, "ElementCount")

@@ -101,7 +101,9 @@ def shorten(message: str, base: str) -> str:
 
 
 def tree_size(entries: Iterable[BomEntry]) -> int:
-    """Return lines of the tree written out in full. Nested assemblies share their values, so it may be huge."""
+    """Return lines of the tree written out in full. Nested assemblies share their values, so it may be
+    huge.
+    """
     sizes: dict[int, int] = {}
 
     def size(entry: BomEntry) -> int:
@@ -205,7 +207,9 @@ _TOLD = ("added", "quantity_changed", "conflicts", "removed", "kept", "manual")
 
 
 def diff_rows(diff: BomDiff) -> Iterator[tuple[str, str, str]]:
-    """Yield each line that differs or is a person's own: (field of the diff, part number, quantity in words)."""
+    """Yield each line that differs or is a person's own: (field of the diff, part number, quantity in
+    words).
+    """
     disputed = {change.part_number for change in diff.conflicts}
     for kind in _TOLD:
         for change in getattr(diff, kind):

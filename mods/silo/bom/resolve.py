@@ -184,7 +184,9 @@ def propose(entry: BomEntry, categories: Mapping[str, str], *, shares_file: bool
 def propose_all(
     entries: Iterable[BomEntry], tree: Iterable[BomEntry], categories: Mapping[str, str]
 ) -> list[Proposal]:
-    """Return a proposal for each; ``tree`` is all that the assembly holds, and says which files are shared."""
+    """Return a proposal for each; ``tree`` is all that the assembly holds, and says which files are
+    shared.
+    """
     crowded = crowded_files(tree)
     return [propose(entry, categories, shares_file=entry.doc_path in crowded) for entry in entries]
 
@@ -400,7 +402,9 @@ def standard_kind(designation: str) -> str:
 
 
 def _standard_category(designation: str, fitting: Mapping[str, str], categories: Mapping[str, str]) -> Guess:
-    """Guess by the site's rules, else the one category of the kind, else one for standard parts of any kind."""
+    """Guess by the site's rules, else the one category of the kind, else one for standard parts of any
+    kind.
+    """
     kind = standard_kind(designation)
     for named in filter(None, (kind, _ALSO.get(kind))):
         words = frozenset(stems(f"{designation} {named}"))

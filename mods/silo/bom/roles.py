@@ -359,7 +359,9 @@ class Reading:
         )
 
     def _find_repeated(self, tree: Tree) -> None:
-        """Find what arrays and compounds show: it never counts where it lies, nor do elements of link arrays."""
+        """Find what arrays and compounds show: it never counts where it lies, nor do elements of link
+        arrays.
+        """
         has_elements = any(kind is Kind.ELEMENT for _, kind in tree.members.values())
         for name, (obj, kind) in tree.members.items():
             if kind is Kind.LINK and has_elements:

@@ -85,7 +85,9 @@ class _Lying:
         )
 
     def is_inner(self, name: str) -> bool:
-        """Return True for what lies in a container, also through folders, and for the copies that one made."""
+        """Return True for what lies in a container, also through folders, and for the copies that one
+        made.
+        """
         if name not in self._inner:
             self._inner[name] = any(kind in _CONTAINERS for _, kind in self.around(name))
         return self._inner[name]
@@ -241,7 +243,9 @@ def _likely(candidates: _Candidates) -> list[Any]:
 
 
 def _root_or_part(document: Any, lying: _Lying, candidates: _Candidates) -> Any:
-    """Return the one part of a file that has nothing else to count, or the document with all that lies in it."""
+    """Return the one part of a file that has nothing else to count, or the document with all that lies in
+    it.
+    """
     best = [obj for standing, obj in candidates if standing == candidates[0][0]]
     loose = lying.loose(_LOOSE)
     bodies = _loose_bodies(lying)

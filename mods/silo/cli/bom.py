@@ -147,7 +147,9 @@ def _exit_of(extraction: Extraction, args: argparse.Namespace) -> int:
 
 
 def _show_each(args: argparse.Namespace) -> int:
-    """Show each assembly of a file; of a folder with its own lines, children first. 1 where one is not whole."""
+    """Show each assembly of a file; of a folder with its own lines, children first. 1 where one is not
+    whole.
+    """
     if args.flat or args.resolve or args.csv or args.xlsx:
         raise InputError("--flat, --resolve, --csv and --xlsx are for one assembly; name its file.")
     from silo.cli import show

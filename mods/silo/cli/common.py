@@ -213,19 +213,19 @@ def refuse_idle_options(parser: argparse.ArgumentParser, args: argparse.Namespac
 
 
 def a_path(text: str) -> Path:
-    """An argument that is a path; an empty one would be the current folder."""
+    """Return an argument that is a path; an empty one would be the current folder."""
     if not text:
         raise InputError("the name of a file or folder is empty ('')")
     return Path(text)
 
 
 def job_count(text: str) -> int:
-    """How many processes, as an argument."""
+    """Return how many processes, as an argument."""
     return above_zero(text, most=512)
 
 
 def above_zero(text: str, most: int = 1_000_000_000) -> int:
-    """A count as an argument: a whole number, not 0 and not less."""
+    """Return a count as an argument: a whole number, not 0 and not less."""
     if not text.isascii() or not text.isdigit() or not 1 <= int(text[:20]) <= most:
         raise argparse.ArgumentTypeError(f"{text[:50]!r} is no number from 1 to {most}")
     return int(text)
@@ -233,7 +233,7 @@ def above_zero(text: str, most: int = 1_000_000_000) -> int:
 
 @contextmanager
 def reading_of(args: argparse.Namespace) -> Iterator[VaultReader]:
-    """What reads files, as the options say."""
+    """Yield the reader of files, as the options say."""
     from silo.vault.index import Index, default_path
     from silo.vault.reading import VaultReader, pool_of
 
@@ -258,7 +258,7 @@ def client_of(
     longest: float = 10.0,
     stop: threading.Event | None = None,
 ) -> Iterator[SiloClient]:
-    """A client for the server that the options, the environment or the configuration name.
+    """Yield a client for the server that the options, the environment or the configuration name.
 
     busy_tries, longest
         for jobs that may wait: how often a server that puts us off is asked, and the longest pause (seconds).
@@ -289,7 +289,9 @@ def client_of(
 
 
 def read_assembly(top: str) -> Extraction:
-    """The BOM of a file, read without FreeCAD; missing files come with the ones that were probably meant."""
+    """Return the BOM of a file, read without FreeCAD; missing files come with the ones that were probably
+    meant.
+    """
     from silo.fcstd import Library
 
     with Library() as library:
@@ -308,7 +310,7 @@ def _with_suggestions(extraction: Extraction) -> Extraction:
 
 
 def read_tops(args: argparse.Namespace) -> list[Extraction]:
-    """The BOM of the file that the options name, from the index where it is known. Raises SiloError.
+    """Return the BOM of the file that the options name, from the index where it is known. Raises SiloError.
 
     Of each assembly of the file if all are asked for, else one.
     """
@@ -398,7 +400,7 @@ def count_steps(count: int) -> Callable[[str], None]:
 
 @contextmanager
 def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, VaultReader, str]]:
-    """All assemblies of the folder that the options name, and the folder. InputError where it has none."""
+    """Yield all assemblies of the folder that the options name, and the folder. InputError if it has none."""
     from silo.files import documents_in
     from silo.vault.plan import make_plan
 
@@ -414,13 +416,13 @@ def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, VaultReader, str]]
 
 
 def refuse_assembly_of(tops: Sequence[str], assembly: str | None) -> None:
-    """A name picks one of the assemblies of a file; the files of a folder have their own."""
+    """Refuse --assembly for a folder: the name picks one of the assemblies of a file."""
     if assembly not in (None, EACH) and any(os.path.isdir(top) for top in tops):
         raise InputError("--assembly picks an assembly of one file, and this is a folder; name the file")
 
 
 def named_item(client: SiloClient, number: str) -> Item:
-    """The item that a person named. InputError where there is none: it is the name that is wrong."""
+    """Return the item that a person named. InputError if there is none: it is the name that is wrong."""
     try:
         return client.get_item(number)
     except RouteMissingError:
@@ -439,12 +441,12 @@ def reach(client: SiloClient, extraction: Extraction | None = None) -> None:
 
 
 def print_json(data: Any) -> None:
-    """JSON on standard output; escaped where that is not UTF-8, or a file's name is not."""
+    """Print JSON on standard output; escaped where that is not UTF-8, or a file's name is not."""
     print(json_text(data, indent=2))
 
 
 def json_text(data: Any, indent: int | None = None) -> str:
-    """JSON that standard output can take as it is."""
+    """Return JSON that standard output can take as it is."""
     text = json.dumps(data, indent=indent, ensure_ascii=False)
     unicode = (getattr(sys.stdout, "encoding", None) or "utf-8").lower().replace("-", "") == "utf8"
     try:

@@ -465,7 +465,9 @@ class _Output(io.TextIOBase):
 
 
 def _system_said_no(error: OSError) -> InputError:
-    """Return a file that we were asked to write, or the output itself: no such folder, no right, a full disk."""
+    """Return a file that we were asked to write, or the output itself: no such folder, no right, a full
+    disk.
+    """
     what = error.filename or "the output cannot be written"
     return InputError(f"{what}: {error.strerror or error}")
 

@@ -337,7 +337,7 @@ def _part(link: str, part: PartResult) -> dict[str, Any]:
 
 
 def _vector(values: Iterable[float], size: float) -> list[float | None]:
-    """Round to 0 what is noise against ``size`` to 0, as in the other reports."""
+    """Round to 0 what is noise against ``size``, as in the other reports."""
     return [0.0 if abs(value) <= NOISE * size else _finite(value) for value in values]
 
 

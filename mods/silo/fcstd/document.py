@@ -292,7 +292,9 @@ class FcstdObject:
         del self.__dict__
 
     def shape_key(self) -> str:
-        """Return something equal for equal shapes, wherever they are placed; "" if the object has no shape."""
+        """Return something equal for equal shapes, wherever they are placed; "" if the object has no
+        shape.
+        """
         value = self.properties.value("Shape") if "Shape" in self.properties.numbers else None
         return self.Document.shape_key(value.name) if isinstance(value, ShapeFile) else ""
 
@@ -439,12 +441,16 @@ class FcstdDocument:
 
     @cached_property
     def Label(self) -> str:
-        """Return the file's name without its ending; FreeCAD ignores the saved label (``Document::Restore``)."""
+        """Return the file's name without its ending; FreeCAD ignores the saved label
+        (``Document::Restore``).
+        """
         return os.path.splitext(os.path.basename(self.FileName))[0]
 
     @cached_property
     def Name(self) -> str:
-        """Return the internal name that FreeCAD would give: the file's, in ASCII letters, digits and ``_``."""
+        """Return the internal name that FreeCAD would give: the file's, in ASCII letters, digits and
+        ``_``.
+        """
         name = re.sub(r"[^A-Za-z0-9_]", "_", self.Label)
         return f"_{name}" if name[:1].isdigit() else name or "Unnamed"
 

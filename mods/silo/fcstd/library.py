@@ -389,7 +389,9 @@ class Library:
         return document
 
     def glance(self, path: Path | str) -> FcstdDocument:
-        """Return the document in a file, of which only as much is read as is asked for. Raises DocumentError."""
+        """Return the document in a file, of which only as much is read as is asked for. Raises
+        DocumentError.
+        """
         opened = os.path.abspath(path)
         return self._document(FoundFile(opened, self._locator.real(opened)))
 

@@ -120,7 +120,9 @@ def place_of(content: Path | str, path: str) -> ProjectPlace:
 
 
 def identity_in(library: Library, path: str) -> str:
-    """Return the identity of the item that a file belongs to; "" if it has none or several, or is unreadable."""
+    """Return the identity of the item that a file belongs to; "" if it has none or several, or is
+    unreadable.
+    """
     try:
         return file_item(library.glance(path)) or ""
     except DocumentError:

@@ -342,7 +342,9 @@ class _Run:
         return summary
 
     def _is_there(self, entry: Entry) -> bool:
-        """Return False if a file that was sent is gone, and its BOM would go alone: the server was restored."""
+        """Return False if a file that was sent is gone, and its BOM would go alone: the server was
+        restored.
+        """
         try:
             revisions = self.client.revisions(entry.part_number)
         except RouteMissingError:

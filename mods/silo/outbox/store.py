@@ -233,7 +233,9 @@ class QueueDatabase:
         return result
 
     def aside(self, path: str) -> Path:
-        """Return a new place for a copy of a file; its folder is there. DocumentError if it cannot be made."""
+        """Return a new place for a copy of a file; its folder is there. DocumentError if it cannot be
+        made.
+        """
         folder = self._kept_aside / time.strftime("%Y-%m-%d")
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -342,7 +344,9 @@ class FileOrigins(QueueDatabase):
             db.execute("DELETE FROM derived WHERE at < ?", (self.clock() - _REMEMBERED,))
 
     def known_revision(self, server: str, sha256: str, item: str) -> int | None:
-        """Return the revision that a file is, for servers that keep no checksums; None if that is not known."""
+        """Return the revision that a file is, for servers that keep no checksums; None if that is not
+        known.
+        """
         with self._open() as db:
             row = db.execute(
                 "SELECT revision FROM known WHERE server = ? AND sha256 = ? AND item = ?",

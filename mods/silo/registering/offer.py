@@ -608,7 +608,9 @@ def chosen(articles: Sequence[Modelled], names: Iterable[str], *, apart: bool = 
 
 
 def source_identity(article: Modelled) -> str | None:
-    """Return the identity of the file that A2plus imported an article from; None if there is none to be read."""
+    """Return the identity of the file that A2plus imported an article from; None if there is none to be
+    read.
+    """
     if not article.source or not os.path.isfile(article.source):
         return None
     try:

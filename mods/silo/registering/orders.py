@@ -491,7 +491,9 @@ def remarks(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
 
 
 def write_table(offer: Offer, wanted: Callable[[Candidate], bool], base: str) -> bytes:
-    """Return the table (RFC 4180, UTF-8 with a mark that spreadsheets want); ``wanted``: what says ``yes``."""
+    """Return the table (RFC 4180, UTF-8 with a mark that spreadsheets want); ``wanted``: what says
+    ``yes``.
+    """
     out = io.StringIO()
     writer = csv.DictWriter(out, COLUMNS)
     writer.writeheader()
@@ -550,7 +552,9 @@ class TableRow:
 
 
 def read_table(data: bytes, name: str) -> list[TableRow]:
-    """Return the rows of a table, as a spreadsheet or an editor saved it. InputError lists all that is wrong."""
+    """Return the rows of a table, as a spreadsheet or an editor saved it. InputError lists all that is
+    wrong.
+    """
     text = _decoded(data, name)
     first = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=first.count)

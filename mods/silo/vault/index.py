@@ -226,7 +226,9 @@ def _removed(path: Path) -> bool:
 
 
 def _may_replace(path: Path) -> bool:
-    """Return True for a path where nothing is, and for a database of ours, however damaged behind its head."""
+    """Return True for a path where nothing is, and for a database of ours, however damaged behind its
+    head.
+    """
     try:
         with path.open("rb") as file:
             head = file.read(72)
@@ -356,7 +358,9 @@ class StoredAnswer(NamedTuple):
 
     @property
     def links(self) -> frozenset[str]:
-        """Return the files that links lead to, counted or not; of those that are not there what is recorded."""
+        """Return the files that links lead to, counted or not; of those that are not there what is
+        recorded.
+        """
         if self.is_of_one_file:
             return frozenset()
         files, lookups = json.loads(self.trail)

@@ -124,7 +124,9 @@ def _without(message: str, base: str, root: Path | str | None) -> str:
 
 
 def _users_first(paths: Sequence[str], library: Library) -> list[str]:
-    """Return files that no other links to come first, so that what they use is walked once, as part of them."""
+    """Return files that no other links to come first, so that what they use is walked once, as part of
+    them.
+    """
     used: set[str] = set()
     for path in paths:
         with suppress(SiloError):  # reported where it is read
@@ -446,7 +448,9 @@ def _report_rings(plan: Plan, keys: Sequence[Key]) -> None:
 
 
 def _find_copies(plan: Plan) -> None:
-    """Find files that claim to be one item: fine where they hold the same, else no BOM of that item is right."""
+    """Find files that claim to be one item: fine where they hold the same, else no BOM of that item is
+    right.
+    """
     users: dict[str, list[PlannedAssembly]] = {}
     for node in plan.nodes.values():
         if node.uuid:
@@ -608,7 +612,9 @@ class SyncJob:
         ]
 
     def _with_suggestion(self, resolved: Resolved, lines: Lines) -> Resolved:
-        """Return missing files, with those that have the identity which the server knows from the last sync."""
+        """Return missing files, with those that have the identity which the server knows from the last
+        sync.
+        """
         line = lines.get(resolved.assembly.part_number or "", ())
         return suggest_by_identity(resolved, [(resolved, line)], self._files_with if self.base else None)
 

@@ -532,7 +532,9 @@ def _ups(position: str) -> tuple[int, list[str]]:
 
 
 def _anchor(tree: FileTree, places: Sequence[str], into: Path) -> Path:
-    """Return where the folder of the places begins: the item may have its file in the user's folder already."""
+    """Return where the folder of the places begins: the item may have its file in the user's folder
+    already.
+    """
     top, name = tree.files[0], posixpath.basename(places[0])
     path = into.joinpath(*places[0].split("/"))
     if path.exists() or not into.is_dir():

@@ -533,7 +533,9 @@ def grouped(several: Iterable[T], size: int) -> Iterator[list[T]]:
 
 
 def tapered(several: Sequence[T], size: int, jobs: int) -> Iterator[Sequence[T]]:
-    """Yield lists of ``size``, and smaller ones towards the end, so that no worker is left with much to do."""
+    """Yield lists of ``size``, and smaller ones towards the end, so that no worker is left with much
+    to do.
+    """
     at = 0
     while at < len(several):
         some = min(size, max(_LEAST, (len(several) - at) // (3 * jobs)))

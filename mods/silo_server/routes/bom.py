@@ -304,7 +304,9 @@ def get_where_used(
     limit: Annotated[int, Query(ge=1, le=1000)] = 1000,
     offset: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
 ) -> Response:
-    """Return the parents; with ``indirect`` theirs as well. ``X-Total-Count`` says how many there are in all."""
+    """Return the parents; with ``indirect`` theirs as well. ``X-Total-Count`` says how many there are in
+    all.
+    """
     with call.read() as tx:
         item = get_item(tx, part_number)
         usages, total = tree.where_used(tx, item, indirect=indirect, limit=limit, offset=offset)

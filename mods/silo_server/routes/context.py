@@ -227,7 +227,9 @@ def etag_of(version: int) -> str:
 
 
 def expected_version(request: Request) -> int | None:
-    """Return the version in ``If-Match``, None if there is none (or ``*``); -1 for one that cannot be ours."""
+    """Return the version in ``If-Match``, None if there is none (or ``*``); -1 for one that cannot be
+    ours.
+    """
     header = request.headers.get("if-match", "").strip()
     if header in ("", "*"):
         return None

@@ -465,7 +465,9 @@ _DRAWN = {
 
 @revisions_router.put("/thumbnail", status_code=204, responses=WRITE_ERRORS, openapi_extra=_DRAWN)
 async def put_thumbnail(call: Editor, part_number: str) -> Response:
-    """A picture of an item that has none: what a browser drew of its model. A new file takes it away."""
+    """Return a picture of an item that has none: what a browser drew of its model. A new file takes it
+    away.
+    """
     picture = await call.request.body()
 
     def work() -> Response:
@@ -604,7 +606,9 @@ def document_at(uuid: str) -> Find:
 
 @by_uuid.post("/documents/by-uuid", response_model=DocumentsOut, responses=READ_ERRORS)
 def get_documents(call: Viewer, body: UuidsBody) -> Response:
-    """Return many documents in one request; those that are not known are absent. Reads only, so a viewer may."""
+    """Return many documents in one request; those that are not known are absent. Reads only, so a viewer
+    may.
+    """
     with call.read() as tx:
         documents = revisions.shown(tx, revisions.documents_by_uuid(tx, body.uuids))
     return json_answer({"documents": [to_wire(document) for document in documents]})
@@ -612,7 +616,9 @@ def get_documents(call: Viewer, body: UuidsBody) -> Response:
 
 @by_uuid.get("/items/{part_number}/documents", response_model=DocumentsOut, responses=READ_ERRORS)
 def documents_of(call: Viewer, part_number: str) -> Response:
-    """Return the documents that hold an item: its own, or the file of several parts in which it is an object."""
+    """Return the documents that hold an item: its own, or the file of several parts in which it is an
+    object.
+    """
     with call.read() as tx:
         documents = revisions.shown(tx, revisions.documents_holding(tx, items.get_item(tx, part_number)))
     return json_answer({"documents": [to_wire(document) for document in documents]})

@@ -118,7 +118,9 @@ def _part(call: Call, sha256: str, part: scene.Part, kind: str, version: str) ->
 def get_scene(
     call: Viewer, part_number: str, revision: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None
 ) -> Response:
-    """Return where each part of a product stands: in the newest files, or in those that a revision recorded."""
+    """Return where each part of a product stands: in the newest files, or in those that a revision
+    recorded.
+    """
     with call.server.large_reads.enter(), call.read() as tx:
         item = items.get_item(tx, part_number, include_archived=True)
         return json_answer(scene.scene(tx, call.server.files, item, revision))

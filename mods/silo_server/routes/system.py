@@ -356,7 +356,9 @@ def list_audit(
 
 
 def set_session_cookie(response: Response, request: Request, session: access.NewSession) -> None:
-    """Set the session's cookie: not for scripts, not for other sites, and only over TLS where there is TLS."""
+    """Set the session's cookie: not for scripts, not for other sites, and only over TLS where there is
+    TLS.
+    """
     settings = server_of(request).settings
     response.set_cookie(
         SESSION_COOKIE,

@@ -178,7 +178,9 @@ def describe(schema: Schema) -> dict[str, Any]:
 
 
 def _described_rules(schema: Schema) -> dict[str, Any]:
-    """Return a wrong file costs the proposals, not the schema; those who register parts read what is wrong."""
+    """Return a wrong file costs the proposals, not the schema; those who register parts read what is
+    wrong.
+    """
     try:
         return {"category_rules": category_rules(schema)}
     except ConfigError as error:

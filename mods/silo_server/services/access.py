@@ -325,7 +325,9 @@ class Token:
 
 
 def secret_hash(secret: str) -> str:
-    """Return what is stored of a secret. The secrets are 160 random bits, so that a plain SHA-256 is enough."""
+    """Return what is stored of a secret. The secrets are 160 random bits, so that a plain SHA-256 is
+    enough.
+    """
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 

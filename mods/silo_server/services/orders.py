@@ -295,7 +295,9 @@ def _summed(
 
 
 def _ids_of(tx: Tx, items_by_id: Mapping[int, Item]) -> dict[int, int]:
-    """Return the internal ids of items that were frozen, by the number that they have in the frozen product."""
+    """Return the internal ids of items that were frozen, by the number that they have in the frozen
+    product.
+    """
     query = select(items.c.uuid, items.c.id).where(
         one_of(tx, items.c.uuid, {each_item.uuid for each_item in items_by_id.values()})
     )

@@ -93,7 +93,9 @@ class Frozen(NamedTuple):
 
 
 def labels(scheme: str) -> Iterator[str]:
-    """Yield all labels of a scheme in their order: ``letters`` A, B, …, Z, AA, … or ``numbers`` 1.0, 2.0, …"""
+    """Yield all labels of a scheme in their order: ``letters`` A, B, …, Z, AA, … or ``numbers`` 1.0,
+    2.0, …
+    """
     if scheme == "numbers":
         yield from (f"{number}.0" for number in count(1))
     for length in count(1):

@@ -433,7 +433,9 @@ def _to_revision(row: Row[Any]) -> Revision:
 
 
 def revision_to_wire(of: Item | Document, revision: Revision, *, links: bool = False) -> dict[str, Any]:
-    """Return a revision, under the contract's names; its links only where they are wanted, there may be many."""
+    """Return a revision, under the contract's names; its links only where they are wanted, there may be
+    many.
+    """
     number = of.part_number if isinstance(of, Item) else ""
     return {"part_number": number, **to_wire(revision, *(() if links else ("links",)))}
 
@@ -620,7 +622,9 @@ def read_thumbnail(path: Path) -> bytes | None:
 
 
 def _directory_size(path: Path) -> int:
-    """Return the bytes of a zip's directory by its end record; a huge number for ZIP64, 0 if this is no zip."""
+    """Return the bytes of a zip's directory by its end record; a huge number for ZIP64, 0 if this is no
+    zip.
+    """
     with path.open("rb") as source:
         length = source.seek(0, os.SEEK_END)
         source.seek(max(0, length - END_SIZE - 0xFFFF))

@@ -65,7 +65,9 @@ def words_of(written: str) -> list[str]:
 
 
 def fits(asked: str) -> Callable[..., bool]:
-    """Return a test of texts: true where every word of ``asked`` is in one of them, without case and accents."""
+    """Return a test of texts: true where every word of ``asked`` is in one of them, without case and
+    accents.
+    """
     wanted = words_of(asked)
 
     def test(*texts: str | None) -> bool:

@@ -46,7 +46,7 @@ Form = Annotated[FormData, Depends(_form)]
 
 
 def text(form: FormData, name: str, most: int = 500) -> str:
-    """A text field, trimmed; "" where it is absent or a file. RejectedError above ``most``."""
+    """Return a text field, trimmed; "" if it is absent or a file. RejectedError above ``most``."""
     value = form.get(name)
     if not isinstance(value, str):
         return ""
@@ -66,18 +66,18 @@ def text(form: FormData, name: str, most: int = 500) -> str:
 
 
 def texts(form: FormData, name: str) -> list[str]:
-    """All values of a repeated field."""
+    """Return all values of a repeated field."""
     return [value for value in form.getlist(name) if isinstance(value, str)]
 
 
 def password_of(form: FormData, name: str) -> str:
-    """A password as it was typed: spaces at its ends belong to it."""
+    """Return a password as it was typed: spaces at its ends belong to it."""
     value = form.get(name)
     return value[: MAX_PASSWORD + 1] if isinstance(value, str) else ""
 
 
 def whole(form: FormData, name: str) -> int | None:
-    """A whole number, None where there is none."""
+    """Return a whole number, None if there is none."""
     return whole_number(text(form, name))
 
 
@@ -105,7 +105,7 @@ class UnsentForm:
 
     @property
     def typed(self) -> list[tuple[str, str]]:
-        """(field, text) of what a person typed or chose, in words."""
+        """Return (field, text) of what a person typed or chose, in words."""
         typed_fields = [
             (name, value) for name, value in self.fields if value and not _MACHINE.fullmatch(name)
         ]
@@ -115,7 +115,7 @@ class UnsentForm:
 
     @property
     def packed(self) -> str:
-        """As one text, which travels in the login form; "" for one that is too large."""
+        """Return the form as one text, which travels in the login form; "" if it is too large."""
         text = json.dumps([self.path, self.fields, self.files])
         if len(text) > MOST_KEPT:
             return ""
@@ -130,7 +130,7 @@ def _label(name: str) -> str:
 
 
 def kept_form(path: str, form: FormData) -> UnsentForm | None:
-    """What a form holds but its secret; None where it holds a password."""
+    """Return what a form holds but its secret; None if it holds a password."""
     if _PASSWORDS & form.keys():
         return None
     pairs = form.multi_items()
@@ -140,7 +140,7 @@ def kept_form(path: str, form: FormData) -> UnsentForm | None:
 
 
 def unpacked(packed: str) -> UnsentForm | None:
-    """What :attr:`Kept.packed` was made of; None where it was not, or leads elsewhere."""
+    """Return what :attr:`Kept.packed` was made of; None if it was not, or leads elsewhere."""
     unpacker = zlib.decompressobj()
     try:
         data = unpacker.decompress(base64.b64decode(packed, validate=True), MOST_KEPT * 4)
@@ -152,13 +152,15 @@ def unpacked(packed: str) -> UnsentForm | None:
 
 
 def local_path(target: str) -> str:
-    """``target`` where it is a path of this server, else the start page: nobody is sent elsewhere."""
+    """Return ``target`` where it is a path of this server, else the start page: nobody is sent elsewhere."""
     plain = target.startswith("/") and not target.startswith(("//", "/\\"))
     return target if plain and target.isprintable() else "/"
 
 
 def own_site(request: Request) -> bool | None:
-    """True for a form of one of our pages, False for another site's, None where the browser does not say."""
+    """Return True for a form of one of our pages, False for another site's, None if the browser does not
+    say.
+    """
     site = request.headers.get("sec-fetch-site")
     if site is not None:
         return site in ("same-origin", "none")
@@ -175,7 +177,7 @@ class AmbiguousError(RejectedError):
 
 
 def amount(typed: str, name: str = "quantity") -> float:
-    """A quantity as people type it (``silo.bom.numbers``); RejectedError says what is wrong with it.
+    """Return a quantity as people type it (``silo.bom.numbers``); RejectedError says what is wrong with it.
 
     Raises AmbiguousError for "1,000": the person is asked which of the two numbers was meant.
     """
@@ -207,12 +209,13 @@ class Edit:
 
 
 def same_text(a: str, b: str, *, lines: bool = False) -> bool:
-    """True for two texts that a form sends back alike: without spaces at the ends, and without line breaks.
+    """Return True for two texts that a form sends back alike: without spaces at the ends, and without line
+    breaks.
 
     Programs store such texts, which nobody has changed where only a browser did.
 
     lines
-        the field has several lines, and keeps their breaks, each as ``\\n``.
+        the field has several lines, and keeps their breaks, each as ``\n``.
     """
 
     def sent(text: str) -> str:
@@ -230,7 +233,7 @@ def compared(
     together: Sequence[Sequence[str]] = (),
     same: Callable[[str, str, str], bool] = lambda _name, a, b: a == b,
 ) -> Edit:
-    """Three texts of each field: as it is now, as the form showed it, as it came back. Pure.
+    """Compare three texts of each field: as it is now, as the form showed it, as it came back. Pure.
 
     A field that the form did not show or did not send is one that the person did not change.
 
@@ -303,7 +306,7 @@ def back_with_secret(request: Request, path: str, name: str, secret: str) -> Res
 
 
 def secret_of(request: Request) -> tuple[str, str] | None:
-    """(name, secret) that waits to be shown on this page, None where there is none."""
+    """Return (name, secret) that waits to be shown on this page, None if there is none."""
     try:
         name, secret = json.loads(unquote(request.cookies.get(SECRET_COOKIE, "")))
     except (ValueError, TypeError):

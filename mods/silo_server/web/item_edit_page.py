@@ -296,7 +296,9 @@ def _change(tx: Tx, item: Item, typed: Mapping[str, str], mine: set[str], commen
 def _properties(
     typed: Mapping[str, str], before: Mapping[str, Any], changed: set[str] | Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the properties behind a form, and what is wrong with it; ``changed`` empty: all that is typed."""
+    """Return the properties behind a form, and what is wrong with it; ``changed`` empty: all that is
+    typed.
+    """
     fields = {property_field.name: property_field for property_field in find_schema(None).fields}
     properties, problems = dict(before), []
     for key in changed or [key for key in typed if key.startswith(("p.", "o."))]:

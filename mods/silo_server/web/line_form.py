@@ -231,7 +231,9 @@ def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
 def _cad_words(
     line: Line, quantities: Mapping[int, float], by_hand: Change | None, merge: Change | None
 ) -> str:
-    """Return what CAD says of a line whose quantity a person changed: the same as the conflict above it says."""
+    """Return what CAD says of a line whose quantity a person changed: the same as the conflict above it
+    says.
+    """
     if line.child_id in quantities:
         said = quantities[line.child_id]
         return (

@@ -147,7 +147,9 @@ async def error_page(request: Request, plain: Response) -> Response:
 
 
 def _page_above(request: Request) -> str:
-    """Return the page that the form of this address stands on: the nearest one above that can be looked at."""
+    """Return the page that the form of this address stands on: the nearest one above that can be
+    looked at.
+    """
     path = request.scope["path"].rstrip("/")
     while path:
         path = path.rpartition("/")[0]

@@ -66,7 +66,9 @@ def _show(
 
 
 def state_of(tx: Tx, item: Item, list_of_releases: list[Release] | None = None) -> dict[str, Any]:
-    """Return what pages say of a product: the revision that is released, and whether something changed since."""
+    """Return what pages say of a product: the revision that is released, and whether something changed
+    since.
+    """
     list_of_releases = releases.list_releases(tx, item) if list_of_releases is None else list_of_releases
     released = next((release for release in list_of_releases if release.status == "released"), None)
     waiting = next((release for release in list_of_releases if release.status == "review"), None)

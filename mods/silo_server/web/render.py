@@ -289,7 +289,9 @@ def isolate(text: str) -> str:
 
 
 def closed(text: str) -> str:
-    """Return ``text`` without characters that turn what follows it: isolates are closed, all others left out."""
+    """Return ``text`` without characters that turn what follows it: isolates are closed, all others left
+    out.
+    """
     if TURNING.search(text) is None:
         return text
     kept: list[str] = []

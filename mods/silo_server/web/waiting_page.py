@@ -190,7 +190,9 @@ def _view_of(form: FormData) -> dict[str, str]:
 
 
 def _gone(call: Call, action: Action, chosen: Sequence[str]) -> dict[str, Sequence[Line]]:
-    """Return part number → the lines that ``action`` would remove; what has changed since is left out here."""
+    """Return part number → the lines that ``action`` would remove; what has changed since is left out
+    here.
+    """
     result: dict[str, Sequence[Line]] = {}
     with call.read() as tx:
         for value in chosen:

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 
 def _stamp(path: str) -> Stamp | None:
-    """Return what changes when a file is written; None if there is none. FreeCAD's start does not import it."""
+    """Return what changes when a file is written; None if there is none. FreeCAD's start does not import
+    it.
+    """
     from silo.platform import stamp_of
 
     return stamp_of(path)

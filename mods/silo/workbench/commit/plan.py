@@ -220,7 +220,9 @@ class CommitPlan:
 
     @property
     def is_simple(self) -> bool:
-        """Return True if there is nothing to ask: one document that can be committed, the others unchanged."""
+        """Return True if there is nothing to ask: one document that can be committed, the others
+        unchanged.
+        """
         others = all(row.state is DocumentState.RECOMPUTED for row in self.rows[:-1])
         replaced = any(row.replaced for row in self.rows)
         return others and self.top.can_commit and not self.unregistered and not replaced

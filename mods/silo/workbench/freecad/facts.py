@@ -89,7 +89,9 @@ class EditWatch:
             self._remember(doc, "", name, doc)
 
     def slotAppendDynamicProperty(self, owner: Any, name: str) -> None:
-        """Note a property that the file lacks; an object's, or the document's. A view's document has no name."""
+        """Note a property that the file lacks; an object's, or the document's. A view's document has no
+        name.
+        """
         doc = getattr(owner, "Document", owner)
         edits = self._docs.get(getattr(doc, "Name", ""))
         if edits is not None and not doc.Restoring and name not in _SHOWN:

@@ -86,7 +86,9 @@ def error(text: str) -> None:
 
 
 def log(text: str) -> None:
-    """Print a line for people who look for the cause of a problem; hidden unless FreeCAD is set to show it."""
+    """Print a line for people who look for the cause of a problem; hidden unless FreeCAD is set to
+    show it.
+    """
     FreeCAD.Console.PrintLog(visible(text) + "\n")
 
 
@@ -188,7 +190,9 @@ def _in_group(group: Any) -> list[tuple[Any, bool]]:
 
 
 def root_objects(document: Any) -> list[tuple[Any, bool]]:
-    """Return what FreeCAD shows at the root of a document: all that no part, link group, array or body holds."""
+    """Return what FreeCAD shows at the root of a document: all that no part, link group, array or body
+    holds.
+    """
     holders = [
         each_obj for each_obj in document.Objects if not each_obj.isDerivedFrom("App::DocumentObjectGroup")
     ]
@@ -233,7 +237,9 @@ def active_document() -> Any:
 
 
 def documents_by_path() -> dict[str, Any]:
-    """Return the open documents by the paths of their files, each in the one spelling that its folder lists."""
+    """Return the open documents by the paths of their files, each in the one spelling that its folder
+    lists.
+    """
     from silo.platform import Spelling  # late: FreeCAD's start waits for this module
 
     real = Spelling().real

@@ -46,7 +46,9 @@ class MassView:
     notes: tuple[str, ...]
 
     def table(self, headings: tuple[str, ...]) -> str:
-        """Return the table for the clipboard: tab-separated, numbers in kg and cm³ that a spreadsheet reads."""
+        """Return the table for the clipboard: tab-separated, numbers in kg and cm³ that a spreadsheet
+        reads.
+        """
         lines = ["\t".join(headings)]
         for row in self.rows:
             numbers = (f"{row.each:.9g}", f"{row.total:.9g}", f"{row.volume_cm3:.9g}")

@@ -82,7 +82,9 @@ _BOUNDARY = ("Forward", "Reversed")
 
 
 def faces_of(shape: Any) -> Iterator[Any]:
-    """Yield the faces, each as the solid has it (``Faces`` would list a face that is used twice only once)."""
+    """Yield the faces, each as the solid has it (``Faces`` would list a face that is used twice only
+    once).
+    """
     if shape.ShapeType == "Face":
         if shape.Orientation in _BOUNDARY:
             yield shape
@@ -93,13 +95,17 @@ def faces_of(shape: Any) -> Iterator[Any]:
 
 
 def face_of(face: Any) -> Face:
-    """Return a FreeCAD face as the integration takes it. ValueError where FreeCAD does not give enough of it."""
+    """Return a FreeCAD face as the integration takes it. ValueError where FreeCAD does not give enough of
+    it.
+    """
     wires = [wire for wire in face.childShapes() if wire.ShapeType == "Wire"]
     return Face(_surface(face), [_curve(face, edge) for wire in wires for edge in _edges(face, wire)])
 
 
 def _edges(face: Any, wire: Any) -> Iterator[Any]:
-    """Yield the edges, with the face's own orientation in them, which distinguishes the two curves of a seam."""
+    """Yield the edges, with the face's own orientation in them, which distinguishes the two curves of a
+    seam.
+    """
     listed = [edge for edge in wire.childShapes() if edge.Orientation in _BOUNDARY]
     yield from listed
     for edge in listed:

@@ -186,7 +186,9 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         return "\n".join(lines)
 
     def tell_view(self, text: str, *, agrees: bool | None) -> None:
-        """Show the result of a comparison with the 3D view, or why a line counts so many (``agrees`` None)."""
+        """Show the result of a comparison with the 3D view, or why a line counts so many (``agrees``
+        None).
+        """
         self._view_text.setText(plain(text, 2000) if "\n" not in text else text)
         widgets.paint(self._view_text, {True: Tone.GOOD, False: Tone.ERROR, None: Tone.PLAIN}[agrees])
         self._view_text.show()

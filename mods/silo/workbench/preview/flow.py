@@ -270,7 +270,9 @@ def _assembly_rows(
 def _below(
     entry: BomEntry, lines: Known, names: Mapping[str, str], above: Keys, room: int
 ) -> Iterator[PreviewRow]:
-    """Yield the lines of a sub-assembly; none where it stands above itself (a loop is reported as a finding)."""
+    """Yield the lines of a sub-assembly; none where it stands above itself (a loop is reported as a
+    finding).
+    """
     compared = lines.get(entry.key) if entry.is_assembly and entry.key not in above else None
     if compared is None:
         return
@@ -406,7 +408,9 @@ def summary(preview: Preview) -> str:
 
 
 def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:
-    """Return snapshots whose BOMs a sync sends, children before parents; without ``below`` the top one only."""
+    """Return snapshots whose BOMs a sync sends, children before parents; without ``below`` the top one
+    only.
+    """
     snapshots = []
     for compared in preview.compared[:-1] if below else ():
         if compared.to_send:

@@ -179,7 +179,9 @@ class Worker:
 
     @property
     def idle(self) -> bool:
-        """Return True if nothing runs and nothing waits, and the end of each job was handed to ``deliver``."""
+        """Return True if nothing runs and nothing waits, and the end of each job was handed to
+        ``deliver``.
+        """
         return not self.left()
 
     def _next(self) -> tuple[Job, Control] | None:

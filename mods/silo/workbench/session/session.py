@@ -356,7 +356,9 @@ class Session:
             )
 
     def no_news(self, seen: Mapping[str, Newer], identities: Iterable[str]) -> None:
-        """Note that the server has nothing newer of these items; ``seen``: what was shown when it was asked."""
+        """Note that the server has nothing newer of these items; ``seen``: what was shown when it was
+        asked.
+        """
         self._colleagues.gone(seen, identities)
         self._show(newer=self._colleagues.newer)
 

@@ -456,13 +456,17 @@ def _key(record: Mapping[str, str]) -> str:
 
 
 def _name_of(record: Mapping[str, str]) -> str:
-    """Return what a row calls its part: the name; or the value with the footprint, without KiCad's library."""
+    """Return what a row calls its part: the name; or the value with the footprint, without KiCad's
+    library.
+    """
     value = " ".join(filter(None, (record.get("value"), record.get("footprint", "").rpartition(":")[2])))
     return record.get("name") or (value if record.get("value") else record.get("description", ""))
 
 
 def _identified(tx: Tx, records: Iterable[Record]) -> Iterator[Record]:
-    """Yield the rows with the numbers of the parts that they mean; ``unknown`` names a part that is not here."""
+    """Yield the rows with the numbers of the parts that they mean; ``unknown`` names a part that is not
+    here.
+    """
     nameless = [record for _, record in records if not record.get("part_number")]
     row, by_name, by_maker = items.c, dict[str, list[str]](), dict[str, list[str]]()
     query = select(row.name, row.part_number).where(row.archived_at.is_(None)).order_by(row.part_number_key)

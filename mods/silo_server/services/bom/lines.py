@@ -91,7 +91,9 @@ MOST_LINES_AT_ONCE = 10_000
 
 
 def check_line_count(tx: Tx, parent_ids: Sequence[int]) -> None:
-    """Raise TooLargeError if several BOMs, each as often as it is named, have more lines than one answer may."""
+    """Raise TooLargeError if several BOMs, each as often as it is named, have more lines than one answer
+    may.
+    """
     row = bom_lines.c.parent_id
     query = select(row, func.count()).where(one_of(tx, row, set(parent_ids))).group_by(row)
     counts: dict[int, int] = dict(tx.conn.execute(query).all())

@@ -326,7 +326,9 @@ def last_sync(tx: Tx, parent: Item) -> LastSync:
 
 
 def last_syncs(tx: Tx, parent_ids: Collection[int]) -> dict[int, LastSync]:
-    """Return the last syncs of all these assemblies; those that were never synced (nor refused) are absent."""
+    """Return the last syncs of all these assemblies; those that were never synced (nor refused) are
+    absent.
+    """
     rows = tx.conn.execute(select(bom_last_syncs).where(one_of(tx, bom_last_syncs.c.parent_id, parent_ids)))
     return {row.parent_id: _read(row) for row in rows}
 
@@ -509,7 +511,9 @@ def _prepare(tx: Tx, parent: Item, order: MergeOrder) -> _Prepared:
 
 
 def _children(tx: Tx, order: MergeOrder, lines: Sequence[Line]) -> tuple[dict[str, int], dict[str, str]]:
-    """Return (part number → item id, key → part number) of every child; RejectedError lists all bad entries."""
+    """Return (part number → item id, key → part number) of every child; RejectedError lists all bad
+    entries.
+    """
     child_ids = {line.child_part_number: line.child_id for line in lines}
     names = {line.child_part_number.casefold(): line.child_part_number for line in lines}
     asked = {entry.key for entry in order.entries if entry.key not in names}

@@ -696,7 +696,9 @@ def editors(tx: Tx) -> list[str]:
 
 
 def badge(tx: Tx, actor: Actor) -> int:
-    """Return how much waits for one person: the open BOMs that are theirs, and the news of what they follow."""
+    """Return how much waits for one person: the open BOMs that are theirs, and the news of what they
+    follow.
+    """
     theirs = select(assignees.c.item_id).where(assignees.c.user_id == actor.own_id)
     ids = list(tx.conn.scalars(theirs))
     mine = open_among(tx, ids) if ids else 0

@@ -195,7 +195,9 @@ class Unmade(NamedTuple):
 
 
 def summary_of(tx: Tx, item: Item) -> Summary:
-    """Return the summary of one product. Raises CycleError, BusyError (it is too large, and made meanwhile)."""
+    """Return the summary of one product. Raises CycleError, BusyError (it is too large, and made
+    meanwhile).
+    """
     return summaries(tx, [item.id])[item.id]
 
 
