@@ -58,9 +58,8 @@ NO_VERB = re.compile(
     r"why|with|within|without",
     re.IGNORECASE,
 )
-PHRASE = re.compile(
-    "|".join(rf"(?P<p{n}>\b(?:{text})(?!\w))" for n, text in enumerate(BANNED)), re.IGNORECASE
-)
+# For text in lower case: a pattern that ignores case, or has a group for each phrase, is 30 times slower.
+PHRASE = re.compile(rf"\b(?:{'|'.join(BANNED)})(?!\w)")
 
 
 def problems() -> list[str]:
@@ -70,8 +69,8 @@ def problems() -> list[str]:
     found = []
     for path in sorted((*pages, *sources)):
         for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):
-            for match in PHRASE.finditer(line):
-                instead = list(BANNED.values())[int(str(match.lastgroup)[1:])]
+            for match in PHRASE.finditer(line.lower()):
+                instead = next(words for text, words in BANNED.items() if re.fullmatch(text, match[0]))
                 found.append(f"{path.relative_to(ROOT)}:{number}: “{match[0]}”: {instead}")
     for path in sorted(ROOT.glob("mods/**/*.py")):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):

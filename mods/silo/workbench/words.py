@@ -54,7 +54,7 @@ def of_command(name: str, text: str) -> str:
 
 
 def plain(text: str, most: int = 200) -> str:
-    """Text of others as one line of visible characters, cut where it is too long to help anybody."""
+    """Return text of others as one line of visible characters, cut where it is too long to help anybody."""
     # Only a little more than can be shown is looked at: a label may be megabytes long.
     head = text[: most * 4]
     shown = " ".join("".join(" " if unicodedata.category(c) in _HIDDEN else c for c in head).split())
@@ -62,7 +62,7 @@ def plain(text: str, most: int = 200) -> str:
 
 
 def told_apart(paths: Iterable[str]) -> dict[str, str]:
-    """Path → the file's name; with as many of its folders as it takes where several have that name."""
+    """Return path → the file's name; with as many of its folders as it takes where several have that name."""
     left = {path: path.replace("\\", "/").split("/") for path in paths}
     shown: dict[str, str] = {}
     depth = 0
@@ -82,7 +82,8 @@ _ZERO_WIDTH = "\u200b"
 
 
 def breakable(text: str) -> str:
-    """A text whose long words (paths, names without a blank) can be broken: after a sign or a small letter.
+    """Return a text whose long words (paths, names without a blank) can be broken: after a sign or a small
+    letter.
 
     A place where a line may end is a character without width; texts without long words stay as they are.
     """
@@ -103,7 +104,7 @@ def _broken(word: str) -> str:
 
 
 def visible(text: str, most: int = 20_000) -> str:
-    """Text of several lines for the report view and message boxes: the same, but lines and blanks stay."""
+    """Return text for the report view and message boxes as :func:`plain` does, but keep lines and blanks."""
     shown = (c if c == "\n" or unicodedata.category(c) not in _HIDDEN else " " for c in text[:most])
     return "".join(shown) + ("…" if len(text) > most else "")
 
@@ -113,7 +114,8 @@ MOST_TIP = 3000
 
 
 def tip(text: str) -> str:
-    """A tool tip. Qt takes text that looks like markup for markup, so ours is some, with nothing in it.
+    """Return a tool tip. Qt takes text that looks like markup for markup, so ours is some, with nothing in
+    it.
 
     That also breaks long lines, which a plain tool tip does not.
     """
@@ -124,10 +126,10 @@ def tip(text: str) -> str:
 
 
 def counted(count: int, singular: str, many: str) -> str:
-    """``one`` or ``many``, with ``{n}`` replaced by the count."""
+    """Return ``one`` or ``many``, with ``{n}`` replaced by the count."""
     return filled(singular if count == 1 else many, n=count)
 
 
 def quantity(value: float | None) -> str:
-    """A quantity for people."""
+    """Return a quantity for people."""
     return "?" if value is None else f"{value:g}"

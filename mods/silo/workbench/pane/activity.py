@@ -146,7 +146,7 @@ class PaneEntry:
             object.__setattr__(self, "lines", shortened(self.lines))
 
     def without_questions(self, is_answered: Callable[[Action], bool] = lambda _same: True) -> PaneEntry:
-        """Without the buttons of the questions about copied identities that have their answer.
+        """Drop the buttons of answered questions about copied identities.
 
         is_answered
             says so of a *Same part*.
@@ -165,12 +165,14 @@ class PaneEntry:
 
 
 def not_in_silo_key(path: str) -> str:
-    """The key of the box for a document without an item; a commit of it that arrives takes its place."""
+    """Return the key of the box for a document without an item; a commit of it that arrives takes its
+    place.
+    """
     return f"not-in-silo:{path}"
 
 
 def gathered(entries: Iterable[PaneEntry]) -> tuple[PaneEntry, ...]:
-    """With one box for each batch: 54 registered parts are one piece of news, and bury nothing.
+    """Merge the entries of one batch into one box.
 
     A batch is of one kind and one person, and has no pause of more than :data:`PAUSE_S` in it. Its box stands
     where its newest one would.
@@ -217,7 +219,7 @@ def _together(group: list[PaneEntry]) -> PaneEntry:
 def shortened(
     lines: tuple[Line, ...], most: int = MOST_LINES, actions: tuple[Action, ...] = ()
 ) -> tuple[Line, ...]:
-    """The first lines, and how many more there are; ``actions`` is the way to see those."""
+    """Return the first lines, and how many more there are; ``actions`` is the way to see those."""
     if len(lines) <= most:
         return lines
     left = len(lines) - most + 1
@@ -236,7 +238,7 @@ class Activity:
     entries: tuple[PaneEntry, ...] = ()
 
     def add(self, entry: PaneEntry) -> Activity:
-        """With one more entry. One with the same key and a higher rank stays as it is."""
+        """Add an entry. An entry with the same key and a higher rank stays as it is."""
         mine = {entry.key, *entry.also}
         # Events may come by the thousand, and hardly one has to do with another.
         related = [e for e in self.entries if e.key in mine or entry.key in e.also]
@@ -252,7 +254,7 @@ class Activity:
         return replace(self, entries=(*rest[:place], entry, *rest[place:])[:MOST_ENTRIES])
 
     def answered(self, is_answered: Callable[[Action], bool]) -> Activity:
-        """Without the buttons of questions that have their answer (:meth:`PaneEntry.without_questions`)."""
+        """Drop the buttons of answered questions (:meth:`PaneEntry.without_questions`)."""
         return replace(self, entries=tuple(e.without_questions(is_answered) for e in self.entries))
 
 
@@ -274,7 +276,7 @@ class Banner:
 
 
 def presence_text(newer: Newer, label: str) -> str:
-    """That a colleague committed a document since it was opened."""
+    """Say that a colleague committed a document since it was opened."""
     return translate(
         "Silo",
         "{who} committed {name} (revision {n}) since you opened it.",
@@ -285,7 +287,7 @@ def presence_text(newer: Newer, label: str) -> str:
 
 
 def banner(shown: PaneState) -> Banner:
-    """The banner for a state: the connection, and what colleagues committed of the open documents."""
+    """Return the banner for a state: the connection, and what colleagues committed of the open documents."""
     made = _connection(shown)
     if not shown.presence:
         return made
@@ -369,7 +371,7 @@ def rows(
     said: str = "",
     pause: Pause | None = None,
 ) -> tuple[WaitingRow, ...]:
-    """The entries, those first that a person has to look at.
+    """Return the entries, those first that a person has to look at.
 
     said
         the reason that the pane shows above them; no row repeats it.
@@ -380,7 +382,7 @@ def rows(
 
 
 def can_send(entries: Iterable[QueueEntry], server_url: str) -> bool:
-    """True where *Send now* would send something: not all waits for a person, an address or settings."""
+    """Return True if *Send now* would send something: not all waits for a person, an address or settings."""
     here = _address(server_url)
     # What a server that was set back has lost is sent by the same press.
     return bool(here) and not all(
@@ -390,7 +392,7 @@ def can_send(entries: Iterable[QueueEntry], server_url: str) -> bool:
 
 
 def heading(entries: Sequence[QueueEntry], server_url: str) -> str:
-    """How many things wait, and for whom."""
+    """Return how many things wait, and for whom."""
     here = _address(server_url)
     urgent = sum(_is_urgent(entry, here) for entry in entries)
     text, many = (
@@ -406,18 +408,18 @@ def heading(entries: Sequence[QueueEntry], server_url: str) -> str:
 
 
 def meant_for_another(entries: Iterable[QueueEntry], server_url: str) -> tuple[int, ...]:
-    """Entries that wait for another address than the one in use."""
+    """Return entries that wait for another address than the one in use."""
     here = _address(server_url)
     return tuple(entry.id for entry in entries if entry.is_away(here))
 
 
 def _address(server_url: str) -> str:
-    """The address in use, as entries have theirs; "" for none."""
+    """Return the address in use, as entries have theirs; "" for none."""
     return canonical(server_url) if server_url else ""
 
 
 def _is_urgent(entry: QueueEntry, here: str) -> bool:
-    """It waits for a person, not for the server."""
+    """Return True if it waits for a person, not for the server."""
     return entry.state is State.HELD or entry.is_away(here)
 
 

@@ -217,7 +217,9 @@ class RevisionFlow:
         )
 
     def _replace(self, path: str, content: Path | None, theirs: Theirs) -> None:
-        """Theirs in the place of mine, of which a copy is kept. ``content`` None: theirs is there already."""
+        """Put theirs in the place of mine, and keep a copy of mine. ``content`` None: theirs is there
+        already.
+        """
         from silo.files import content_hash
         from silo.platform import remove_patiently, replacing
 
@@ -290,7 +292,7 @@ class RevisionFlow:
     def search(
         self, words: str, done: Callable[[list[Item]], None], failed: Callable[[SiloError], None]
     ) -> None:
-        """Items whose number, name or description have all these words."""
+        """Search items whose number, name or description have all these words."""
         url = self._session.shown.server.url
 
         def told(items: list[Item]) -> None:
@@ -307,14 +309,14 @@ class RevisionFlow:
 
     @property
     def recent(self) -> list[Item]:
-        """What the server in use showed last without any words."""
+        """Return what the server in use showed last without any words."""
         url, items = self._recent
         return items if url == self._session.shown.server.url else []
 
     def details(
         self, part_number: str, done: Callable[[ItemHistory], None], failed: Callable[[SiloError], None]
     ) -> None:
-        """An item's revisions and picture."""
+        """Fetch an item's revisions and picture."""
         self._session.ask(
             translate("Silo", "Asking Silo"),
             lambda client, _control: _history_of(client, part_number),
@@ -373,7 +375,7 @@ class RevisionFlow:
         done: Callable[[ItemHistory], None],
         failed: Callable[[SiloError], None],
     ) -> None:
-        """The revisions of a document's item.
+        """Fetch the revisions of a document's item.
 
         base
             what the document was made from.
@@ -404,7 +406,7 @@ class RevisionFlow:
         done: Callable[[list[str]], None],
         failed: Callable[[SiloError], None],
     ) -> None:
-        """What a revision changed in the BOM, line by line in words; read from both files."""
+        """Compare a revision's BOM with the one before, line by line in words; both files are read."""
 
         def run(client: SiloClient, control: Control) -> list[str]:
             from silo.vault.pull import RevisionBoms, line_texts
@@ -434,18 +436,18 @@ class ProjectRow:
 
     @property
     def is_fine(self) -> bool:
-        """True where Silo has it as it is here."""
+        """Return True if Silo has it as it is here."""
         return self.state.name == "SAME" and not self.edits
 
     @property
     def tone(self) -> Tone:
-        """How its state is meant."""
+        """Return how its state is meant."""
         if self.is_fine:
             return Tone.GOOD
         return Tone.WARNING if self.state.name in ("BOTH", "NO_ITEM") else Tone.CHANGED
 
     def words(self) -> str:
-        """Its state for people."""
+        """Return its state for people."""
         texts = {
             "SAME": translate("Silo", "in Silo"),
             "NEW": translate("Silo", "not in Silo"),
@@ -474,7 +476,9 @@ class ProjectView:
     notes: tuple[str, ...] = ()
 
     def shown(self, words: str, *, only_left: bool) -> list[ProjectRow]:
-        """The rows with all of these words; ``only_left``: those that Silo has not as they are here."""
+        """Return the rows with all of these words; ``only_left``: those that Silo has not as they are
+        here.
+        """
         wanted = words.casefold().split()
         return [
             row
@@ -484,7 +488,7 @@ class ProjectView:
         ]
 
     def heading(self) -> str:
-        """How many files there are, and how many of them Silo does not have as they are here."""
+        """Return how many files there are, and how many of them Silo does not have as they are here."""
         left = sum(not row.is_fine for row in self.rows)
         return translate("Silo", "{n} files, {left} of them different from Silo", n=len(self.rows), left=left)
 
@@ -500,7 +504,7 @@ class ProjectFlow:
         self.view = ProjectView()
 
     def roots(self) -> list[str]:
-        """The project that was shown last, and those of the open documents."""
+        """Return the project that was shown last, and those of the open documents."""
         folders = {os.path.dirname(path) for path in self._desk.open_paths()}
         project_roots = {project.root for folder in folders if (project := Project.of(folder)) is not None}
         last = self._preferences.text("ProjectFolder")
@@ -534,7 +538,9 @@ class ProjectFlow:
         self._session.ask(title, lambda client, _control: work(client), told, offline)
 
     def _edited(self) -> set[str]:
-        """The open files with edits; what FreeCAD only marked has none, as far as time allows to compare."""
+        """Return the open files with edits; what FreeCAD only marked has none, as far as time allows to
+        compare.
+        """
         documents, until = self._desk.documents, time.thread_time() + MOST_S
         edited_documents = ((one_path(path), self._desk.find(path)) for path in self._desk.open_paths())
         return {
@@ -600,7 +606,7 @@ def _project_view(root: str, client: SiloClient | None, store: Store, edited: Se
 
 
 def file_in_project(folder: str, item: str) -> str:
-    """The file of an item that lies in a project already; "" where there is none."""
+    """Return the file of an item that lies in a project already; "" if there is none."""
     if (project := Project.of(folder)) is None:
         return ""
     items = project.files().items()
@@ -617,7 +623,7 @@ def _history_of(client: SiloClient, part_number: str) -> ItemHistory:
 
 
 def over_edits(pulled: Pulled) -> list[Theirs]:
-    """The new versions of files that have edits which are not in Silo."""
+    """Return the new versions of files that have edits which are not in Silo."""
     return [
         Theirs(str(file.path), file.part_number, file.revision, newer={"revision_number": file.revision})
         for file in pulled.files
@@ -626,7 +632,7 @@ def over_edits(pulled: Pulled) -> list[Theirs]:
 
 
 def left_alone(pulled: Pulled) -> Sequence[str]:
-    """What a pull did not do, in sentences."""
+    """Return what a pull did not do, in sentences."""
     from silo.vault.pull import PullState
 
     texts = {
@@ -644,7 +650,7 @@ def left_alone(pulled: Pulled) -> Sequence[str]:
 
 
 def _not_here(path: str) -> list[str]:
-    """The files that a file links to and that are not there."""
+    """Return the files that a file links to and that are not there."""
     from silo.fcstd.linked import recorded_paths
     from silo.files import FoundFile, Locator
 
