@@ -359,6 +359,7 @@ FAULTY = {
     "pull": "pull A01-0001",
     "search": "search plate",
     "show": "show A01-0001",
+    "order": "order A01-0001",
     "whoami": "whoami",
     "doctor": "doctor",
     "queue retry": "queue retry",

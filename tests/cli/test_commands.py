@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import zipfile
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -415,6 +416,45 @@ def test_resolve_shows_what_the_server_says_of_the_product(
 def flat_number(run: Any, gearbox: Path) -> str:
     """The part number of one part of the assembly."""
     return str(run("bom", gearbox, "--resolve", "--flat", "--json").json()[0]["part_number"])
+
+
+def test_the_order_list_is_that_of_the_server(run: Any, silo: Any, gearbox: Path, tmp_path: Path) -> None:
+    """For so many pieces with spares, as text, JSON, CSV and a workbook, also for one supplier."""
+    run("register", gearbox, "--yes")
+    run("sync", gearbox, "--recursive")
+    number = run("bom", gearbox, "--resolve", "--json").json()["assembly"]["part_number"]
+    one = {row["part_number"]: int(row["total"]) for row in run("order", number, "--json").json()["parts"]}
+    bought, other = list(one.items())[:2]
+    terms = {"supplier": "Misumi", "standard_cost": 0.5, "lead_time_days": 9}
+    silo.client.update_item(bought[0], properties=terms)
+    silo.client.update_item(other[0], properties={"supplier": "Norelem"})
+    words = ("order", number, "--quantity", 100, "--spares", 10)
+    told = run(*words, "--json").json()
+    rows = {row["part_number"]: row for row in told["parts"]}
+    assert rows.keys() == one.keys()
+    assert (told["pieces"], told["spares"], told["lead_time_days"], told["unpriced"]) == (100, "10", 9, 1)
+    assert rows[bought[0]]["needed"] == str(110 * bought[1])
+    assert Decimal(told["total_cost"]) == Decimal(rows[bought[0]]["cost"]) == 55 * bought[1]
+    text = run(*words).out
+    assert "This is the draft, not a released revision" in text
+    assert f"Cost: {told['total_cost']} EUR, without 1 of the bought parts. Longest lead time: 9 days" in text
+    ran = run(*words, "--csv", "-", "--supplier", "Misumi")
+    table = list(csv.reader(ran.out.splitlines()))
+    head = next(row for row in table if "Part number" in row)
+    column = head.index("Part number")
+    assert [row[column] for row in table[table.index(head) + 1 :]] == [bought[0]]
+    for end in ("csv", "xlsx"):
+        path = tmp_path / f"order.{end}"
+        assert run(*words, f"--{end}", path, "--kind", "unsaid").code == 0
+        assert path.stat().st_size > 100
+    for wrong, code, why in (
+        (("order", "X99-9999"), 2, "there is no item"),
+        (("order", number, "--supplier", "Misumi"), 2, "does nothing without --csv or --xlsx"),
+        (("order", number, "--revision", "B"), 3, "B"),
+        (("order", number, "--spares", "many"), 3, "spares"),
+    ):
+        ran = run(*wrong)
+        assert (ran.code, why in ran.err) == (code, True), ran.err
 
 
 @pytest.mark.usefixtures("needs_locks")

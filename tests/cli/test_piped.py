@@ -38,6 +38,10 @@ COMMANDS: dict[str, tuple[Sequence[str], set[str]]] = {
     "pull": (("pull", "A01-0001", "--into", "pulled"), set()),
     "search": (("search", "bracket"), set()),
     "show": (("show", "A01-0001"), set()),
+    "order": (
+        ("order", "A01-0001", "--quantity", "7"),
+        {"total", "costs", "path", "prices", "minimum", "pack_size"},
+    ),
     "whoami": (("whoami",), set()),
     "log": (("log", "vault/top.FCStd"), {"file_name", "created_at"}),
 }
@@ -97,6 +101,11 @@ def test_piped_text_holds_every_string_of_the_json(run: Any, silo: Any, project:
         run("register", "vault", "--yes")
         for item in silo.client.search_items():
             silo.client.upload_file(item.part_number, project / "top.FCStd", LONG)
+    if name == "order":
+        run("sync", "vault", "--allow-missing")
+        for line in silo.client.get_bom("A01-0001"):
+            sold = {"supplier": f"Misumi, {LONG}", "supplier_part_number": LONG[::-1], "standard_cost": 0.25}
+            silo.client.update_item(line.child_part_number, properties=sold)
     text = run(*words)
     found = run(*words, "--json").json()
     missing = {one for one in strings(found, without) if one not in text.out + text.err}

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from server_testing import Api, bom
 from web_visitor import Visitor
 
 from silo_server.run import RunningServer
+from silo_server.services.bom import review
 from silo_server.services.bom.review import keep_looks
 
 
@@ -82,8 +84,33 @@ def test_news_of_a_folder_are_of_the_boms_in_it(api: Api, visitors: dict[str, Vi
     assert f">{name}<" in viewer.get("/mine").body.decode().replace("<bdi>", "").replace("</bdi>", "")
     assert viewer.post("/mine/seen").status == 303
     assert badge(viewer) == 0
+    # What a person does in a folder is no news for that person.
+    editor, line = visitors["editor"], api.lines(one)[part]["id"]
+    follow(editor, folder=name, on="yes")
+    form = {"quantity": "7", "was_quantity": "1", "mark": "", "at": "0"}
+    assert editor.post(f"/items/{one}/bom/lines/{line}", **form).status == 303
+    assert (badge(editor), badge(viewer)) == (0, 1)
+    follow(editor, target=f"folder:{name}")
     for wrong in ({"target": "item:nothing"}, {"folder": "/"}, {"target": "planet:mars"}):
         assert viewer.post("/mine/follow", **wrong, on="yes").status == 400
+
+
+def test_a_person_follows_so_much_and_no_more(
+    api: Api, visitors: dict[str, Visitor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the limit, what is followed may be followed again, which ends its news; another item is refused."""
+    first, second = (f"item:{api.get(f'/api/items/{number}')['id']}" for number in api.items(2))
+    admin = visitors["admin"]
+    follow(admin, target=first, on="yes")
+    monkeypatch.setattr(review, "MOST_FOLLOWED", 1)
+    follow(admin, target=first, on="yes")
+    refused = admin.post("/mine/follow", target=second, on="yes")
+    assert (refused.status, b"at most 1 items" in refused.body) == (400, True)
+    page = admin.get("/mine").body.decode()
+    assert (first in page, second in page) == (True, False)
+    follow(admin, target=first)
+    follow(admin, target=second, on="yes")
+    follow(admin, target=second)
 
 
 def test_what_is_open_has_somebody_who_settles_it(api: Api, visitors: dict[str, Visitor]) -> None:
@@ -101,7 +128,11 @@ def test_what_is_open_has_somebody_who_settles_it(api: Api, visitors: dict[str, 
     assert f"/items/{top}/bom" not in editor.get(f"/waiting?who=-&q={top}").body.decode()
     assert f"<option selected>{name}</option>" in editor.get(f"/items/{top}/bom").body.decode()
     viewer = visitors["viewer"]
-    for one, status in (("viewer", 403), ("nobody-of-this-name", 404)):
+    api.good("POST", "/api/users", {"username": "former", "role": "editor"})
+    assert "<option>former</option>" in editor.get(f"/items/{top}/bom").body.decode()
+    api.good("PUT", "/api/users/former", {"active": False})
+    assert "<option>former</option>" not in editor.get(f"/items/{top}/bom").body.decode()
+    for one, status in (("viewer", 403), ("former", 403), ("nobody-of-this-name", 404)):
         assert editor.post("/waiting/assign", chosen=f"{top} -", assignee=one).status == status
     assert viewer.post("/waiting/assign", chosen=f"{top} -", assignee=name).status == 403
     assert badge(editor) == 1

@@ -20,6 +20,7 @@ from web_visitor import HTML, ROLES, Visitor, enter
 
 from silo_server.run import running_server
 from silo_server.settings import Settings
+from silo_server.web import orders_page
 
 TOKEN = "silo_pages"
 VIEWER, EDITOR, ADMIN = ROLES
@@ -531,6 +532,35 @@ def test_an_order_list_shows_what_it_knows(api: Api, visitors: dict[str, Visitor
     page = visitors[EDITOR].get(f"/items/{top}/order").body.decode()
     assert "Longest lead time" in page
     assert "no price" in page
+
+
+def test_an_order_list_has_pages_with_the_totals_of_all(
+    api: Api, visitors: dict[str, Visitor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By supplier, then made, then the others; page 0 has all, for paper. Exports are whole."""
+    monkeypatch.setattr(orders_page, "PAGE_ROWS", 2)
+    top, *parts = api.items(6)
+    api.merge(top, dict.fromkeys(parts, 1))
+    for part, supplier, days in zip(parts, ("bolts", "Axles", "bolts"), (3, 9, 4), strict=False):
+        terms = {"supplier": supplier, "standard_cost": 100 + days, "lead_time_days": days}
+        api.good("PATCH", f"/api/items/{part}/properties", terms)
+    api.good("PUT", f"/api/items/{parts[3]}", {"sourcing_type": "manufactured"})
+    as_shown = [parts[1], *sorted((parts[0], parts[2])), parts[3], parts[4]]
+
+    def shown(query: str) -> list[str]:
+        page = visitors[EDITOR].get(f"/items/{top}/order{query}").body.decode()
+        for words in ("316.00 EUR", "3 bought parts, 1 made part, 1 neither", "9 days"):
+            assert words in page
+        return re.findall(r'aria-label="Choose ([^"]+)"', page)
+
+    assert [shown(f"?page={number}") for number in (1, 2, 3)] == [as_shown[:2], as_shown[2:4], as_shown[4:]]
+    assert shown("?page=99") == as_shown[4:]
+    assert shown("?page=0") == as_shown
+    second = visitors[EDITOR].get(f"/items/{top}/order?pieces=7&page=2").body.decode()
+    assert f"/items/{top}/order?pieces=7&amp;page=3" in second
+    (export,) = re.findall(r'"(/api/[^"]+order.csv[?]pieces=7&amp;kind=bought)"', second)
+    written = visitors[EDITOR].get(unescape(export)).body.decode()
+    assert all(part in written for part in as_shown[:3])
 
 
 def test_only_the_newest_change_of_suppliers_is_undone(api: Api, visitors: dict[str, Visitor]) -> None:

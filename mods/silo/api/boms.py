@@ -28,6 +28,7 @@ from silo.api.wire import (
     MergeRequest,
     MergeResult,
     MergeWarning,
+    OrderList,
     ProductChanges,
     ProductSummary,
     Quantity,
@@ -281,6 +282,19 @@ class BomCalls(Caller):
         query = {"from": since, **({"to": until} if until else {})}
         where = (f"what changed in {part_number}", *_bom(part_number), "changes")
         return self._get(*where, params=query).model(ProductChanges)
+
+    def get_order(self, part_number: str, /, **asked: str | int) -> OrderList:
+        """Return what to order for so many ``pieces``; with ``spares``, of a ``release``, only the ``rest``.
+
+        Raises :class:`RouteMissingError` from a server without order lists.
+        """
+        where = (f"the order list of {part_number}", "items", part_number, "order")
+        return self._get(*where, params=asked).model(OrderList)
+
+    def get_order_table(self, part_number: str, end: str, /, **asked: str | int) -> bytes:
+        """Return the same as a table, ``csv`` or ``xlsx``: the parts of a ``kind``, or of a ``supplier``."""
+        where = (f"the order list of {part_number}", "items", part_number, f"order.{end}")
+        return self._get(*where, params=asked).content
 
     def get_bom_version(self, part_number: str, /) -> str | None:
         """Return the version of the BOM as it is now, for ``if_match``; None if the server keeps none."""

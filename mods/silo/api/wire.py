@@ -145,6 +145,59 @@ class SupplierPart(Answer):
     preferred: bool = False
 
 
+class PartFile(Answer):
+    """A file of a part, and its path below ``/api/``."""
+
+    name: str
+    path: str
+
+
+class OrderPart(Answer):
+    """A part of an order list; ``kind`` is ``bought``, ``made`` or ``unsaid``.
+
+    total, needed, ordered
+        what all pieces hold of it, with spares, and what was ordered already.
+    quantity, price, cost
+        of what is bought, in whole packs, in the currency of the ``supplier_part``.
+    """
+
+    part_number: str
+    name: str = ""
+    kind: str
+    unit: str | None = None
+    total: str
+    needed: str
+    ordered: str = "0"
+    quantity: str | None = None
+    price: str | None = None
+    cost: str | None = None
+    remarks: list[str] = Field(default_factory=list)
+    files: list[PartFile] = Field(default_factory=list)
+    supplier_part: SupplierPart | None = None
+
+
+class OrderList(Answer):
+    """What to order for so many pieces of a product (``GET …/order``). Amounts are as in a SupplierPart.
+
+    costs
+        per currency; ``total_cost`` is in the site's ``currency``, without the ``unpriced`` parts.
+    """
+
+    part_number: str
+    pieces: int = 1
+    spares: str = "0"
+    release: str | None = None
+    state: str = ""
+    warnings: list[str] = Field(default_factory=list)
+    costs: dict[str, str] = Field(default_factory=dict)
+    total_cost: str = "0"
+    currency: str = "EUR"
+    unpriced: int = 0
+    lead_time_days: int | None = None
+    without_lead_time: int = 0
+    parts: list[OrderPart] = Field(default_factory=list)
+
+
 FACTS = ("mass_kg", "volume_m3", "com_m", "size_m", "material")
 """Properties whose origin is kept: a model states them, a scale does, or a person."""
 FactSource = Literal["hand", "scale", "cad"]

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from decimal import Context, Decimal
 from enum import StrEnum
 from fractions import Fraction
+from functools import reduce
 from math import isfinite
 from typing import NamedTuple, overload
 
@@ -179,7 +180,7 @@ def plain_text(text: str) -> str:
 
     Superscripts, fractions and circled numbers stay what they are: "5²" is not 52, nor "1½" 11/2.
     """
-    return "".join(map(_plain_character, text.strip())).strip()
+    return text.strip() if text.isascii() else "".join(map(_plain_character, text.strip())).strip()
 
 
 def _plain_character(character: str) -> str:
@@ -201,18 +202,12 @@ def as_decimal(value: float | int | Decimal) -> Decimal:
 
 def exact_sum(values: Iterable[float | int | Decimal]) -> Decimal:
     """Return the sum of what the values show: 0.1 + 0.2 is 0.3. Exact to 80 digits."""
-    total = Decimal(0)
-    for value in values:
-        total = _WIDE.add(total, as_decimal(value))
-    return total
+    return reduce(_WIDE.add, map(as_decimal, values), Decimal(0))
 
 
 def exact_product(values: Iterable[float | int | Decimal]) -> Decimal:
     """Return the product of what the values show: 3 × 0.1 is 0.3. Exact to 80 digits."""
-    product = Decimal(1)
-    for value in values:
-        product = _WIDE.multiply(product, as_decimal(value))
-    return product
+    return reduce(_WIDE.multiply, map(as_decimal, values), Decimal(1))
 
 
 @overload

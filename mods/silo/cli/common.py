@@ -56,7 +56,9 @@ class SharedOption(NamedTuple):
 # For ``--assembly``: each of the assemblies of a file.
 EACH = "all"
 _READ = "bom diff register sync where-used"
-_ASK = "bom diff register commit status sync queue pull search show log watch whoami doctor inertia mass"
+_ASK = (
+    "bom diff register commit status sync queue pull search show order log watch whoami doctor inertia mass"
+)
 
 
 def shared_options() -> Iterator[SharedOption]:

@@ -88,6 +88,11 @@ THEMES = {
             "silo-mod search base plate",
         ),
         "show": ("show", "show an item with its BOM lines", "silo-mod show A01-0001"),
+        "order": (
+            "show",
+            "show what to order for so many pieces of a product, with prices, or write it as a table",
+            "silo-mod order A01-0001 --quantity 50 --spares 5 --xlsx order.xlsx",
+        ),
         "log": (
             "sync",
             "show the revisions of a file's item, and which one the file is; or what changed in a product",

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, create_model
 
 import silo.inertia
-from silo.api.wire import MergeResult, ProductSummary
+from silo.api.wire import MergeResult, OrderList, ProductSummary
 from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode, Severity
 from silo.bom_sync import Status
@@ -404,6 +404,7 @@ SHAPES: dict[str, Any] = {
     "queue": Queue,
     "search": _many(Found),
     "show": Shown,
+    "order": OrderList,
     "whoami": Whoami,
     "logout": Logout,
     "serve": Greeting,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What the commands print for people; ``silo-mod search``, ``show``, ``whoami``, ``logout``."""
+"""What the commands print for people; ``silo-mod search``, ``show``, ``order``, ``whoami``, ``logout``."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import argparse
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.console import Console, Group, RenderableType
@@ -24,7 +25,7 @@ from silo.bom.resolve import display_name
 from silo.cli import common
 
 if TYPE_CHECKING:
-    from silo.api.wire import ProductSummary
+    from silo.api.wire import OrderList, ProductSummary
     from silo.bom.resolve import Proposal
     from silo.bom_sync import ActivityText, Outcome
     from silo.registering.items import Registration
@@ -346,6 +347,30 @@ def add_show(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=run_show)
 
 
+def add_order(parser: argparse.ArgumentParser) -> None:
+    common.add_each(
+        parser, "part_number", "--revision", "--csv", "--xlsx", metavar="PRODUCT", help="its part number"
+    )
+    parser.add_argument(
+        "--quantity", metavar="N", type=common.above_zero, default=1, help="for so many pieces (1)"
+    )
+    common.options(
+        parser,
+        {
+            "--revision LABEL": "of a released revision, such as B (else of the draft)",
+            "--spares PERCENT": "so many percent more of each part",
+            "--rest": "without what was ordered already",
+            "--csv FILE": "write a table as CSV (- for standard output)",
+            "--xlsx FILE": "write a table as a workbook",
+            "--supplier NAME": "only what this supplier sells",
+        },
+    )
+    kinds = ("bought", "made", "unsaid")
+    parser.add_argument("--kind", choices=kinds, default="bought", help="only these parts (bought)")
+    common.only_with(parser, "--csv --xlsx", "--kind", "--supplier")
+    parser.set_defaults(run=run_order)
+
+
 def add_whoami(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=run_whoami)
 
@@ -394,6 +419,72 @@ def run_show(args: argparse.Namespace) -> int:
     _print(rows)
     print(page)
     return Exit.DONE
+
+
+def run_order(args: argparse.Namespace) -> int:
+    """Print what to order, or write it as a table."""
+    from silo.files import check_writable
+    from silo.platform import replacing
+
+    asked = {"pieces": args.quantity, "spares": args.spares, "release": args.revision, "rest": args.rest}
+    given = {name: str(value) for name, value in asked.items() if value}
+    table = {"kind": args.kind} | ({"supplier": args.supplier} if args.supplier else {})
+    check_writable(*(path for path in (args.csv, args.xlsx) if path and path != "-"))
+    with common.client_of(args) as client:
+        number = common.named_item(client, args.part_number).part_number
+        for end, path in (("csv", args.csv), ("xlsx", args.xlsx)):
+            data = client.get_order_table(number, end, **given, **table) if path else b""
+            if end == "csv" and path == "-":
+                sys.stdout.write(data.decode("utf-8-sig").replace("\r\n", "\n"))
+            elif path:
+                with replacing(Path(path)) as file:
+                    file.write(data)
+        order = client.get_order(number, **given)
+    if args.json:
+        common.print_json(order.model_dump(mode="json"))
+    elif args.csv != "-":
+        _print_order(order)
+    return Exit.DONE
+
+
+def _print_order(order: OrderList) -> None:
+    from silo.api.wire import SupplierPart
+
+    out = console()
+    spares = f", {order.spares} % spares" if order.spares != "0" else ""
+    head = f"{order.part_number}: what to order for {order.pieces}{spares}. {order.state}"
+    out.print(Text(plain(head), "bold"))
+    for warning in order.warnings:
+        out.print(Text(f"⚠ {plain(warning)}", "yellow"))
+    table = Table(box=None, pad_edge=False)
+    for title in (
+        "",
+        "Part number",
+        "Name",
+        "Needed",
+        "Ordered",
+        "Quantity",
+        "Supplier",
+        "Its number",
+        "Cost",
+    ):
+        table.add_column(title, overflow="fold")
+    table.add_column("", overflow="fold")
+    empty = SupplierPart(supplier="", currency="")
+    for part in sorted(order.parts, key=lambda part: (part.kind, (part.supplier_part or empty).supplier)):
+        of = part.supplier_part or empty
+        price = f"{part.quantity} at {part.price} {of.currency}" if part.price else part.quantity or ""
+        cells = (
+            *(part.kind, part.part_number, part.name, f"{part.needed} {part.unit or ''}", part.ordered),
+            *(price, of.supplier, of.number, f"{part.cost or ''} {of.currency}".strip()),
+            "; ".join((*part.remarks, *(file.name for file in part.files))),
+        )
+        table.add_row(*(Text(plain(cell)) for cell in cells))
+    if order.parts:
+        out.print(table)
+        left = f", without {order.unpriced} of the bought parts" if order.unpriced else ""
+        days = "not known" if order.lead_time_days is None else f"{order.lead_time_days} days"
+        out.print(Text(f"Cost: {order.total_cost} {order.currency}{left}. Longest lead time: {days}"))
 
 
 def run_whoami(args: argparse.Namespace) -> int:

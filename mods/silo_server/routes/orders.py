@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from decimal import Decimal
 from functools import partial
 from typing import Annotated, Any
@@ -13,7 +14,8 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
-from silo.bom.numbers import as_decimal, read_number
+from silo.bom.numbers import LONGEST, as_decimal, read_number
+from silo_server.db.engine import Tx
 from silo_server.routes import context
 from silo_server.routes.bom import IMPORT_BODY, XLSX, content_of, file_of, uploaded
 from silo_server.routes.context import (
@@ -52,7 +54,7 @@ def _exact(value: object) -> object:
 _AMOUNT = {"type": "number", "minimum": 0.001, "maximum": 1_000_000}
 _TYPED = {"type": "string", "pattern": "^[1-9][0-9]{0,5}([.][0-9]{1,2})?$"}
 Exact = Annotated[Decimal, BeforeValidator(_exact), WithJsonSchema({"anyOf": [_AMOUNT, _TYPED]})]
-Quantity = Annotated[Exact, Field(gt=0, le=10**9)]
+Quantity = Annotated[Exact, Field(gt=0, le=10**9, max_digits=LONGEST)]
 Code = Annotated[str, Field(pattern="^[A-Z]{3}$")]
 
 
@@ -88,10 +90,10 @@ class OrderedBody(Body):
 
     part_number: Short
     quantity: Quantity
-    unit: Brief | None = None
+    unit: Annotated[Brief, Field(max_length=32)] | None = None
     supplier: Short = ""
     number: Short = ""
-    price: Exact | None = None
+    price: Annotated[Exact, Field(ge=0, le=suppliers.LARGEST_PRICE, max_digits=LONGEST)] | None = None
     currency: Code | None = None
 
 
@@ -294,16 +296,15 @@ def get_orders(call: Viewer, part_number: str) -> dict[str, Any]:
 def post_orders(call: Editor, part_number: str, body: OrdersBody) -> Response:
     """Note what was ordered for a product."""
     with call.write() as tx:
-        made = {
-            recorded.id
-            for recorded in orders.record(
-                tx, part_number, [NewOrder(**part.model_dump()) for part in body.parts], body.note
-            )
-        }
-        orders_json = [
-            _recorded_to_wire(recorded, number) for recorded, number in orders.list_recorded(tx, made)
-        ]
-        return json_answer({"orders": orders_json}, 201)
+        made = record_all(tx, part_number, body.parts, body.note)
+        return json_answer({"orders": [_recorded_to_wire(*recorded) for recorded in made]}, 201)
+
+
+def record_all(
+    tx: Tx, part_number: str, parts: Sequence[OrderedBody], note: str
+) -> list[tuple[Recorded, str]]:
+    """Note what was ordered; the body is what says whether it is usable."""
+    return orders.record(tx, part_number, [NewOrder(**part.model_dump()) for part in parts], note)
 
 
 @router.post("/items/{part_number}/orders/{order_id}/take-back", responses=WRITE_ERRORS)

@@ -11,8 +11,9 @@ import json
 import math
 import re
 import uuid as uuids
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from operator import itemgetter
 from typing import Any
 
 from sqlalchemy import ColumnElement, func, insert, select, update
@@ -30,7 +31,7 @@ from silo_server.schema import ITEM_TYPES, Category, Schema, find_schema
 from silo_server.services import revisions
 from silo_server.services.search import index_item, search_for
 from silo_server.settings import DuplicateError
-from silo_server.values import Item, check_json, dumps, from_row, merge_patch
+from silo_server.values import Item, check_json, dumps, merge_patch, names_of
 
 # Words that stand where a part number stands in a path.
 RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
@@ -159,13 +160,30 @@ SORTS: Mapping[str, Sequence[ColumnElement[Any]]] = {
 }
 
 
+_TEXTS = tuple(ItemTexts.model_fields)
+_MADE = ("schema_name", "properties", "supplier_parts", "origins")
+_OWN = tuple(name for name in names_of(Item) if name not in ("schema", "texts", *_MADE))
+
+
+def _columns(names: Sequence[str]) -> Callable[[Any], tuple[Any, ...]]:
+    # By place, in a third of the time of an attribute for each: a page reads 10 000 items.
+    return itemgetter(*map(items.c.keys().index, names))
+
+
+_texts, _made, _own = map(_columns, (_TEXTS, _MADE, _OWN))
+
+
 def to_item(row: Any) -> Item:
-    """Return a frozen item from its row."""
-    texts = {name: getattr(row, name) for name in ItemTexts.model_fields}
-    offers = json.loads(row.supplier_parts) if row.supplier_parts else ()
-    origins = json.loads(row.origins) if row.origins else {}
-    fields = {"schema": row.schema_name, "texts": texts, "supplier_parts": offers, "origins": origins}
-    return from_row(Item, row, **fields, properties=json.loads(row.properties))
+    """Return a frozen item from its row, of all columns in their order."""
+    schema, properties, offers, origins = _made(row)
+    return Item(
+        **dict(zip(_OWN, _own(row), strict=True)),
+        schema=schema,
+        texts=dict(zip(_TEXTS, _texts(row), strict=True)),
+        properties=json.loads(properties),
+        supplier_parts=json.loads(offers) if offers else (),
+        origins=json.loads(origins) if origins else {},
+    )
 
 
 def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: bool = False) -> Item:

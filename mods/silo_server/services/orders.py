@@ -9,7 +9,7 @@ their files. Nothing is left out: what nobody called made or bought is listed as
 
 from __future__ import annotations
 
-import re
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Decimal
@@ -18,7 +18,7 @@ from typing import NamedTuple
 from sqlalchemy import insert, or_, select, update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted, listed
-from silo.bom.numbers import LONGEST, as_decimal, counts_pieces, exact_product, exact_sum, plain
+from silo.bom.numbers import as_decimal, counts_pieces, exact_product, exact_sum, plain
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import document_items, documents, items, orders, revisions
 from silo_server.services import access
@@ -29,7 +29,6 @@ from silo_server.services.bom.tree import FlatRow, Graph, flatten, load_graph
 from silo_server.services.items import by_ids, get_item
 from silo_server.services.releases import Release, get_release, newest_release
 from silo_server.services.suppliers import (
-    LARGEST_PRICE,
     Offer,
     choose,
     decimal_text,
@@ -95,6 +94,8 @@ class OrderRow(NamedTuple):
         what N pieces hold of it, and with spares, in whole pieces, without what was ordered if that is asked.
     ordered
         what was ordered of it for this product.
+    kind
+        ``bought``, ``made`` or ``unsaid``.
     """
 
     item: Item
@@ -103,14 +104,9 @@ class OrderRow(NamedTuple):
     needed: Decimal
     ordered: Decimal
     doubts: Sequence[str]
+    kind: str
     offer: Offer | None = None
     files: Sequence[PartFile] = ()
-
-    @property
-    def kind(self) -> str:
-        """Return ``bought``, ``made`` or ``unsaid``."""
-        made = self.item.texts.get("sourcing_type") == "manufactured"
-        return BOUGHT if self.item.is_bought else MADE if made else UNSAID
 
     @property
     def supplier(self) -> str:
@@ -167,17 +163,19 @@ class OrderList:
     lead_time: int | None
     no_lead_time: int
 
-    def of_kind(self, kind: str) -> list[OrderRow]:
-        """Return the bought parts, the made ones, or those that nobody called either."""
-        return [row for row in self.rows if row.kind == kind]
+    @property
+    def counts(self) -> dict[str, int]:
+        """Return how many parts are bought, are made, and how many nobody called either."""
+        return {BOUGHT: 0, MADE: 0, UNSAID: 0} | Counter(row.kind for row in self.rows)
 
     @property
-    def by_supplier(self) -> dict[str, list[OrderRow]]:
-        """Return the bought parts by supplier, those without one last."""
-        rows: dict[str, list[OrderRow]] = {}
-        for row in self.of_kind(BOUGHT):
-            rows.setdefault(row.supplier, []).append(row)
-        return dict(sorted(rows.items(), key=lambda pair: (not pair[0], pair[0].casefold())))
+    def by_supplier(self) -> list[OrderRow]:
+        """Return the rows as people read them: bought by supplier, the rest of them, made, the others."""
+
+        def place(row: OrderRow) -> tuple[object, ...]:
+            return (BOUGHT, MADE, UNSAID).index(row.kind), not row.supplier, row.supplier.casefold()
+
+        return sorted(self.rows, key=place)
 
 
 def order_list(tx: Tx, part_number: str, asked: OrderRequest) -> OrderList:
@@ -212,7 +210,8 @@ def order_list(tx: Tx, part_number: str, asked: OrderRequest) -> OrderList:
     files = _files(
         tx, {ids[row.item.id] for row in rows if row.kind != BOUGHT and row.item.id in ids}, release
     )
-    rows = [row._replace(files=files.get(ids.get(row.item.id, 0), ())) for row in rows]
+    if files:
+        rows = [row._replace(files=files.get(ids.get(row.item.id, 0), ())) for row in rows]
     rows.sort(key=lambda row: row.item.part_number.casefold())
     return _summed(product, asked, rows, rates, *_state(tx, product, release, summary, graph))
 
@@ -225,14 +224,16 @@ def _row(
     rates: Mapping[str, Decimal],
 ) -> OrderRow:
     item = items_by_id[flat_row.line.child_id]
+    made = item.texts.get("sourcing_type") == "manufactured"
+    kind = BOUGHT if item.is_bought else MADE if made else UNSAID
     total = exact_product((as_decimal(flat_row.total), asked.pieces))
-    needed = exact_product((total, 1 + asked.spares / 100))
+    needed = exact_product((total, 1 + asked.spares / 100)) if asked.spares else total
     if asked.rest:
         needed = max(Decimal(0), exact_sum((needed, -done)))
     if counts_pieces(flat_row.unit):
         needed = needed.to_integral_value(ROUND_CEILING)
-    row = OrderRow(item, flat_row.unit, total, needed, done, flat_row.doubts(asked.pieces))
-    return row._replace(offer=choose(supplier_parts_of(item), needed, rates)) if row.kind == BOUGHT else row
+    offer = choose(supplier_parts_of(item), needed, rates) if kind == BOUGHT else None
+    return OrderRow(item, flat_row.unit, total, needed, done, flat_row.doubts(asked.pieces), kind, offer)
 
 
 def _state(
@@ -360,8 +361,10 @@ class NewOrder(NamedTuple):
     currency: str | None = None
 
 
-def record(tx: Tx, part_number: str, ordered: Sequence[NewOrder], note: str = "") -> list[Recorded]:
-    """Note what was ordered for a product. RejectedError if there is nothing to note."""
+def record(
+    tx: Tx, part_number: str, ordered: Sequence[NewOrder], note: str = ""
+) -> list[tuple[Recorded, str]]:
+    """Note what was ordered for a product, as :func:`list_recorded` has it. RejectedError for nothing."""
     if not ordered:
         raise RejectedError(
             "wanted at least one part with a quantity above 0, got none; nothing was recorded"
@@ -369,7 +372,6 @@ def record(tx: Tx, part_number: str, ordered: Sequence[NewOrder], note: str = ""
     product = get_item(tx, part_number, include_archived=True)
     made = []
     for order in ordered:
-        _check_order(order)
         row = {
             **order._asdict(),
             "product_id": product.id,
@@ -384,19 +386,7 @@ def record(tx: Tx, part_number: str, ordered: Sequence[NewOrder], note: str = ""
         del row["part_number"]
         made.append(tx.conn.execute(insert(orders).values(row).returning(orders.c.id)).scalar_one())
     access.note(tx, "order.recorded", product.part_number, f"{counted(len(made), 'part')}: {note}"[:500])
-    return [recorded for recorded, _ in list_recorded(tx, made)]
-
-
-def _check_order(order: NewOrder) -> None:
-    amounts = [order.quantity, *(() if order.price is None else (order.price,))]
-    if any(not 0 <= value <= LARGEST_PRICE or len(decimal_text(value)) > LONGEST for value in amounts):
-        raise RejectedError(f"{order.part_number}: wanted a quantity and a price of at most {LONGEST} digits")
-    if order.currency and not re.fullmatch("[A-Z]{3}", order.currency):
-        raise RejectedError(
-            f"{order.part_number}: wanted a currency such as EUR, got {order.currency[:20]!r}"
-        )
-    if len(order.unit or "") > 32:
-        raise RejectedError(f"{order.part_number}: wanted a unit of at most 32 characters")
+    return list_recorded(tx, made)
 
 
 def take_back(tx: Tx, part_number: str, order_id: int) -> Recorded:
@@ -451,7 +441,7 @@ _MADE = (
 
 def export_orders(order: OrderList, kind: str, supplier: str | None = None) -> Export:
     """Return the list, or what is ordered from one supplier, to be written as a table."""
-    rows = [row for row in order.of_kind(kind) if supplier is None or row.supplier == supplier]
+    rows = [row for row in order.rows if row.kind == kind and supplier in (None, row.supplier)]
     asked = order.asked
     what = f"For {asked.pieces} of {order.product.part_number} {order.product.name}".strip()
     spares = f", {decimal_text(asked.spares)} % spares" if asked.spares else ""

@@ -15,7 +15,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from decimal import Decimal
+from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
 from math import ceil
 from typing import Any, NamedTuple
@@ -26,6 +26,7 @@ from silo.bom.errors import ConflictError, RejectedError, VersionConflictError
 from silo.bom.headers import Role
 from silo.bom.numbers import (
     Mark,
+    as_decimal,
     common_mark,
     exact_product,
     parse_number,
@@ -39,6 +40,7 @@ from silo_server.db.engine import Tx, get_state, one_of, put_state
 from silo_server.db.tables import items, supplier_changes
 from silo_server.services import access
 from silo_server.services.bom.imports import Layout, Record, Table
+from silo_server.services.bom.tree import DEFAULT_CURRENCY, currency_of, positive_number
 from silo_server.services.items import get_by_numbers, get_item
 from silo_server.services.search import index_item
 from silo_server.values import Item, dumps, from_row
@@ -97,7 +99,10 @@ class SupplierPart:
         """Return how much is ordered if so much is needed: at least the minimum, in whole packs; 0 for 0."""
         if not needed:
             return Decimal(0)
-        packs = ceil(Fraction(max(needed, self.minimum)) / Fraction(self.pack_size))
+        wanted = max(needed, self.minimum)
+        if self.pack_size == 1:
+            return wanted.to_integral_value(ROUND_CEILING)
+        packs = ceil(Fraction(wanted) / Fraction(self.pack_size))
         return exact_product((packs, self.pack_size))
 
     def price_at(self, amount: Decimal) -> Decimal | None:
@@ -140,7 +145,8 @@ def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) ->
         return None if price is None else exact_product((amount, price))
 
     amount = part.amount(needed)
-    cost, rate = cost_of(amount), rates.get(part.currency)
+    price, rate = part.price_at(amount), rates.get(part.currency)
+    cost = None if price is None else exact_product((amount, price))
     in_base = None if cost is None or rate is None else exact_product((cost, rate))
     larger = {part.amount(least) for least, _ in part.prices if least > amount}
     cheaper = [
@@ -149,32 +155,28 @@ def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) ->
         if (more := cost_of(each_rate)) is not None and more < (cost or 0)
     ]
     best = min(cheaper, default=None)
-    return Offer(part, amount, part.price_at(amount), cost, in_base, best and (best[1], best[0]))
+    return Offer(part, amount, price, cost, in_base, best and (best[1], best[0]))
 
 
 def supplier_parts_of(item: Item) -> list[SupplierPart]:
-    """Return the supplier parts of an item; without a list what its properties state."""
+    """Return the supplier parts of an item; without a list what of its properties is usable."""
     if item.supplier_parts:
         return [from_json(part) for part in item.supplier_parts]
     said = item.properties
     supplier = said.get("supplier")
     if not isinstance(supplier, str) or not supplier.strip():
         return []
-    texts = {
-        "supplier": supplier.strip()[:200],
-        "number": str(said.get("supplier_part_number") or "")[:200],
-        "prices": _number_text(said.get("standard_cost")),
-        "currency": str(said.get("currency") or ""),
-        "lead_time_days": _number_text(said.get("lead_time_days")),
-    }
-    usable = {
-        name: text for name, text in texts.items() if text and not _Reader(dot=True).read({name: text})[1][1:]
-    }
-    return [_Reader(dot=True).read({"supplier": texts["supplier"], **usable})[0]]
-
-
-def _number_text(value: Any) -> str:
-    return "" if value is None or isinstance(value, bool) else str(value)
+    number = str(said.get("supplier_part_number") or "")[:200].strip()
+    cost, currency = positive_number(said, "standard_cost"), currency_of(said).strip().upper()
+    days = whole_number(str(said.get("lead_time_days")).strip(), 4)
+    part = SupplierPart(
+        supplier.strip()[:200],
+        "" if character_problem(number) else number,
+        prices=() if cost is None or cost > LARGEST_PRICE else ((Decimal(1), as_decimal(cost)),),
+        currency=currency if re.fullmatch("[A-Z]{3}", currency) else DEFAULT_CURRENCY,
+        lead_time_days=None if days is None or days > LONGEST_LEAD_TIME else days,
+    )
+    return [part]
 
 
 def to_json(part: SupplierPart) -> dict[str, Any]:
@@ -280,13 +282,12 @@ class _Reader:
         preferred = word in ("x", "✓", "✔", "y") or (yes_or_no(word) if word else False)
         if preferred is None:
             problems.append(f"Preferred: wanted yes or nothing, got {said['preferred'][:40]!r}")
-        size, minimum = said["pack_size"] or "1", said["minimum"] or "0"
         part = SupplierPart(
             said["supplier"],
             said["number"],
             said["link"],
-            amount("pack_size", size, tiny, LARGEST_AMOUNT),
-            amount("minimum", minimum, Decimal(0), LARGEST_AMOUNT),
+            amount("pack_size", said["pack_size"], tiny, LARGEST_AMOUNT) if said["pack_size"] else Decimal(1),
+            amount("minimum", said["minimum"], Decimal(0), LARGEST_AMOUNT) if said["minimum"] else Decimal(0),
             tuple(sorted(prices.items())),
             currency,
             days,

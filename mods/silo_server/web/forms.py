@@ -85,7 +85,7 @@ def whole(form: FormData, name: str) -> int | None:
 _PASSWORDS = frozenset({"password", "again", "current"})
 # Fields that no person typed.
 _MACHINE = re.compile(
-    r"csrf_token|at|view|mark|asked|bulk|version|packed|child_id|change_id|next|from|id|key|base_revision"
+    r"csrf_token|at|back|target|view|mark|asked|bulk|version|packed|child_id|change_id|next|from|id|key|base_revision"
     r"|was[_.].*"
 )
 MOST_KEPT = 4 * 1024 * 1024
@@ -155,6 +155,12 @@ def local_path(target: str) -> str:
     """Return ``target`` where it is a path of this server, else the start page: nobody is sent elsewhere."""
     plain = target.startswith("/") and not target.startswith(("//", "/\\"))
     return target if plain and target.isprintable() else "/"
+
+
+def back_to(form: FormData, usual: str, below: str = "/items/") -> str:
+    """Return the page that a form came from (``back``) if it is below a path, else the usual one."""
+    path = text(form, "back", 2000)
+    return path if path.startswith(below) else usual
 
 
 def own_site(request: Request) -> bool | None:

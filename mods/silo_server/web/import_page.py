@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import binascii
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -61,14 +61,25 @@ def import_page(call: Writer, part_number: str) -> Response:
 @router.post("/items/{part_number}/import/check")
 def check(call: Writer, part_number: str, form: Form) -> Response:
     """Say what the file would do; nothing is written. The same file again, with other columns, comes back."""
+    allowed = _allowed(form)
+
+    def show(upload: Upload | None, layout: Layout | None, problem: Problem) -> Response:
+        return _show(call, part_number, upload, layout, problem, allowed)
+
+    return checked(form, imports.BOM, show)
+
+
+def checked(
+    form: FormData, of: imports.Table, show: Callable[[Upload | None, Layout | None, Problem], Response]
+) -> Response:
+    """Show what a file would do, or why it cannot be read."""
     upload, layout = None, None
     try:
-        upload = carried(form) if "packed" in form else uploaded(form)
-        layout = layout_of(form)
-        return _show(call, part_number, upload, layout, allowed=_allowed(form))
+        upload = carried(form) if "packed" in form else uploaded(form, of)
+        layout = layout_of(form, of)
+        return show(upload, layout, Problem())
     except (RejectedError, TooLargeError) as error:
-        shown = replace(Problem.of(error), upload=upload, layout=layout)
-        return _show(call, part_number, None, problem=shown)
+        return show(None, None, replace(Problem.of(error), upload=upload, layout=layout))
 
 
 @router.post("/items/{part_number}/import")
@@ -203,7 +214,7 @@ def _name_of(index: int, header: Sequence[str], samples: Sequence[Sequence[str]]
     )
 
 
-def uploaded(form: FormData, of: imports.Table = imports.BOM) -> Upload:
+def uploaded(form: FormData, of: imports.Table) -> Upload:
     file = form.get("file")
     if not isinstance(file, UploadFile) or not file.filename:
         raise RejectedError(_("No file was chosen."))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cache, cached_property
@@ -189,25 +189,32 @@ class Structure:
     def worth(self, line: Line) -> MassAndCost:
         """Return what the child of a line is worth, to sort by it."""
         if line.child_id not in self._worths:
-            children = {each_line.child_id for each_line in self._lines[line.parent_id]}
-            by_item = summaries(self._tx, children)
-            self._worths |= {child: by_item[child].as_part for child in children}
+            known = self._known({each_line.child_id for each_line in self._lines[line.parent_id]})
+            self._worths |= {child: worth for child, (_part, worth, _summary) in known.items()}
         return self._worths[line.child_id]
+
+    def _known(self, children: Collection[int]) -> dict[int, tuple[RolledItem, MassAndCost, Summary | None]]:
+        """Return each child, its worth and its summary; without a BOM it is worth what it states."""
+        parts = tree.some_parts(self._tx, children)
+        by_item = summaries(self._tx, {child for child in children if parts[child].has_bom})
+        return {
+            child: (part, found.as_part if found else own_worth(part.properties), found)
+            for child, part in parts.items()
+            for found in [by_item.get(child)]
+        }
 
     def dressed(self, rows: Sequence[tuple[Row, Sequence[str]]]) -> list[Branch]:
         """Return the rows with everything that they show; beside each stand the doubts of its line."""
-        children = {row.line.child_id for row, _ in rows}
-        parts = tree.some_parts(self._tx, children)
-        by_item = summaries(self._tx, {child for child in children if parts[child].has_bom})
+        known = self._known({row.line.child_id for row, _ in rows})
 
         def dress(row: Row, doubts: Sequence[str]) -> Branch:
             child = row.line.child_id
-            part, summary = parts[child], by_item.get(child)
-            if summary is None:  # without a BOM it is worth what it states
-                return Branch(row.line, part, row.depth, row.total, own_worth(part.properties), doubts)
+            part, worth, summary = known[child]
+            if summary is None:
+                return Branch(row.line, part, row.depth, row.total, worth, doubts)
             marks = [*summary.inside(child, is_open=row.is_open), *doubts]
             key = row.key if row.is_open or summary.levels else ""
-            return Branch(row.line, part, row.depth, row.total, summary.as_part, marks, key, row.is_open)
+            return Branch(row.line, part, row.depth, row.total, worth, marks, key, row.is_open)
 
         return [dress(*row) for row in rows]
 

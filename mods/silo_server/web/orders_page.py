@@ -6,33 +6,33 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from functools import partial
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Query
+from pydantic import ValidationError
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
-from silo.bom.numbers import as_decimal, read_number
 from silo_server.routes.context import Call
-from silo_server.routes.orders import asked_of
+from silo_server.routes.orders import OrderedBody, asked_of, record_all
 from silo_server.services import items as item_service
 from silo_server.services import orders, releases, suppliers
 from silo_server.services.bom import imports
 from silo_server.services.items import ItemChange, get_item
-from silo_server.services.orders import NewOrder, OrderRequest, OrderRow
+from silo_server.services.orders import OrderRequest, OrderRow
 from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, TABLE, decimal_text, typed_text
-from silo_server.settings import TooLargeError
 from silo_server.web.accounts import Administrator, Reader, Writer
-from silo_server.web.forms import Form, amount, back, text, texts, whole
-from silo_server.web.import_page import Problem, Upload, carried, layout_of, reading, uploaded
-from silo_server.web.render import N_, Address, _, isolate, page, segment
+from silo_server.web.forms import Form, amount, back, back_to, text, texts, whole
+from silo_server.web.import_page import Problem, Upload, carried, checked, layout_of, reading
+from silo_server.web.render import N_, PAGE_ROWS, Address, _, isolate, page, page_of, segment
 
 router = APIRouter(include_in_schema=False)
 
 EMPTY_ROWS = 3
 _NO_PROBLEM = Problem()
+_STALE = N_("chosen: wanted the boxes of this page; load it again")
 AskedFor = Annotated[OrderRequest, Depends(asked_of)]
 
 
@@ -101,8 +101,13 @@ def undo_suppliers(call: Writer, part_number: str, form: Form) -> Response:
 
 
 @router.get("/items/{part_number}/order")
-def order_page(call: Reader, part_number: str, asked: AskedFor) -> Response:
-    """Return what to order for so many pieces."""
+def order_page(
+    call: Reader,
+    part_number: str,
+    asked: AskedFor,
+    number: Annotated[int, Query(ge=0, le=10**9, alias="page")] = 1,
+) -> Response:
+    """Return what to order for so many pieces; page 0 has all rows, for paper."""
     with call.server.large_reads.enter(), call.read() as tx:
         product = get_item(tx, part_number, include_archived=True)
         labels = [
@@ -117,11 +122,17 @@ def order_page(call: Reader, part_number: str, asked: AskedFor) -> Response:
         except SiloError as error:
             problem = str(error)
         now = tx.stamp
-    view = {"pieces": asked.pieces, "spares": decimal_text(asked.spares), "release": asked.release}
+    rows = order_list.by_supplier if order_list else []
+    table = page_of(rows, len(rows), number, PAGE_ROWS if number else max(1, len(rows)))
+    view = {
+        "pieces": asked.pieces,
+        "spares": decimal_text(asked.spares),
+        "release": asked.release,
+        "rest": "true" if asked.rest else "",
+        "page": number and table.number,
+    }
     given = {name: str(value) for name, value in view.items() if value not in ("", "0", 1)}
-    at = Address(
-        f"/items/{segment(product.part_number)}/order", given | ({"rest": "true"} if asked.rest else {})
-    )
+    at = Address(f"/items/{segment(product.part_number)}/order", given)
     return page(
         call,
         "order.html",
@@ -136,7 +147,9 @@ def order_page(call: Reader, part_number: str, asked: AskedFor) -> Response:
         now=now,
         decimal=typed_text,
         fact_of=_fact_of,
-        some=_some(order_list.rows if order_list else ()),
+        table=table,
+        counts=order_list.counts if order_list else {},
+        some=_some(rows),
     )
 
 
@@ -162,7 +175,6 @@ def _fact_of(row: OrderRow) -> str:
 @router.post("/items/{part_number}/order")
 def record(call: Writer, part_number: str, form: Form) -> Response:
     """Note the chosen parts as ordered, or say of them that they are made or bought."""
-    path = text(form, "at", 500)
     chosen = [_read_fact(key) for key in texts(form, "chosen")]
     kind = text(form, "kind")
     with call.write() as tx:
@@ -174,10 +186,10 @@ def record(call: Writer, part_number: str, form: Form) -> Response:
             said = said if chosen else _("Nothing was chosen.")
         else:
             facts = [_order_of(form, key) for key in chosen]
-            done = orders.record(tx, part_number, facts, text(form, "note"))
+            done = record_all(tx, part_number, facts, text(form, "note"))
             said = _("%(count)s noted as ordered.", count=len(done))
     home = f"/items/{segment(part_number)}/order"
-    return back(path if path.startswith(home) else home, said)
+    return back(back_to(form, home, home), said)
 
 
 def _read_fact(written: str) -> dict[str, Any]:
@@ -185,16 +197,17 @@ def _read_fact(written: str) -> dict[str, Any]:
         fact = json.loads(written)
         return {name: None if fact[name] is None else str(fact[name])[:200] for name in fact}
     except (ValueError, TypeError):
-        raise RejectedError(_("chosen: wanted the boxes of this page; load it again")) from None
+        raise RejectedError(_(_STALE)) from None
 
 
-def _order_of(form: FormData, fact: Mapping[str, Any]) -> NewOrder:
+def _order_of(form: FormData, fact: Mapping[str, Any]) -> OrderedBody:
     number, unit = str(fact.get("part_number")), fact.get("unit")
-    quantity = as_decimal(amount(text(form, f"quantity.{number}.{unit or ''}"), number))
-    price = fact.get("price")
-    reading = read_number(price, points_are_decimal=True).value if price else None
-    facts = {name: fact.get(name) or "" for name in ("supplier", "number")}
-    return NewOrder(number, quantity, unit, **facts, price=reading, currency=fact.get("currency"))
+    quantity = amount(text(form, f"quantity.{number}.{unit or ''}"), number)
+    said = {name: value for name, value in fact.items() if value is not None}
+    try:
+        return OrderedBody.model_validate(said | {"quantity": quantity})
+    except ValidationError:
+        raise RejectedError(_(_STALE)) from None
 
 
 @router.post("/items/{part_number}/order/{order_id}/take-back")
@@ -258,13 +271,7 @@ def _records(
 @router.post("/suppliers/check")
 def check(call: Writer, form: Form) -> Response:
     """Say what a table would change; nothing is written."""
-    upload, layout = None, None
-    try:
-        upload = carried(form) if "packed" in form else uploaded(form, TABLE)
-        layout = layout_of(form, TABLE)
-        return _prices(call, upload, layout)
-    except (RejectedError, TooLargeError) as error:
-        return _prices(call, problem=replace(Problem.of(error), upload=upload, layout=layout))
+    return checked(form, TABLE, partial(_prices, call))
 
 
 @router.post("/suppliers/import")

@@ -21,6 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from decimal import ROUND_HALF_EVEN, Context, Decimal
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 from urllib.parse import quote, unquote, urlencode
@@ -243,6 +244,7 @@ def quantity(value: float | None, unit: str | None = None) -> str:
     return f"{shown} {isolate(unit)}" if unit else shown
 
 
+@lru_cache(maxsize=4096)
 def when(stamp: str | None) -> Markup | str:
     """Return ``2026-02-08 22:15`` (UTC, as stored) with its full form for machines; a dash where there is
     none.
@@ -516,10 +518,10 @@ def arranged(rows: Sequence[T], sort: str, keys: Mapping[str, Callable[[T], Any]
     key = keys.get(sort.removeprefix("-"))
     if key is None:
         return rows
-    with_value = [(value, row) for row in rows if (value := key(row)) not in (None, "")]
-    unknown = [row for row in rows if key(row) in (None, "")]
+    pairs = [(key(row), row) for row in rows]
+    with_value = [pair for pair in pairs if pair[0] not in (None, "")]
     with_value.sort(key=lambda pair: _natural(pair[0]), reverse=sort.startswith("-"))
-    return [*(row for _value, row in with_value), *unknown]
+    return [row for _value, row in (*with_value, *(pair for pair in pairs if pair[0] in (None, "")))]
 
 
 def _natural(value: Any) -> Any:

@@ -25,7 +25,7 @@ from silo_server.services.scene import with_model
 from silo_server.services.search import fits
 from silo_server.values import Line
 from silo_server.web.accounts import Reader, Writer
-from silo_server.web.forms import Form, back, text, texts
+from silo_server.web.forms import Form, back, back_to, text, texts
 from silo_server.web.line_form import DONE, decision_of
 from silo_server.web.render import N_, Address, _, arranged, isolate, page, page_of, plural
 
@@ -135,15 +135,9 @@ def assign(call: Writer, form: Form) -> Response:
             review.assign(tx, part_number, who)
     name = isolate(who) if who else _("nobody in particular")
     return back(
-        _back_to(form, Address("/waiting", view).url()),
+        back_to(form, Address("/waiting", view).url()),
         _("%(boms)s given to %(name)s.", boms=plural(len(chosen), "BOM"), name=name),
     )
-
-
-def _back_to(form: FormData, usual: str) -> str:
-    """Return the page of an item that a form came from."""
-    path = text(form, "back", 400)
-    return path if path.startswith("/items/") else usual
 
 
 @router.get("/mine")
@@ -159,6 +153,7 @@ def mine_page(call: Reader) -> Response:
         waiting=len(rows),
         rows=[row for row in rows if row.assignee == call.actor.username],
         found=subjects,
+        open_of=_open_of,
         folders=sorted({part for row in rows for part in _folders(row.folder)} - followed),
     )
 
@@ -171,7 +166,7 @@ def follow(call: Reader, form: Form) -> Response:
     with call.write(even_when_read_only=True) as tx:
         review.follow(tx, target, on=on)
     said = _("You follow it now: the page For me says what changes.") if on else _("You no longer follow it.")
-    return back(_back_to(form, "/mine"), said)
+    return back(back_to(form, "/mine"), said)
 
 
 @router.post("/mine/seen")
@@ -267,7 +262,7 @@ def _show(
         folders=sorted(folders.items()),
         kinds=KINDS,
         people=people,
-        totals={name: sum(count(row) for row in rows) for name, (_, count) in KINDS.items()},
+        open=_open_of(*rows),
         said=said,
         # What was done beside the problems can be undone as well.
         done=changes,
@@ -275,6 +270,20 @@ def _show(
         problems=(problems or [])[:MOST_TOLD],
         more_problems=max(0, len(problems or []) - MOST_TOLD),
     )
+
+
+def _open_of(*rows: Waiting) -> list[str]:
+    """Return what is open in these BOMs, by kind, in words."""
+    unreferenced, conflicts, left_out, unregistered = (
+        sum(count(row) for row in rows) for _words, count in KINDS.values()
+    )
+    counts = {
+        plural(unreferenced, "unreferenced line"): unreferenced,
+        plural(conflicts, "conflict"): conflicts,
+        plural(left_out, "component left out", "components left out"): left_out,
+        plural(unregistered, "unregistered part"): unregistered,
+    }
+    return [words for words, count in counts.items() if count]
 
 
 def _folders(folder: str) -> list[str]:

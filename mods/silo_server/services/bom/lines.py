@@ -177,6 +177,7 @@ def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
     return hashlib.sha256(seen.encode()).hexdigest()[:16]
 
 
+@lru_cache(maxsize=16384)
 def stored_state(text: str) -> LineState:
     """Return the state that :func:`state_to_json` gave and history stored."""
     values = dict(json.loads(text))

@@ -604,9 +604,9 @@ def follow(tx: Tx, target: str, *, on: bool) -> None:
     else:
         raise RejectedError(f"target: wanted an item or a project folder, got {target[:80]!r}")
     row, user_id = follows.c, tx.actor.own_id
-    rowcount = tx.conn.execute(delete(follows).where(row.user_id == user_id, row.target == target)).rowcount
+    tx.conn.execute(delete(follows).where(row.user_id == user_id, row.target == target))
     count = tx.conn.scalar(select(func.count()).select_from(follows).where(row.user_id == user_id)) or 0
-    if on and not rowcount and count >= MOST_FOLLOWED:
+    if on and count >= MOST_FOLLOWED:
         raise RejectedError(
             f"you can follow at most {MOST_FOLLOWED} items and folders; stop following some first"
         )

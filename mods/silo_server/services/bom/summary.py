@@ -337,7 +337,7 @@ def _own(tx: Tx, item_ids: Collection[int]) -> dict[int, _Own]:
 
 def own_worth(properties: Mapping[str, Any]) -> MassAndCost:
     """Return what an item states of itself."""
-    mass, cost = (positive_number(properties, name) for name in ("mass_kg", "standard_cost"))
+    mass, cost = positive_number(properties, "mass_kg"), positive_number(properties, "standard_cost")
     costs = {currency_of(properties): as_decimal(cost)} if cost is not None else {}
     return MassAndCost(None if mass is None else as_decimal(mass), mass is not None, costs, bool(costs))
 

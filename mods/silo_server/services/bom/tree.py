@@ -243,7 +243,12 @@ def narrowed(graph: Graph, fitting: Callable[[Line], bool], leaves: Sequence[Fla
         below = (line for lines in inside.values() for line in lines)
         leaves = flatten(graph, {line.child_id for line in below if fitting(line)})
     rows = [row for row in leaves if fitting(row.line)]
-    lines = [row.line._replace(state=replace(row.line.state, quantity=float(row.total))) for row in rows]
+    lines = [
+        row.line
+        if row.total == row.line.state.quantity
+        else row.line._replace(state=replace(row.line.state, quantity=float(row.total)))
+        for row in rows
+    ]
     return Graph(graph.root, {**inside, graph.root.id: lines})
 
 
