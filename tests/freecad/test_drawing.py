@@ -33,9 +33,10 @@ MODS = machines.REPOSITORY / "mods"
 pytestmark = pytest.mark.freecad
 
 
-def test_freecad_draws_what_the_kernel_draws(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", machines.ENDS)
+def test_freecad_draws_what_the_kernel_draws(version: str, tmp_path: Path) -> None:
     """Fewer triangles, the same volume and box; a shape that it cannot read is a sentence in the model."""
-    freecad = machines.need("1.1")
+    freecad = machines.need(version)
     body = BRepAlgoAPI_Fuse(BRepPrimAPI_MakeCylinder(10, 40).Shape(), BRepPrimAPI_MakeSphere(12).Shape())
     BRepTools.Write_s(body.Shape(), str(tmp_path / "body.brp"))
     doc = Doc("part")

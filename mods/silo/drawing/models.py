@@ -233,10 +233,10 @@ class FileWalk(Walk):
         obj = node.obj
         here = [self.looks.override(obj)] * count
         each = elements(obj) if node.kind is Kind.LINK else []
-        if len(each) == count:
-            here = [self.looks.override(colour) or over for colour, over in zip(each, here, strict=True)]
-        elif count > 1 and (listed := self.looks.overrides(obj)):
-            here = [colour or over for colour, over in zip([*listed, *[None] * count], here, strict=False)]
+        if not any(here) and len(each) == count:
+            here = [self.looks.override(element) for element in each]
+        elif not any(here) and count > 1:
+            here = [*self.looks.overrides(obj), *here][:count]
         if None in here:
             steps = [step.obj for step in self._reader.resolve(obj).way[1:]] if node.kind is Kind.LINK else []
             below = next((inner.obj for inner, _ in node.below if key in inner.worth), None)

@@ -125,7 +125,8 @@ class FreeCadDrawer:
         leaf = Leaf(tuple(ShapeRef(_stored(*shape), shape[2]) for shape in shapes))
         parts = [part for shape in leaf.shapes for part in shape.handle.Faces or [shape.handle]]
         about = [_corners(part.BoundBox) for part in parts]
-        exact = exact_box(about, lambda n: _corners(parts[n].optimalBoundingBox(False, False)))
+        # Without triangles. FreeCAD 0.20 crashes on a second argument.
+        exact = exact_box(about, lambda n: _corners(parts[n].optimalBoundingBox(False)))
         return exact, measure(leaf, EPS, lambda *_: None) if weigh else None
 
 
