@@ -9,6 +9,7 @@ import pytest
 from freecad_cases.machines import NEWEST
 from gui_cases.window import Window
 
+from silo.api.files import Origin
 from silo.files import content_hash
 
 VERSIONS = NEWEST
@@ -23,7 +24,16 @@ def _told(freecad: Window) -> dict[str, Any]:
             files = {content_hash(path): path.name for path in freecad.vault.glob("*.FCStd")}
             return sorted(files[one] for one in client.lacking_models(files))
 
-    freecad.answers["drawn"] = lacking
+    def colleague() -> None:
+        """Commit the first revision once more, on top of the newest."""
+        with freecad.server.client() as client:
+            (top,) = client.search_items("Top")
+            old, path = client.get_revision(top.part_number, 1), freecad.folder / "Top.FCStd"
+            client.download_file(top.part_number, path, 1)
+            origin = Origin(base_revision=2, file_path=old.file_path, links=old.links)
+            client.upload_file(top.part_number, path, "as it was", origin=origin)
+
+    freecad.answers |= {"drawn": lacking, "colleague": colleague}
     return freecad.run("seen.py")
 
 
@@ -44,3 +54,10 @@ def test_parts_are_lit_and_a_revision_is_a_ghost(told: dict[str, Any]) -> None:
     assert told["said"] == "Ghost: 1 only in revision 1, 1 elsewhere there. Only here: 1."
     assert (told["ghost"], told["after"]) == (3, 0)
     assert told["modified"] == told["modified_before"] == []
+
+
+def test_a_held_commit_is_compared_with_the_colleagues_revision(told: dict[str, Any]) -> None:
+    """By its button in the pane: what is only there, elsewhere or only here; pressed again, it goes."""
+    assert told["held_said"] == "Ghost: 1 only in revision 3, 1 elsewhere there. Only here: 1."
+    assert (told["held_ghost"], told["held_after"]) == (3, True)
+    assert told["held_modified"] == told["modified_before"]

@@ -12,13 +12,16 @@ sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 from inside import (
     App,
     Gui,
+    QtWidgets,
     addon,
     ask,
     assembly,
     boxes,
+    button_texts,
     link,
     part,
     picture,
+    press,
     register,
     run,
     settled,
@@ -90,6 +93,7 @@ def story() -> None:
     lights(doc)
     compares()
     tell(modified=modified_now())
+    held(doc)
 
 
 def modified_now() -> list[str]:
@@ -122,6 +126,26 @@ def compares() -> None:
     wait(lambda: "removed" in window.news.text())
     tell(after=nodes())
     window.close()
+
+
+def held(doc: Any) -> None:
+    """*Compare with revision 3* of a commit that waits, since a colleague was quicker; pressed twice."""
+    from silo.workbench.commit.plan import plan
+
+    one = addon()
+    ask("colleague")
+    one.commits.run(plan(doc, one.desk.documents).rows, "mine")
+    wait(lambda: [entry for entry in one.session.shown.waiting if entry.newer] and settled())
+    one.dock.show_and_raise()
+    compare = "Compare with revision 3"
+    wait(lambda: compare in button_texts(one.dock))
+    press(one.dock, compare)
+    wait(lambda: settled() and nodes())
+    tell(held_said=QtWidgets.QToolTip.text(), held_ghost=nodes())
+    view("held")
+    picture(Gui.getMainWindow(), "held window")
+    press(one.dock, compare)
+    tell(held_after=wait(lambda: settled() and not nodes()), held_modified=modified_now())
 
 
 run(story)
