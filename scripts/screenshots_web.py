@@ -23,7 +23,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "support"))
 
-from gearbox_story import GearboxStory  # noqa: E402
+from gearbox_story import PROPERTIES, GearboxStory  # noqa: E402
 from large_boms import write_boms  # noqa: E402
 
 from silo.api.client import SiloClient  # noqa: E402
@@ -32,6 +32,7 @@ from silo_server.settings import Settings  # noqa: E402
 
 DOCS = ROOT / "docs" / "images"
 WIDE, NARROW = {"width": 1200, "height": 800}, {"width": 390, "height": 844}
+WINDOW = {"width": 1440, "height": 900}
 SMALLEST = {"width": 320, "height": 640}
 REAL = ROOT.parent / "shared" / "data" / "assemblies" / "lmn3"
 REAL_TOP = "assemblies/assembly.FCStd"
@@ -55,10 +56,11 @@ def main() -> None:
     """Play the story, then photograph."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
     with tempfile.TemporaryDirectory() as scratch, _server(Path(scratch)) as (server, story):
-        top = _play(story)
+        top = _play(server, story)
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(
-                executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
+                executable_path=shutil.which("chromium"),
+                args=["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"],
             )
             state = _log_in(browser, server, Path(scratch) / "state.json")
             if folder is None:
@@ -83,12 +85,14 @@ def _server(folder: Path) -> Iterator[tuple[RunningServer, GearboxStory]]:
         yield server, GearboxStory(folder, client)
 
 
-def _play(story: GearboxStory) -> str:
+def _play(server: RunningServer, story: GearboxStory) -> str:
     """Everything that the pages can show; the part number of the top assembly."""
     client = story.client
     story.register()
-    story.upload()
-    story.sync()
+    _commit(server, story.top, "first issue")
+    for name, properties in PROPERTIES.items():
+        number = story.number_of(name)
+        client.update_item(number, properties={**client.get_properties(number), **properties})
     top = story.number_of("TopAssembly")
     glue = client.create_item("kindred-rd", "C01", "Thread locker", item_type="consumable")
     client.create_item("kindred-rd", "C01", "Gear oil ISO VG 220", item_type="consumable")
@@ -97,8 +101,15 @@ def _play(story: GearboxStory) -> str:
     story.remove("Cover")
     story.remove("BasePlate")
     story.more_bolts(4)
-    story.sync()
+    _commit(server, story.top, "without cover and base plate")
     return top
+
+
+def _commit(server: RunningServer, top: Path, comment: str) -> None:
+    """Send the files with their models, and the BOMs, as a user does it."""
+    environ = {**os.environ, "SILO_API_URL": server.base_url, "SILO_API_TOKEN": str(server.token)}
+    command = [sys.executable, "-m", "silo.cli.main", "commit", str(top), "--comment", comment]
+    subprocess.run(command, env=environ, check=True)
 
 
 def _log_in(browser: Browser, server: RunningServer, state: Path) -> Path:
@@ -207,12 +218,29 @@ def _for_docs(browser: Browser, server: RunningServer, state: Path, top: str) ->
         for shot in _shots(top):
             if shot.name in wanted and (not suffix or shot.name == "merge"):
                 _photograph(page, shot, DOCS / f"web-{shot.name}{suffix}.png")
+        if not suffix:
+            _decision(page, top)
         context.close()
+
+
+def _decision(page: Page, top: str) -> None:
+    """The decision page's first question in the model, in a window, and a sub-assembly of the product."""
+    page.set_viewport_size(WINDOW)
+    page.goto(f"/items/{top}/bom#model")
+    page.locator("#model[data-ready]").wait_for()
+    page.evaluate("scrollTo(0, 0)")
+    page.screenshot(path=DOCS / "web-decision.png")
+    page.goto(f"/items/{top}")
+    page.locator("#model[data-ready]").wait_for()
+    page.get_by_role("button", name="Show A01-0001 in the model").click()
+    page.screenshot(path=DOCS / "web-model.png")
 
 
 def _photograph(page: Page, shot: Shot, path: Path) -> None:
     page.goto(shot.path)
     page.locator(shot.show).first.wait_for()
+    if page.locator("#model").count():
+        page.locator("#model[data-ready]").wait_for()
     width, height = page.evaluate("() => [innerWidth, document.documentElement.scrollHeight]")
     if page.evaluate("() => document.documentElement.scrollWidth > innerWidth"):
         print(f"{shot.path} is wider than the screen of {width}")
