@@ -17,7 +17,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from silo.batch import JUnit, Markdown, Summary, SyncOptions, TopResult, cell, stopped_by, sync_top
+from silo.batch import JUnit, Markdown, RunSummary, SyncOptions, TopResult, cell, stopped_by, sync_top
 from silo.bom.compare import MergePlan
 from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
 from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
@@ -222,9 +222,9 @@ def test_an_error_of_the_file_itself_does_not_stop_the_run() -> None:
 
 def test_no_token_is_shown_in_a_repr() -> None:
     """A log or a traceback shows objects."""
-    from silo.workbench.settings.server import Server, ServerPreferences
+    from silo.workbench.settings.server import ServerChoice, ServerPreferences
 
-    values: list[Any] = [ServerPreferences("u", "silo_x"), Server("u", "silo_x")]
+    values: list[Any] = [ServerPreferences("u", "silo_x"), ServerChoice("u", "silo_x")]
     assert all("silo_x" not in repr(value) for value in values)
 
 
@@ -249,7 +249,7 @@ def test_text_of_others_is_shown_in_markdown_and_does_nothing(text: str) -> None
 
 def test_a_sentence_of_the_report_is_followed_by_the_files_that_it_does_not_name() -> None:
     """With a space between them."""
-    summary = Summary(warnings={"One bolt is too many.": ["asm/T.FCStd"], "b.FCStd is odd.": ["b.FCStd"]})
+    summary = RunSummary(warnings={"One bolt is too many.": ["asm/T.FCStd"], "b.FCStd is odd.": ["b.FCStd"]})
     lines = Markdown().head(summary).splitlines()
     assert {"- One bolt is too many. (asm/T.FCStd)", "- b.FCStd is odd."} <= set(lines)
 
@@ -261,7 +261,7 @@ def test_the_counts_of_a_ci_report_are_those_of_its_cases(files: list[list[Statu
     files
         the assemblies of each; None for a file that cannot be read.
     """
-    form, summary, cases = JUnit(), Summary(), ""
+    form, summary, cases = JUnit(), RunSummary(), ""
     for number, statuses in enumerate(files):
         top = f"{number}.FCStd"
         one = Resolved(BomEntry(top, object_name="Top"), (), (), ())

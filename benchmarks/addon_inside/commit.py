@@ -50,9 +50,9 @@ def commits(one: Any, doc: Any) -> None:
 
 def drawing(one: Any) -> None:
     """A commit with 10 000 findings, and 2000 events in one burst."""
-    from silo.workbench.pane.activity import Line, PaneEntry, Tone
+    from silo.workbench.pane.activity import EntryLine, PaneEntry, Tone
 
-    lines = tuple(Line(f"<b>finding</b> {number}", Tone.ERROR) for number in range(10_000))
+    lines = tuple(EntryLine(f"<b>finding</b> {number}", Tone.ERROR) for number in range(10_000))
 
     def draw() -> None:
         one.session.add(PaneEntry("big", "Big", time.time(), lines=lines))

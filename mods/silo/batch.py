@@ -296,7 +296,7 @@ def cell(text: str) -> str:
 
 
 @dataclass
-class Summary:
+class RunSummary:
     """A run in numbers, and what it leaves to people.
 
     files, fine, unread, parts
@@ -485,13 +485,13 @@ class Summary:
 class Form(Protocol):
     """How a report is written: a beginning, what became of each file, and an end."""
 
-    def head(self, summary: Summary | None) -> str:
+    def head(self, summary: RunSummary | None) -> str:
         """Return the beginning; ``summary`` is None until the run has ended."""
         ...
 
     def one(self, result: TopResult, number: int) -> str: ...
 
-    def end(self, summary: Summary | None) -> str:
+    def end(self, summary: RunSummary | None) -> str:
         """Return the end; ``summary`` is None until the run has ended."""
         ...
 
@@ -518,7 +518,7 @@ class ReportFile:
         if text:
             self._write(text, self._form.end(None))
 
-    def close(self, summary: Summary | None = None) -> None:
+    def close(self, summary: RunSummary | None = None) -> None:
         """End the report; without a summary as it stands."""
         if self._file is None:
             return
@@ -607,7 +607,7 @@ _NOT_ENDED = "The run has not ended, or was stopped here."
 class Markdown:
     """To read, and to attach to a job."""
 
-    def head(self, summary: Summary | None) -> str:
+    def head(self, summary: RunSummary | None) -> str:
         lines = ["# BOM sync", "", *([cell(summary.sentence()), ""] if summary is not None else [])]
         for title, subtitle in summary.sections() if summary is not None else ():
             if subtitle:
@@ -632,7 +632,7 @@ class Markdown:
         lines += [f"- {cell(reason)}" for reason in reasons]
         return "\n".join(lines).rstrip("\n") + "\n"
 
-    def end(self, summary: Summary | None) -> str:
+    def end(self, summary: RunSummary | None) -> str:
         return f"\n*{_NOT_ENDED}*\n" if summary is None else "\nNothing else changed.\n"
 
 
@@ -646,7 +646,7 @@ td:last-child,th:last-child{text-align:right}"""
 class Html:
     """One page to read, in mail or in a browser."""
 
-    def head(self, summary: Summary | None) -> str:
+    def head(self, summary: RunSummary | None) -> str:
         parts = [
             '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>BOM sync</title>',
             f'<meta name="viewport" content="width=device-width"><style>{_STYLE}</style></head>',
@@ -673,7 +673,7 @@ class Html:
             parts.append(f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>")
         return "\n".join([*parts, *([_list([(reason, []) for reason in reasons])] if reasons else []), ""])
 
-    def end(self, summary: Summary | None) -> str:
+    def end(self, summary: RunSummary | None) -> str:
         return _element("p", _NOT_ENDED if summary is None else "Nothing else changed.") + "</body></html>\n"
 
 
@@ -708,13 +708,13 @@ def reasons_of(outcome: Outcome) -> list[str]:
 class Json:
     """``{"results": […], "ended": true, "summary": {…}}``."""
 
-    def head(self, summary: Summary | None) -> str:
+    def head(self, summary: RunSummary | None) -> str:
         return '{"results": ['
 
     def one(self, result: TopResult, number: int) -> str:
         return ("," if number else "") + "\n" + json.dumps(result_json(result))
 
-    def end(self, summary: Summary | None) -> str:
+    def end(self, summary: RunSummary | None) -> str:
         if summary is None:
             return '\n], "ended": false}\n'
         findings = [finding_json(finding, summary.base) for finding in summary.findings]
@@ -725,8 +725,8 @@ class Json:
 class JUnit:
     """For CI: a test case per assembly, and per file that could not be read."""
 
-    def head(self, summary: Summary | None) -> str:
-        summary = summary or Summary()
+    def head(self, summary: RunSummary | None) -> str:
+        summary = summary or RunSummary()
         count = summary.statuses
         left = count[Status.BLOCKED] + count[Status.UNREGISTERED]
         tests, errors = count.total() + summary.unread, count[Status.FAILED] + summary.unread
@@ -757,7 +757,7 @@ class JUnit:
             return f"{head}/>"
         return f"{head}><{kind} message={_attribute(why)}/></testcase>"
 
-    def end(self, summary: Summary | None) -> str:
+    def end(self, summary: RunSummary | None) -> str:
         text = _NOT_ENDED
         if summary is not None:
             text = "\n".join([summary.sentence(), *(f"new: {line}" for line in summary.new() or ())])

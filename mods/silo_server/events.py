@@ -58,13 +58,13 @@ class LoggedEvent:
     username: str | None = None
 
     @property
-    def mark(self) -> Mark:
+    def mark(self) -> EventMark:
         """Return what a listener that was given this event comes back with."""
-        return Mark(self.id, f"{zlib.crc32(f'{self.name} {self.at} {self.data}'.encode()):08x}")
+        return EventMark(self.id, f"{zlib.crc32(f'{self.name} {self.at} {self.data}'.encode()):08x}")
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class EventMark:
     """A place in the log: an event's number, and a tag of what it said; "" where there is no event.
 
     A restored database gives the numbers that it had given out since the backup to other events. The tag
@@ -207,12 +207,12 @@ def bounds(tx: Tx) -> tuple[int, int]:
     return horizon, max(head, horizon)
 
 
-def head(tx: Tx) -> Mark:
+def head(tx: Tx) -> EventMark:
     """Return the newest place of the log."""
     return mark_at(tx, bounds(tx)[1])
 
 
-def reaches(tx: Tx, mark: Mark) -> bool:
+def reaches(tx: Tx, mark: EventMark) -> bool:
     """Return True if the log goes back to ``mark`` without a gap: what came after it can be given, all of it.
 
     False for one that was trimmed away, that is of the future, or whose event is another one by now.
@@ -223,10 +223,10 @@ def reaches(tx: Tx, mark: Mark) -> bool:
     return not mark.tag or mark.id == horizon or mark_at(tx, mark.id) == mark
 
 
-def mark_at(tx: Tx, event_id: int) -> Mark:
+def mark_at(tx: Tx, event_id: int) -> EventMark:
     """Return the mark of the event with this id; without a tag where there is none, or no more."""
     row = tx.conn.execute(select(events).where(events.c.id == event_id)).one_or_none()
-    return from_row(LoggedEvent, row).mark if row is not None else Mark(event_id)
+    return from_row(LoggedEvent, row).mark if row is not None else EventMark(event_id)
 
 
 def trim(tx: Tx, keep: int, keep_bytes: int | None = None, limit: int | None = None) -> int:
@@ -292,7 +292,7 @@ PAGE = 500
 class Frame:
     """An event as it goes over the wire, with what filters look at."""
 
-    mark: Mark
+    mark: EventMark
     item_uuid: str | None
     part_number_key: str | None
     payload: bytes
@@ -307,7 +307,7 @@ class Batch:
     """What a listener gets next: frames, its new cursor, and whether it must re-read everything first."""
 
     frames: Sequence[Frame]
-    cursor: Mark
+    cursor: EventMark
     reset: bool = False
 
 
@@ -326,7 +326,7 @@ class Hub:
         self._ring: deque[Frame] = deque()
         self._ring_bytes = 0
         self._ring_start = 0  # the ring holds every event with an id above this
-        self.head = Mark(0)
+        self.head = EventMark(0)
         self.epoch = 0  # counts how often the log turned out to be another one
         self.listeners = 0
         self.closed = False
@@ -371,7 +371,7 @@ class Hub:
         """Wait until there is news, a heartbeat is due, or the hub closes."""
         await self._news.wait()
 
-    async def take(self, cursor: Mark) -> Batch:
+    async def take(self, cursor: EventMark) -> Batch:
         """Return what comes after ``cursor``: from the ring where it reaches back far enough, else from the
         log.
         """
@@ -391,7 +391,7 @@ class Hub:
         newer.reverse()
         return newer
 
-    async def place(self, last: Mark | None) -> tuple[Mark, bool]:
+    async def place(self, last: EventMark | None) -> tuple[EventMark, bool]:
         """Return (cursor to begin at, whether a ``reset`` is due) for a client that says what it saw last."""
         # The log and not the ring says where "now" is: the ring may be a moment behind a commit.
         return await asyncio.to_thread(self._read_place, last)
@@ -461,24 +461,24 @@ class Hub:
             self._news.set()
         news.set()
 
-    def _read_page(self, after: Mark) -> list[Frame] | None:
+    def _read_page(self, after: EventMark) -> list[Frame] | None:
         """Return what comes after ``after``; None if that is no place of this log."""
         with self._db.read() as tx:
             if not reaches(tx, after):
                 return None
             return [to_frame(event) for event in read_after(tx, after.id, PAGE)]
 
-    def _read_head(self) -> Mark:
+    def _read_head(self) -> EventMark:
         with self._db.read() as tx:
             return head(tx)
 
-    def _read_place(self, last: Mark | None) -> tuple[Mark, bool]:
+    def _read_place(self, last: EventMark | None) -> tuple[EventMark, bool]:
         with self._db.read() as tx:
             if last is not None and reaches(tx, last):
                 return mark_at(tx, last.id), False
             return head(tx), last is not None
 
-    def _read_log(self, cursor: Mark) -> Batch:
+    def _read_log(self, cursor: EventMark) -> Batch:
         with self._db.read() as tx:
             if not reaches(tx, cursor):
                 return Batch((), head(tx), reset=True)
@@ -552,7 +552,7 @@ class EventStream(Response):
     def __init__(
         self,
         hub: Hub,
-        last: Mark | None,
+        last: EventMark | None,
         items: Sequence[str] = (),
         still_allowed: Callable[[], bool] = lambda: True,
     ) -> None:
@@ -615,12 +615,12 @@ class EventStream(Response):
         return _reset(batch.cursor) + frames if batch.reset else frames
 
 
-def _hello(cursor: Mark) -> bytes:
+def _hello(cursor: EventMark) -> bytes:
     # With the id a listener that is cut off before its first event can ask for what it missed.
     return f": connected\nid: {cursor}\nretry: 2000\n\n".encode()
 
 
-def _reset(cursor: Mark) -> bytes:
+def _reset(cursor: EventMark) -> bytes:
     return f"id: {cursor}\nevent: reset\ndata: {{}}\n\n".encode()
 
 

@@ -71,7 +71,7 @@ from silo_server.schema import find_schema
 from silo_server.services import items as item_service
 from silo_server.services.access import START_TOKEN, note_token_uses
 from silo_server.services.bom.history import state_at
-from silo_server.services.bom.lines import ChangeKind, LineChange, history_row
+from silo_server.services.bom.lines import ChangeKind, LineRecord, history_row
 from silo_server.services.bom.review import keep_looks
 from silo_server.services.bom.summary import keep_summaries
 from silo_server.services.revisions import FileStore
@@ -253,7 +253,7 @@ def _history(tx: Tx) -> int:
             refers_to=None,
         )
     )
-    added = [LineChange(line.line_id, line.child.id, None, line.state, line.position) for line in lines]
+    added = [LineRecord(line.line_id, line.child.id, None, line.state, line.position) for line in lines]
     rows = [{"change_id": newest, **history_row(change)} for change in added]
     if rows:
         tx.conn.execute(insert(bom_change_lines), rows)
@@ -338,7 +338,7 @@ class Later:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class ServerStanding:
     """How a server is. ``files``: ok, unwritable or full (so is ``database``, or unreachable)."""
 
     mode: str
@@ -358,10 +358,10 @@ class Probe:
         self._db = db
         self._files = files
         self._executor = ThreadPoolExecutor(1, "silo-probe")
-        self._running: asyncio.Future[State] | None = None
-        self.last = State("normal", "ok", "ok")
+        self._running: asyncio.Future[ServerStanding] | None = None
+        self.last = ServerStanding("normal", "ok", "ok")
 
-    async def look(self, seconds: float) -> State | None:
+    async def look(self, seconds: float) -> ServerStanding | None:
         """Return how the server is now, None if that does not turn out within ``seconds``."""
         if self._running is None or self._running.done():
             self._running = asyncio.get_running_loop().run_in_executor(self._executor, self._look)
@@ -373,7 +373,7 @@ class Probe:
         """Take no more looks."""
         self._executor.shutdown(wait=False, cancel_futures=True)
 
-    def _look(self) -> State:
+    def _look(self) -> ServerStanding:
         files = self._files.state(MIN_FREE)
         database = "ok"
         path = self._db.settings.sqlite_path
@@ -384,7 +384,7 @@ class Probe:
                 mode = mode_of(tx)
         except SQLAlchemyError:
             mode, database = "degraded", "unreachable"
-        self.last = State(mode if files == database == "ok" else "degraded", database, files)
+        self.last = ServerStanding(mode if files == database == "ok" else "degraded", database, files)
         return self.last
 
 

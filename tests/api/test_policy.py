@@ -16,8 +16,8 @@ from silo.api.config import Pause
 from silo.api.policy import (
     LONGEST_TOLD,
     Backoff,
+    ErrorScope,
     Retries,
-    Scope,
     Then,
     Verdict,
     WebPageError,
@@ -36,24 +36,24 @@ from silo.bom.errors import (
     UnreachableError,
 )
 
-ENTRY_PERSON, ALL_RETRY = (Scope.ENTRY, Then.PERSON), (Scope.ALL, Then.RETRY)
+ENTRY_PERSON, ALL_RETRY = (ErrorScope.ENTRY, Then.PERSON), (ErrorScope.ALL, Then.RETRY)
 VERDICTS = {
     "SiloError": ENTRY_PERSON,
     "InputError": ENTRY_PERSON,
     "DocumentError": ENTRY_PERSON,
-    "ConfigError": (Scope.ALL, Then.PERSON),
-    "PackageError": (Scope.ALL, Then.PERSON),
+    "ConfigError": (ErrorScope.ALL, Then.PERSON),
+    "PackageError": (ErrorScope.ALL, Then.PERSON),
     "RemoteError": ENTRY_PERSON,
     "UnreachableError": ALL_RETRY,
     "NotSentError": ALL_RETRY,
     "BusyError": ALL_RETRY,
-    "AuthError": (Scope.ALL, Then.PERSON),
-    "ForbiddenError": (Scope.KIND, Then.PERSON),
-    "NotFoundError": (Scope.ENTRY, Then.RETRY),
-    "RouteMissingError": (Scope.KIND, Then.RETRY),
+    "AuthError": (ErrorScope.ALL, Then.PERSON),
+    "ForbiddenError": (ErrorScope.KIND, Then.PERSON),
+    "NotFoundError": (ErrorScope.ENTRY, Then.RETRY),
+    "RouteMissingError": (ErrorScope.KIND, Then.RETRY),
     "RejectedError": ENTRY_PERSON,
     "ReadOnlyError": ALL_RETRY,
-    "ServerFaultError": (Scope.ENTRY, Then.RETRY),
+    "ServerFaultError": (ErrorScope.ENTRY, Then.RETRY),
     "SeveralAssembliesError": ENTRY_PERSON,
     "ConflictError": ENTRY_PERSON,
     "CycleError": ENTRY_PERSON,
@@ -89,8 +89,8 @@ def test_a_plain_question_distinguishes_one_entry_from_all(kind: str) -> None:
     def dead() -> None:
         raise UnreachableError("y")
 
-    assert judge(error, lambda: None) == Verdict(Scope.ENTRY, Then.RETRY)
-    assert judge(error, dead) == Verdict(Scope.ALL, Then.RETRY)
+    assert judge(error, lambda: None) == Verdict(ErrorScope.ENTRY, Then.RETRY)
+    assert judge(error, dead) == Verdict(ErrorScope.ALL, Then.RETRY)
 
 
 def test_nobody_is_asked_where_the_error_says_it_all() -> None:

@@ -16,7 +16,7 @@ from fcstd_writer import Doc, locals_, part
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.batch import Html, Summary, TopResult
+from silo.batch import Html, RunSummary, TopResult
 from silo.bom.errors import DocumentError, Exit, SiloError, UnreachableError
 
 POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:{}\nsize 12345\n"
@@ -127,7 +127,7 @@ def test_all_forms_say_the_same(night: Any, gearbox: Path) -> None:
 
 @given(st.text(st.sampled_from("ab<>&\"'\n\x00\x1b\u202e\ud800"), max_size=20))
 def test_text_of_others_does_nothing_in_html(text: str) -> None:
-    summary = Summary(warnings={text: []}, notes=[text])
+    summary = RunSummary(warnings={text: []}, notes=[text])
     page = Visible(Html().head(summary) + Html().end(summary))
     assert page.tags <= {
         *["html", "head", "meta", "title", "style", "body", "h1", "h2", "h3", "p", "ul", "li"]
@@ -208,7 +208,7 @@ CAUSES: list[SiloError | None] = [
 
 @given(st.lists(st.tuples(st.sampled_from(CAUSES), st.integers(1, 5))))
 def test_the_exit_code_is_the_worst_of_the_run(files: list[tuple[SiloError | None, int]]) -> None:
-    summary = Summary()
+    summary = RunSummary()
     for number, (error, left) in enumerate(files):
         summary.add(TopResult(f"{number}.FCStd", error=error, left=left))
     worst = {None: Exit.DONE, DocumentError: Exit.UNDONE, UnreachableError: Exit.REMOTE}

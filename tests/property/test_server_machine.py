@@ -32,7 +32,7 @@ from silo_server.run import prepare
 from silo_server.services.bom import history, review
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge import merge_bom, preview_merge, read_merge_order
-from silo_server.services.bom.review import Action, Decision, open_conflicts, resolve
+from silo_server.services.bom.review import Decision, ReviewAction, open_conflicts, resolve
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import DuplicateError, Settings
 from silo_server.values import Actor, LineState, Role
@@ -166,16 +166,16 @@ class Silo(RuleBasedStateMachine):
         del self.model[number]
         self.changed(before)
 
-    @rule(number=part, action=st.sampled_from(list(Action)), who=user)
-    def decide(self, number: str, action: Action, who: str) -> None:
+    @rule(number=part, action=st.sampled_from(list(ReviewAction)), who=user)
+    def decide(self, number: str, action: ReviewAction, who: str) -> None:
         """A decision of the merge page; refused where there is nothing to decide."""
         before = copy.deepcopy(self.model)
         line = self.model.get(number)
         open_now = self.open_conflicts()
         possible = line is not None and (
-            action is Action.REMOVE
-            or (action is Action.KEEP and line["unreferenced"])
-            or (action in (Action.TAKE_CAD, Action.KEEP_SILO) and number in open_now)
+            action is ReviewAction.REMOVE
+            or (action is ReviewAction.KEEP and line["unreferenced"])
+            or (action in (ReviewAction.TAKE_CAD, ReviewAction.KEEP_SILO) and number in open_now)
         )
         decisions = [Decision(number, action, "because")]
         if not possible or line is None:
@@ -183,16 +183,16 @@ class Silo(RuleBasedStateMachine):
                 self.do(who, lambda tx: resolve(tx, self.parent, decisions))
             return
         self.do(who, lambda tx: resolve(tx, self.parent, decisions))
-        if action is Action.REMOVE or (action is Action.TAKE_CAD and open_now[number] == 0):
+        if action is ReviewAction.REMOVE or (action is ReviewAction.TAKE_CAD and open_now[number] == 0):
             del self.model[number]
-        elif action is Action.KEEP:
+        elif action is ReviewAction.KEEP:
             line |= {"source": "manual", "unreferenced": False}
-        elif action is Action.TAKE_CAD:
+        elif action is ReviewAction.TAKE_CAD:
             line |= {"quantity": open_now[number], "source": "assembly", "override": False, "cad": None}
         else:
             line |= {"override": False, "cad": None}
             self.accepted[number] = open_now[number]
-        if before == self.model and action is not Action.REMOVE:
+        if before == self.model and action is not ReviewAction.REMOVE:
             # A reason was written on the line, which the model does not keep; it is a change anyway.
             self.version += self._version() - self.version
         self.changed(before)

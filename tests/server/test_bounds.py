@@ -307,7 +307,7 @@ def test_what_waits_is_listed_and_counted_without_reading_all_lines(db: Database
         assert [one.conflicts for one in review.waiting(tx) if one.part_number == "T4"] == [2]
         review.change_line(tx, "T4", "C2", {"quantity": 5.0})
         assert [one.conflicts for one in review.waiting(tx) if one.part_number == "T4"] == [1]
-        review.resolve(tx, "T4", [review.Decision("C3", review.Action.KEEP_SILO)])
+        review.resolve(tx, "T4", [review.Decision("C3", review.ReviewAction.KEEP_SILO)])
     with db.read() as tx:
 
         def note(_conn: Any, _cursor: Any, sql: str, values: Any, *_: Any) -> None:

@@ -99,7 +99,7 @@ def edit(tx: Tx, numbers: list[str], dice: random.Random) -> None:
 
 
 def decide(tx: Tx, numbers: list[str], dice: random.Random) -> None:
-    action = dice.choice(list(review.Action))
+    action = dice.choice(list(review.ReviewAction))
     decision = review.Decision(dice.choice(numbers), action)
     review.resolve(tx, dice.choice(numbers[:ASSEMBLIES]), [decision])
 

@@ -13,7 +13,7 @@ from typing import Any
 from server_testing import Api
 
 from silo_server.db.engine import Database
-from silo_server.services.bom.lines import ChangeKind, ChangeNote, LineChange, apply_changes, new_line_id
+from silo_server.services.bom.lines import ChangeKind, ChangeNote, LineRecord, apply_changes, new_line_id
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
 from silo_server.values import LineState
@@ -104,7 +104,7 @@ def _assembly(tx: Any, number: str, name: str) -> str:
 
 def _fill(tx: Any, parent: str, children: list[str], dice: random.Random) -> None:
     changes = [
-        LineChange(
+        LineRecord(
             new_line_id(),
             get_item(tx, child).id,
             None,

@@ -32,7 +32,7 @@ from silo.api.policy import Reply, Retries, WebPageError, translated
 from silo.api.transport import (
     LISTS,
     Abilities,
-    Call,
+    ApiCall,
     Cancel,
     Params,
     Timeouts,
@@ -510,7 +510,7 @@ class SiloClient(ItemCalls, BomCalls):
 
     def ready(self) -> ServerState:
         """Return whether the server takes changes: ``normal``, ``read-only`` or ``degraded``."""
-        call = Call("GET", f"{self._address.web_root}/ready", "/ready", repeatable=False)
+        call = ApiCall("GET", f"{self._address.web_root}/ready", "/ready", repeatable=False)
         with self._transport.opened(call) as response:
             reply = self._transport.reply(response, call)
         # A server that is not ready says so with 503, and why in the same form.

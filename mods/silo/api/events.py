@@ -35,7 +35,7 @@ from pydantic import ValidationError
 from silo.api.config import Pause
 from silo.api.policy import (
     Backoff,
-    Scope,
+    ErrorScope,
     WebPageError,
     Where,
     error_of,
@@ -44,7 +44,7 @@ from silo.api.policy import (
     told_wait,
     translated,
 )
-from silo.api.transport import MAX_ERROR, Call, Transport, read_some
+from silo.api.transport import MAX_ERROR, ApiCall, Transport, read_some
 from silo.api.wire import MergeEvent, ServerState
 from silo.bom.errors import (
     AuthError,
@@ -210,7 +210,7 @@ def open_stream(transport: Transport, last_event_id: str | None, silence: float)
     headers = {"Accept": "text/event-stream", "Cache-Control": "no-cache", "Accept-Encoding": "identity"}
     if last_event_id:
         headers["Last-Event-ID"] = last_event_id
-    call = Call("GET", transport.address.api("events"), "its events", headers=headers, endless=True)
+    call = ApiCall("GET", transport.address.api("events"), "its events", headers=headers, endless=True)
     response = transport.open(call, read_timeout=silence)
     where = Where(transport.address.host, "its events", transport.timeouts.connect, silence)
     kind = response.headers.get("Content-Type", "")
@@ -466,7 +466,7 @@ class EventListener:
             except SiloError as error:
                 if stop.is_set():
                     return
-                if judge(error).scope is Scope.ALL:
+                if judge(error).scope is ErrorScope.ALL:
                     now, reached = self._pauses.clock(), 0 if heard.anything else failures
                     before = self._pauses.get()
                     waited = pause_after(error, before, now, self._backoff, self._chance(), reached)

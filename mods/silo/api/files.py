@@ -23,7 +23,7 @@ from silo.api.policy import error_of
 from silo.api.transport import (
     LISTS,
     MAX_ERROR,
-    Call,
+    ApiCall,
     Caller,
     Cancel,
     Params,
@@ -318,7 +318,9 @@ class FileCalls(Caller):
         kind = "model/gltf-binary" if part == "geometry" else "application/json"
         headers = {"Accept": "application/json", "Content-Type": kind, "Content-Encoding": "gzip"}
         url = self._address.api("models", sha256, part)
-        call = Call("PUT", url, f"the {part} of a file", body=lambda: body, headers=headers, repeatable=True)
+        call = ApiCall(
+            "PUT", url, f"the {part} of a file", body=lambda: body, headers=headers, repeatable=True
+        )
         self._transport.send(call)
 
     def get_scene(self, part_number: str, revision: int, /) -> Scene:
@@ -425,7 +427,7 @@ class FileCalls(Caller):
             if idempotency_key:
                 headers["Idempotency-Key"] = idempotency_key
             url = self._address.api(*_path_of(part_number), "file")
-            call = Call("POST", url, subject, body=form.rewound, headers=headers, cancelled=cancelled)
+            call = ApiCall("POST", url, subject, body=form.rewound, headers=headers, cancelled=cancelled)
             try:
                 revision, sent = self._transport.send(call).model(Revision), form.sha256
             except (RouteMissingError, RejectedError) as error:
@@ -452,7 +454,7 @@ class FileCalls(Caller):
             url = self._address.api("items", part_number, "files")
             subject = f"{file_name} beside {part_number}"
             self._transport.send(
-                Call("POST", url, subject, body=form.rewound, headers=headers, cancelled=cancelled)
+                ApiCall("POST", url, subject, body=form.rewound, headers=headers, cancelled=cancelled)
             )
 
     def download_file(
@@ -470,7 +472,7 @@ class FileCalls(Caller):
         differ from those uploaded: a server re-packs some formats.
         """
         segments = (*_path_of(part_number), "file", *(() if revision is None else (str(revision),)))
-        call = Call(
+        call = ApiCall(
             "GET",
             self._address.api(*segments),
             f"the file of {part_number}",
@@ -515,7 +517,7 @@ def _upload_fields(
 
 def _in_two_steps(
     transport: Transport,
-    call: Call,
+    call: ApiCall,
     path: Path,
     name: str,
     said: Mapping[str, Any],

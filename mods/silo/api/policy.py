@@ -501,7 +501,7 @@ def _clean(value: Any, secret: str | None) -> str:
     return text if len(text) <= _MAX_TEXT else text[: _MAX_TEXT - 1] + "…"
 
 
-class Scope(StrEnum):
+class ErrorScope(StrEnum):
     """What an error concerns."""
 
     ENTRY = "entry"  # this item or entry; the others may fare better
@@ -520,7 +520,7 @@ class Then(StrEnum):
 class Verdict:
     """What to do after an error. ``wait``: seconds that the server asked for; None where it named none."""
 
-    scope: Scope
+    scope: ErrorScope
     then: Then
     wait: float | None = None
 
@@ -534,26 +534,26 @@ def judge(error: SiloError, alive: Callable[[], object] | None = None) -> Verdic
     """
     wait = told_wait(error)
     if isinstance(error, (BusyError, ReadOnlyError, CancelledError)):
-        return Verdict(Scope.ALL, Then.RETRY, wait)
+        return Verdict(ErrorScope.ALL, Then.RETRY, wait)
     if isinstance(error, ForbiddenError):
-        return Verdict(Scope.KIND, Then.PERSON)
+        return Verdict(ErrorScope.KIND, Then.PERSON)
     if isinstance(error, (AuthError, ConfigError)):
-        return Verdict(Scope.ALL, Then.PERSON)
+        return Verdict(ErrorScope.ALL, Then.PERSON)
     if isinstance(error, NotSentError):
-        return Verdict(Scope.ALL, Then.RETRY)
+        return Verdict(ErrorScope.ALL, Then.RETRY)
     if isinstance(error, (UnreachableError, ServerFaultError, WebPageError)):
-        scope = Scope.ALL if alive is None and isinstance(error, UnreachableError) else Scope.ENTRY
+        scope = ErrorScope.ALL if alive is None and isinstance(error, UnreachableError) else ErrorScope.ENTRY
         try:
             if alive is not None:
                 alive()
         except SiloError:
-            scope = Scope.ALL
+            scope = ErrorScope.ALL
         return Verdict(scope, Then.RETRY, wait)
     if isinstance(error, RouteMissingError):
-        return Verdict(Scope.KIND, Then.RETRY)
+        return Verdict(ErrorScope.KIND, Then.RETRY)
     if isinstance(error, NotFoundError):
-        return Verdict(Scope.ENTRY, Then.RETRY, wait)
-    return Verdict(Scope.ENTRY, Then.PERSON)
+        return Verdict(ErrorScope.ENTRY, Then.RETRY, wait)
+    return Verdict(ErrorScope.ENTRY, Then.PERSON)
 
 
 def is_certain(error: SiloError) -> bool:
@@ -563,7 +563,7 @@ def is_certain(error: SiloError) -> bool:
     if isinstance(error, UnreachableError):
         return error.refused
     lost = isinstance(error, ServerFaultError | WebPageError)
-    return not lost and judge(error, lambda: None).scope is not Scope.ALL
+    return not lost and judge(error, lambda: None).scope is not ErrorScope.ALL
 
 
 def ends_run(error: SiloError, api: object = None) -> bool:
@@ -572,7 +572,7 @@ def ends_run(error: SiloError, api: object = None) -> bool:
     api
         the server's client; its ``ready`` says whether only this item had trouble.
     """
-    return judge(error, getattr(api, "ready", None)).scope is not Scope.ENTRY
+    return judge(error, getattr(api, "ready", None)).scope is not ErrorScope.ENTRY
 
 
 def told_wait(error: SiloError) -> float | None:

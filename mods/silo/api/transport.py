@@ -76,7 +76,7 @@ class Timeouts:
 
 
 @dataclass(frozen=True)
-class Call:
+class ApiCall:
     """One request. ``body`` makes the content again for each attempt.
 
     ``endless`` answers (downloads) may take as long as they come at all.
@@ -149,7 +149,7 @@ class Transport:
     def close(self) -> None:
         self._session.close()
 
-    def send(self, call: Call) -> Reply:
+    def send(self, call: ApiCall) -> Reply:
         """Return the server's good answer; raises one of :mod:`silo.bom.errors` for everything else."""
         attempt = 0
         while True:
@@ -164,7 +164,7 @@ class Transport:
                 self._retries.tell(wait, error)
             self._pause(wait, call.cancelled)
 
-    def _attempt(self, call: Call) -> Reply:
+    def _attempt(self, call: ApiCall) -> Reply:
         with self.opened(call) as response:
             reply = self.reply(response, call)
         if not reply.ok:
@@ -172,12 +172,12 @@ class Transport:
         return reply
 
     @contextmanager
-    def opened(self, call: Call, read_timeout: float | None = None) -> Iterator[requests.Response]:
+    def opened(self, call: ApiCall, read_timeout: float | None = None) -> Iterator[requests.Response]:
         """Yield the response with its body still unread, redirects followed; closed at the end."""
         with closing(self.open(call, read_timeout)) as response:
             yield response
 
-    def open(self, call: Call, read_timeout: float | None = None) -> requests.Response:
+    def open(self, call: ApiCall, read_timeout: float | None = None) -> requests.Response:
         """Do as :meth:`opened`, for the caller to close."""
         url, params, home = call.url, dict(call.params), self.address.origin
         for _ in range(MAX_REDIRECTS + 1):
@@ -196,7 +196,7 @@ class Transport:
         )
 
     def _exchange(
-        self, call: Call, url: str, params: dict[str, Any], carry: bool, read_timeout: float | None
+        self, call: ApiCall, url: str, params: dict[str, Any], carry: bool, read_timeout: float | None
     ) -> requests.Response:
         # A server on this computer is never behind a proxy, whatever the environment says of the others.
         proxies = {"no_proxy": self.address.origin[1]} if self.address.is_loopback else None
@@ -216,12 +216,12 @@ class Transport:
                 proxies=proxies,
             )
 
-    def reply(self, response: requests.Response, call: Call) -> Reply:
+    def reply(self, response: requests.Response, call: ApiCall) -> Reply:
         """Return the response, read whole within the call's bounds."""
         content = b"".join(self.pieces(response, call))
         return Reply(response.status_code, content, self.where(call.subject), response.headers, self._token)
 
-    def pieces(self, response: requests.Response, call: Call) -> Iterator[bytes]:
+    def pieces(self, response: requests.Response, call: ApiCall) -> Iterator[bytes]:
         """Yield the body as it comes, each piece at once; ends by error when it is too much or takes too
         long.
         """
@@ -301,7 +301,7 @@ def stop_if(cancelled: Cancel | None) -> None:
 
 
 def _check_redirect(
-    call: Call, home: ServerAddress, here: Origin, there: Origin, target: str, status: int
+    call: ApiCall, home: ServerAddress, here: Origin, there: Origin, target: str, status: int
 ) -> None:
     shown = f"{there[0]}://{urlsplit(target).netloc}"
     words = urlsplit(target).path.lower().strip("/").split("/")
@@ -404,7 +404,7 @@ class Abilities(BaseModel):
     schemas: dict[str, str] = {}
 
 
-class _Kept(Abilities):
+class _KeptAbilities(Abilities):
     learned_at: float
 
 
@@ -416,7 +416,7 @@ def abilities_path() -> Path:
 def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time.time) -> Abilities:
     """Return what is known of a server; nothing where that is older than a day."""
     try:
-        memory = _Kept.model_validate(read_memory(path).get(server), strict=True)
+        memory = _KeptAbilities.model_validate(read_memory(path).get(server), strict=True)
     except ValidationError:
         return Abilities()
     fresh = 0 <= clock() - memory.learned_at < KEPT_S
@@ -468,7 +468,7 @@ class Caller:
     def _get(self, subject: str, *segments: str, params: Params | None = None) -> Reply:
         """Ask; a question may be repeated freely."""
         return self._transport.send(
-            Call(
+            ApiCall(
                 "GET",
                 self._address.api(*segments),
                 subject,
@@ -532,7 +532,7 @@ class Caller:
         def send(data: Any) -> Reply:
             content = as_json(data)
             return self._transport.send(
-                Call(
+                ApiCall(
                     method,
                     self._address.api(*segments),
                     subject,
@@ -598,7 +598,7 @@ class Caller:
 
     def _delete(self, subject: str, *segments: str) -> None:
         """Remove."""
-        self._transport.send(Call("DELETE", self._address.api(*segments), subject))
+        self._transport.send(ApiCall("DELETE", self._address.api(*segments), subject))
 
 
 def body(kind: type[Body], values: Mapping[str, Any], thing: str) -> Body:

@@ -470,7 +470,7 @@ def run_diff(args: argparse.Namespace) -> int:
 
 def _folder_diff(args: argparse.Namespace) -> int:
     """Show every assembly of a folder against the server; only those that differ."""
-    from silo.batch import Summary, SyncOptions, is_news
+    from silo.batch import RunSummary, SyncOptions, is_news
     from silo.bom_sync import blocking
     from silo.cli import show
     from silo.vault.plan import SyncJob
@@ -479,7 +479,7 @@ def _folder_diff(args: argparse.Namespace) -> int:
     with common.plan_of(args) as (plan, reading, base), common.client_of(args) as client:
         if not plan.uuids:
             common.reach(client)
-        summary = Summary(base)
+        summary = RunSummary(base)
         options = SyncOptions(recursive=True, dry_run=True, allow_missing=args.allow_missing)
         drifted = broken = False
         compared_count = 0

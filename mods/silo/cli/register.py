@@ -305,7 +305,7 @@ def run(args: argparse.Namespace) -> int:
         if args.category and args.category not in offer_made.categories:
             text = ", ".join(offer_made.categories)
             raise InputError(f"--category: schema {schema} has no {args.category}; it has {text}")
-        code = _Run(args, client, schema, offer_made, base).as_asked(rows, unused)
+        code = _RegisterRun(args, client, schema, offer_made, base).as_asked(rows, unused)
         return code or (Exit.UNDONE if unread else Exit.DONE)
 
 
@@ -391,7 +391,7 @@ class _Told:
 # --- doing it -------------------------------------------------------------------------------------------
 
 
-class _Run:
+class _RegisterRun:
     """One registration, from orders to the report."""
 
     def __init__(
@@ -526,7 +526,7 @@ def _declare(args: argparse.Namespace) -> int:
         if args.category:
             orders = [replace(part, category=args.category) for part in orders]
         base = os.path.dirname(os.path.realpath(args.top))
-        return _Run(args, client, schema, own_offer, base).register(orders, ())
+        return _RegisterRun(args, client, schema, own_offer, base).register(orders, ())
 
 
 def _undeclare(args: argparse.Namespace) -> int:

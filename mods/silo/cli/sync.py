@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.config import Pause
     from silo.api.wire import Item, ProductChanges, Revision
-    from silo.batch import Summary
+    from silo.batch import RunSummary
     from silo.outbox.entry import Entry
     from silo.outbox.store import Store
     from silo.vault.pull import Pulled
@@ -49,7 +49,7 @@ def add_sync(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Sync each file; one failure does not stop the rest. 1 or 3 where anything was left undone."""
-    from silo.batch import ReportFile, Summary
+    from silo.batch import ReportFile, RunSummary
     from silo.vault.plan import only_job
 
     common.refuse_assembly_of(args.tops, args.assembly)
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         dry_run=args.dry_run,
         skip_parts=bool(folders),
     )
-    summary = Summary(base)
+    summary = RunSummary(base)
     stop = threading.Event()
     with ExitStack() as stack:
         for folder in {os.path.realpath(folder): folder for folder in folders}.values():
@@ -97,7 +97,7 @@ def _results(
     tops: Sequence[str],
     options: SyncOptions,
     client: SiloClient,
-    summary: Summary,
+    summary: RunSummary,
     stop: threading.Event,
 ) -> Iterator[TopResult]:
     from silo.vault.plan import SyncJob, make_plan
@@ -157,7 +157,7 @@ class _Shown:
         else:
             _show(result, whole=not self._many)
 
-    def close(self, summary: Summary | None) -> None:
+    def close(self, summary: RunSummary | None) -> None:
         if self._json is not None:
             print(self._json.end(summary), end="")
         elif summary is not None and self._many:
@@ -188,7 +188,7 @@ def _show(result: TopResult, *, whole: bool) -> None:
         out.print(show.findings_text(result.findings, result.base))
 
 
-def _show_summary(summary: Summary) -> None:
+def _show_summary(summary: RunSummary) -> None:
     from silo.cli import show
 
     out = show.console()

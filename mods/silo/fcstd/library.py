@@ -110,8 +110,8 @@ class Remembered:
         )
         self.state = FileState(*file_facts.state)
         self._objects = dict(file_facts.objects)
-        self._tables: dict[str, _Kept] = {}
-        self.document: Properties = _Kept(self, "", "", *file_facts.document)
+        self._tables: dict[str, _DigestTable] = {}
+        self.document: Properties = _DigestTable(self, "", "", *file_facts.document)
         self.sound: set[str] = set()
 
     @property
@@ -124,11 +124,11 @@ class Remembered:
         table = self.table(name)
         return None if table is None else table.kind
 
-    def table(self, name: str) -> _Kept | None:
+    def table(self, name: str) -> _DigestTable | None:
         """Return the table of an object, made once; None if nothing is known of it."""
         table = self._tables.get(name)
         if table is None and (rows_of_object := self._objects.pop(name, None)) is not None:
-            table = self._tables[name] = _Kept(self, name, *rows_of_object)
+            table = self._tables[name] = _DigestTable(self, name, *rows_of_object)
         return table
 
     def _content(self) -> Content:
@@ -148,7 +148,7 @@ class Remembered:
         return self._content().directory
 
 
-class _Kept(Properties):
+class _DigestTable(Properties):
     """The table of an object, "" for the document itself: what a walker asks of a target."""
 
     __slots__ = ("_file", "_name", "_texts", "_values", "kind")

@@ -58,7 +58,7 @@ class Head:
 
 
 @dataclass(slots=True)
-class _Walk:
+class _XmlWalk:
     """One run of expat over a text; ``open_at`` and ``close_at`` get tag, depth and byte offset."""
 
     text: bytes
@@ -158,7 +158,7 @@ class _DocumentIndex:
 def index_document(text: bytes, depth_limit: int) -> tuple[Head, dict[str, Span]]:
     """Return the head, and where each object's data stands. Raises Malformed."""
     index = _DocumentIndex()
-    _Walk(text, depth_limit, index.open_at, index.close_at).run()
+    _XmlWalk(text, depth_limit, index.open_at, index.close_at).run()
     return index.head, index.data
 
 
@@ -182,7 +182,7 @@ def index_properties(text: bytes, depth_limit: int) -> dict[str, Span]:
                 raise Malformed(f"has the property {name!r} twice")
             spans[name] = (begin, end)
 
-    _Walk(text, depth_limit, open_at, close_at).run()
+    _XmlWalk(text, depth_limit, open_at, close_at).run()
     return spans
 
 
@@ -196,7 +196,7 @@ def start_tags(text: bytes, depth_limit: int, tags: Collection[str]) -> list[tup
         if tag in tags:
             result.append((at, dict(attributes)))
 
-    _Walk(text, depth_limit, open_at, lambda depth, tag, end: None).run()
+    _XmlWalk(text, depth_limit, open_at, lambda depth, tag, end: None).run()
     return result
 
 
@@ -222,7 +222,7 @@ def parse_value(snippet: bytes, depth_limit: int) -> XmlElement:
     def close_at(depth: int, tag: str, end: int) -> None:
         stack.pop()
 
-    _Walk(snippet, depth_limit, open_at, close_at).run()
+    _XmlWalk(snippet, depth_limit, open_at, close_at).run()
     return root.children[0]
 
 

@@ -63,7 +63,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Decision:
+class MassDecision:
     """Where a product's mass comes from.
 
     mass_kg
@@ -113,7 +113,7 @@ class MassRule:
         answer = self.materials.find(material)
         return answer.material.density if isinstance(answer, MaterialHit) else None
 
-    def decide(self, prototype: Prototype, match: Match | None) -> Decision:
+    def decide(self, prototype: Prototype, match: Match | None) -> MassDecision:
         """Return the mass of one piece of ``prototype``, by the first rule that applies."""
         if match is None:
             return self._without_row(prototype)
@@ -123,21 +123,21 @@ class MassRule:
             return self._bom_mass(base, prototype, match)
         return self._without_mass(base, prototype, row.material)
 
-    def decide_by_sub_assembly(self, prototype: Prototype, match: Match) -> Decision:
+    def decide_by_sub_assembly(self, prototype: Prototype, match: Match) -> MassDecision:
         """Do as :meth:`decide`, by the row of a sub-assembly around the part, which gives no mass."""
         base = self._base(match, Rule.SUB_ASSEMBLY)
         return self._without_mass(base, prototype, match.row.material, f" to “{match.row.name}” around it")
 
     def _without_mass(
-        self, base: Decision, prototype: Prototype, material: str | None, to: str = ""
-    ) -> Decision:
+        self, base: MassDecision, prototype: Prototype, material: str | None, to: str = ""
+    ) -> MassDecision:
         if material is None:
             return self._neither(base, prototype, to)
         return self._material(base, prototype, material, to)
 
     @staticmethod
-    def _base(match: Match, rule: Rule) -> Decision:
-        return Decision(
+    def _base(match: Match, rule: Rule) -> MassDecision:
+        return MassDecision(
             source=Source.ZERO,
             rule=rule,
             decided=match.decided,
@@ -146,7 +146,7 @@ class MassRule:
             notes=(Note(MassCode.AMBIGUOUS, match.doubt),) if match.doubt else (),
         )
 
-    def _bom_mass(self, base: Decision, prototype: Prototype, match: Match) -> Decision:
+    def _bom_mass(self, base: MassDecision, prototype: Prototype, match: Match) -> MassDecision:
         row = match.row
         mass = row.mass_kg or 0.0
         material = self.materials.find(row.material) if row.material is not None else None
@@ -166,14 +166,16 @@ class MassRule:
             notes=(*base.notes, *two_ways(row), *mass_doubts(given, prototype, expected)),
         )
 
-    def _zero_of_known_material(self, base: Decision, prototype: Prototype, row: BOMEntry) -> Decision:
+    def _zero_of_known_material(
+        self, base: MassDecision, prototype: Prototype, row: BOMEntry
+    ) -> MassDecision:
         """Decide on "0 kg" of steel: it is less than the BOM shows, and not nothing."""
         decision = self._material(base, prototype, row.material or "")
         given = GivenMass(0.0, row.quantum_kg)
         note = zero_doubt(given, prototype.volume_m3, decision.density or 0.0, row.material or "")
         return replace(decision, notes=(*decision.notes, note))
 
-    def _material(self, base: Decision, prototype: Prototype, text: str, to: str = "") -> Decision:
+    def _material(self, base: MassDecision, prototype: Prototype, text: str, to: str = "") -> MassDecision:
         answer = self.materials.find(text)
         notes = list(base.notes)
         name, spread = None, 0.0
@@ -207,7 +209,7 @@ class MassRule:
             notes=tuple(notes),
         )
 
-    def _neither(self, base: Decision, prototype: Prototype, to: str) -> Decision:
+    def _neither(self, base: MassDecision, prototype: Prototype, to: str) -> MassDecision:
         if self.options.step_density and prototype.step_density is not None:
             note = Note(
                 MassCode.NO_MASS_NO_MATERIAL,
@@ -221,9 +223,9 @@ class MassRule:
         note = Note(MassCode.NO_MASS_NO_MATERIAL, f"No mass or material assigned{to}: counted as 0 kg{hint}")
         return replace(base, source=Source.ZERO, mass_kg=0.0, notes=(*base.notes, note))
 
-    def _without_row(self, prototype: Prototype) -> Decision:
+    def _without_row(self, prototype: Prototype) -> MassDecision:
         stated = prototype.step_density
-        base = Decision(source=Source.DEFAULT_DENSITY)
+        base = MassDecision(source=Source.DEFAULT_DENSITY)
         message = "Part not found in BOM" if self.has_bom else "There is no BOM"
         if self.options.own_bom and not self.has_bom:
             message = "The document assigns no material with a density"
@@ -249,7 +251,7 @@ class MassRule:
             notes = [*(notes if self.has_bom else ()), _no_volume(prototype)]
         return replace(base, density=density, density_source="default", notes=tuple(notes))
 
-    def _from_file(self, base: Decision, prototype: Prototype, notes: tuple[Note, ...]) -> Decision:
+    def _from_file(self, base: MassDecision, prototype: Prototype, notes: tuple[Note, ...]) -> MassDecision:
         return replace(
             base,
             source=Source.STEP_DENSITY,
@@ -476,10 +478,10 @@ class Groups:
     assembly: Assembly
     volume: Floats
     mass: Floats
-    decisions: list[Decision]
+    decisions: list[MassDecision]
     counted: NDArray[np.bool_]
     rule: MassRule
-    _made: dict[tuple[Match, Decision, str], Decision] = field(default_factory=dict)
+    _made: dict[tuple[Match, MassDecision, str], MassDecision] = field(default_factory=dict)
 
     def apply(self, matches: Mapping[str, Match]) -> Iterator[PlacedAssembly]:
         """Use or compare every matched row, once per placed sub-assembly. ``matches``: by product name."""
@@ -571,13 +573,13 @@ class Groups:
                 self._set(index, match, self.rule.decide_by_sub_assembly(prototype, match))
                 self.mass[index] = (self.decisions[index].density or 0.0) * self.volume[index]
 
-    def _set(self, index: int, match: Match, new: Decision) -> None:
+    def _set(self, index: int, match: Match, new: MassDecision) -> None:
         """Return one decision per (row, product): instances of one product stay one part in the report."""
         key = (match, self.decisions[index], self.assembly.instances[index].prototype)
         self.decisions[index] = self._made.setdefault(key, new)
 
 
-def _has_data(decision: Decision) -> bool:
+def _has_data(decision: MassDecision) -> bool:
     return decision.informed or decision.source is Source.SUB_ASSEMBLY_MASS
 
 
@@ -602,7 +604,7 @@ class Placed:
     com: Floats
     unit: Floats
     mass: Floats
-    decisions: Sequence[Decision]
+    decisions: Sequence[MassDecision]
     counted: NDArray[np.bool_]
     groups: Sequence[PlacedAssembly] = ()
 
@@ -659,7 +661,7 @@ def weighed(placed: Placed, groups: Sequence[tuple[str, Sequence[int], float]]) 
             continue
         words = f"weighed: {name} is {kg:.6g} kg"
         mass[rest] = left * weights / weights.sum() if rest else []
-        made: dict[Decision, Decision] = {}
+        made: dict[MassDecision, MassDecision] = {}
         for index in rest:
             old = decisions[index]
             if old not in made:
@@ -681,7 +683,7 @@ def _geometry(assembly: Assembly) -> tuple[Floats, Floats, Floats]:
     return place(volumes, coms, units, placements)
 
 
-def _note_totals(decisions: dict[str, Decision]) -> None:
+def _note_totals(decisions: dict[str, MassDecision]) -> None:
     """Mark the masses that cannot be checked as doubtful if those that can be are row totals."""
     given = {key: decision for key, decision in decisions.items() if decision.source is Source.BOM_MASS}
     totals = {key: any(note.code == MassCode.ROW_TOTAL for note in d.notes) for key, d in given.items()}
@@ -692,7 +694,7 @@ def _note_totals(decisions: dict[str, Decision]) -> None:
             decisions[key] = replace(decision, notes=(*decision.notes, TOTAL_BY_OTHERS))
 
 
-def _note_scaling(assembly: Assembly, decisions: dict[str, Decision]) -> None:
+def _note_scaling(assembly: Assembly, decisions: dict[str, MassDecision]) -> None:
     placements = np.array([i.transform for i in assembly.instances], float).reshape(-1, 4, 4)
     scaled = {assembly.instances[i].prototype for i in np.flatnonzero(~rigid_mask(placements))}
     for key in sorted(scaled):

@@ -36,7 +36,7 @@ from silo.api.files import (
     other_name,
     standing,
 )
-from silo.api.policy import Backoff, Scope, Then, is_certain, judge, pause_after
+from silo.api.policy import Backoff, ErrorScope, Then, is_certain, judge, pause_after
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
     HeldItem,
@@ -169,7 +169,7 @@ def send_all(
                 if is_set_back and entry.server == canonical(client.base_url):
                     with suppress(InputError):  # discarded in this moment
                         store.retry(entry.id)
-        run = _Run(store, client, cancelled, on_progress, on_sent, backoff, chance)
+        run = _SendRun(store, client, cancelled, on_progress, on_sent, backoff, chance)
         run.all()
         run.report.pause = store.pause(client.base_url)
         return run.report
@@ -184,7 +184,7 @@ class _PassingError(SiloError):
 
 
 @dataclass
-class _Run:
+class _SendRun:
     store: Store
     client: SiloClient
     cancelled: Cancel | None
@@ -265,7 +265,7 @@ class _Run:
             self._later(entry, error, str(error))
             return
         verdict = judge(error, self.client.ready)
-        if verdict.scope is Scope.ALL:
+        if verdict.scope is ErrorScope.ALL:
             self.report.stopped_by = error
             self._pause(error)
         elif verdict.then is Then.PERSON:

@@ -181,7 +181,7 @@ def register(
     """
     try:
         with journal.turn(proposal.entry.doc_path, component_key(proposal.entry), tell) as turn:
-            run = _Run(proposal, api, turn, stamp, schema, properties or {}, ask)
+            run = _ItemRun(proposal, api, turn, stamp, schema, properties or {}, ask)
             item, existing = run.item(check, copy)
     except SiloError as error:
         return Registration(proposal, error=error)
@@ -191,7 +191,7 @@ def register(
 
 
 @dataclass(frozen=True)
-class _Run:
+class _ItemRun:
     """The steps of one component's registration."""
 
     proposal: Proposal

@@ -160,7 +160,7 @@ def carry_out(
     from silo.api.policy import ends_run
 
     gone: SiloError | None = None
-    run = _Run(api, journal, write, schema, check, ask, control)
+    run = _OrderRun(api, journal, write, schema, check, ask, control)
     learnt = []
     for number, order in enumerate(orders):
         control.check()
@@ -212,7 +212,7 @@ def take_back(
 
 
 @dataclass(frozen=True)
-class _Run:
+class _OrderRun:
     api: RegistrationApi
     journal: Journal
     write: Write

@@ -175,7 +175,16 @@ def _sync(job: HeadlessJob) -> int:
         client = _client()
     except ImportError as error:
         return _without_server(job, error)
-    from silo.batch import Json, Markdown, ReportFile, Summary, SyncOptions, TopResult, stopped_by, sync_top
+    from silo.batch import (
+        Json,
+        Markdown,
+        ReportFile,
+        RunSummary,
+        SyncOptions,
+        TopResult,
+        stopped_by,
+        sync_top,
+    )
     from silo.workbench.freecad import host
 
     tops = documents_in(job.tops)
@@ -185,7 +194,7 @@ def _sync(job: HeadlessJob) -> int:
         dry_run=job.dry_run,
         skip_parts=any(os.path.isdir(top) for top in job.tops),
     )
-    summary = Summary()
+    summary = RunSummary()
     reports = [ReportFile(job.json, Json())] if job.json is not None else []
     reports += [ReportFile(job.report, Markdown())] if job.report is not None else []
 

@@ -417,7 +417,7 @@ class DecisionBody(Body):
 
     child_part_number: Short = ""
     line_id: Short | None = None
-    action: service.Action
+    action: service.ReviewAction
     reason: Text | None = None
 
 

@@ -67,7 +67,7 @@ from silo_server.services.bom.merge import (
 from silo_server.services.bom.tree import where_used
 from silo_server.services.items import preview_number
 from silo_server.services.releases import draft_of
-from silo_server.services.revisions import Origin, revision_to_wire
+from silo_server.services.revisions import RevisionOrigin, revision_to_wire
 from silo_server.values import Document, Item, Revision, to_wire
 
 router = APIRouter(prefix="/api", tags=["items"])
@@ -402,7 +402,7 @@ async def receive(call: Call, find: Find) -> Response:
             raise RejectedError(f"comment, properties: {problem}")
         sha256 = sha256_or_none("sha256", form.get("sha256"))
         properties = _properties(raw if isinstance(raw, str) else None)
-        origin = Origin(
+        origin = RevisionOrigin(
             _base_revision(form.get("base_revision")),
             _path(form.get("path")),
             _list("links", _LINKS, form.get("links")),
@@ -488,12 +488,12 @@ def store_file(
     properties: Mapping[str, Any] | None = None,
     key: str | None = None,
     sha256: str = "",
-    origin: Origin | None = None,
+    origin: RevisionOrigin | None = None,
 ) -> Response:
     """Return an uploaded file as a new revision, for the API and the pages; ``answer`` is made before the
     commit.
     """
-    origin = origin or Origin()
+    origin = origin or RevisionOrigin()
     with call.read() as tx:
         find(tx, False)  # before anything is written to the disk
     stored = call.server.files.keep(file.filename or "file", file.file)

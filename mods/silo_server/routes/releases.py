@@ -85,7 +85,7 @@ def submit(call: Editor, part_number: str, body: SubmitBody) -> Response:
         return json_answer(release_to_wire(tx, release, whole=True), 201)
 
 
-def frozen_now(call: Call, part_number: str) -> releases.Frozen:
+def frozen_now(call: Call, part_number: str) -> releases.FrozenProduct:
     """Return the product as one snapshot of the database has it."""
     with call.server.large_reads.enter(), call.read() as tx:
         return frozen.freeze(tx, get_item(tx, part_number))

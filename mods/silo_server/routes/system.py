@@ -20,7 +20,14 @@ from silo.bom.errors import RejectedError
 from silo_server import events
 from silo_server.db.engine import mode_of
 from silo_server.events import EventStream
-from silo_server.housekeeping import CONTENT_TYPE, HEALTH_SECONDS, READY_SECONDS, State, last_run, standing
+from silo_server.housekeeping import (
+    CONTENT_TYPE,
+    HEALTH_SECONDS,
+    READY_SECONDS,
+    ServerStanding,
+    last_run,
+    standing,
+)
 from silo_server.routes import context
 from silo_server.routes.context import (
     READ_ERRORS,
@@ -79,7 +86,7 @@ async def looked_at() -> Response:
 @router.get("/ready", responses={503: {"description": "The database or the file store is not there"}})
 async def ready(server: ServerDep) -> Response:
     """Say if the server can do its work: 200, or 503 while the database or the file store is away or full."""
-    state = await server.probe.look(READY_SECONDS) or State(
+    state = await server.probe.look(READY_SECONDS) or ServerStanding(
         "degraded", "unreachable", server.probe.last.files
     )
     body = {
@@ -171,13 +178,13 @@ def set_mode(call: Admin, body: ModeBody) -> dict[str, Any]:
         return {"mode": events.set_mode(tx, body.mode)}
 
 
-def _event_id(text: str | None) -> events.Mark | None:
+def _event_id(text: str | None) -> events.EventMark | None:
     if text is None or text == "":
         return None
     match = EVENT_ID.fullmatch(text)
     if match is None:
         raise RejectedError(f"Last-Event-ID: wanted the id of an event (a number), got {text[:40]!r}")
-    return events.Mark(int(match["number"]), match["tag"] or "")
+    return events.EventMark(int(match["number"]), match["tag"] or "")
 
 
 auth_router = APIRouter(prefix="/api", tags=["auth"])

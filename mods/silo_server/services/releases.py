@@ -83,7 +83,7 @@ class Approval:
     comment: str
 
 
-class Frozen(NamedTuple):
+class FrozenProduct(NamedTuple):
     """A product as it was read at ``at``: its record, and those of all that is in it, by their hashes."""
 
     record: str
@@ -215,7 +215,13 @@ def blocks_of(tx: Tx, release: Release) -> list[str]:
 
 
 def submit(
-    tx: Tx, part_number: str, frozen: Frozen, comment: str, label: str = "", *, with_parts: bool = False
+    tx: Tx,
+    part_number: str,
+    frozen: FrozenProduct,
+    comment: str,
+    label: str = "",
+    *,
+    with_parts: bool = False,
 ) -> Release:
     """Put a frozen product up for review. Raises ConflictError if one is in review or the label is taken."""
     item = get_item(tx, part_number, lock=True)
@@ -316,7 +322,7 @@ def _release_parts(tx: Tx, release: Release, comment: str) -> None:
             continue
         row = tx.conn.execute(select(items.c.part_number).where(items.c.uuid == made["item"])).one()
         item = get_item(tx, row.part_number, include_archived=True, lock=True)
-        frozen = Frozen(record, {}, (), release.frozen_at)
+        frozen = FrozenProduct(record, {}, (), release.frozen_at)
         part = submit(tx, item.part_number, frozen, comment)
         _make_released(tx, item, part)
 

@@ -223,7 +223,7 @@ class StoredFile:
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
+class RevisionOrigin:
     """What the client says of a file: the revision that it was made from, its place, what it links to, and
     which items (UUID and object) are in it."""
 
@@ -245,7 +245,7 @@ def add_revision(
     comment: str = "",
     properties: Mapping[str, Any] | None = None,
     file: StoredFile | None = None,
-    origin: Origin = Origin(),
+    origin: RevisionOrigin = RevisionOrigin(),
     source: FactSource = "hand",
 ) -> Revision:
     """Append a revision of an item, or of a document without one. Without ``properties`` it carries those of

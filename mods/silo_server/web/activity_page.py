@@ -81,7 +81,7 @@ NAMES = tuple(EVENTS)
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ActivityEntry:
     """One event in words. ``counts`` are the marks of a merge: (mark, number, word)."""
 
     at: str
@@ -152,7 +152,7 @@ def _day(text: str) -> str:
     return ""
 
 
-def entry_of(event: LoggedEvent, item: Item | None = None) -> Entry:
+def entry_of(event: LoggedEvent, item: Item | None = None) -> ActivityEntry:
     """Return an event in words. ``item``: what it is about, as it is now."""
     data: dict[str, Any] = json.loads(event.data)
     number = item.part_number if item else str(data.get("item") or data.get("part_number") or "")
@@ -161,7 +161,7 @@ def entry_of(event: LoggedEvent, item: Item | None = None) -> Entry:
         path += EVENTS[event.name].below
     if event.name == "document.revised":
         number, path = str(data.get("file_name") or ""), f"/documents/{segment(str(data.get('document')))}"
-    return Entry(
+    return ActivityEntry(
         event.at,
         event.name,
         number,
@@ -242,7 +242,7 @@ def changes_page(
     looked.
     """
     problem, first, last, status = "", "", "", 200
-    happenings: Sequence[history.Happened] = ()
+    happenings: Sequence[history.PastChange] = ()
     models: list[list[int]] = [[], []]
     with call.server.large_reads.enter(), call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)

@@ -29,7 +29,7 @@ from silo_server.services import items as service
 from silo_server.services.bom.tree import where_used
 from silo_server.services.items import ItemChange, NewItem, get_item
 from silo_server.services.releases import draft_of
-from silo_server.services.revisions import Origin
+from silo_server.services.revisions import RevisionOrigin
 from silo_server.values import Document, Item, Revision
 from silo_server.web.accounts import Writer
 from silo_server.web.forms import Form, UnsentForm, back, compared, same_text, text, whole
@@ -172,7 +172,7 @@ def upload(call: Writer, part_number: str, form: Form) -> Response:
         return back(f"{path}#revisions", said)
 
     comment, key = text(form, "comment", LONGEST), text(form, "key", 128) or None
-    origin = Origin(whole(form, "base_revision"))
+    origin = RevisionOrigin(whole(form, "base_revision"))
     try:
         return store_file(call, numbered(part_number), file, comment, answer, key=key, origin=origin)
     except NewerRevisionError as error:

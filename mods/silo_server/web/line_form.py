@@ -24,7 +24,7 @@ from silo_server.schema import text_hints
 from silo_server.services.bom import history
 from silo_server.services.bom.history import Change, ChangedLine
 from silo_server.services.bom.lines import ChangeKind
-from silo_server.services.bom.review import Action, Decision, Review, told_quantities
+from silo_server.services.bom.review import Decision, Review, ReviewAction, told_quantities
 from silo_server.values import Item, Line, LineState
 from silo_server.web.forms import Edit, amount, compared, same_text, text, texts, whole
 from silo_server.web.render import N_, _, isolate, plural, quantity
@@ -49,10 +49,10 @@ TOGETHER = (("quantity", "unit"),)
 MINE, THEIRS = "mine", "theirs"
 KEPT = "kept on purpose, not in the CAD model"
 DONE = {
-    Action.REMOVE: N_("removed"),
-    Action.KEEP: N_("kept as intentional"),
-    Action.TAKE_CAD: N_("set to what CAD says"),
-    Action.KEEP_SILO: N_("left as Silo says"),
+    ReviewAction.REMOVE: N_("removed"),
+    ReviewAction.KEEP: N_("kept as intentional"),
+    ReviewAction.TAKE_CAD: N_("set to what CAD says"),
+    ReviewAction.KEEP_SILO: N_("left as Silo says"),
 }
 
 
@@ -165,13 +165,13 @@ def values_of(texts: Mapping[str, str]) -> dict[str, Any]:
     return values
 
 
-def decision_of(form: FormData) -> tuple[Action, str | None]:
+def decision_of(form: FormData) -> tuple[ReviewAction, str | None]:
     """Return what a form decides, and why; RejectedError if it has no button of ours."""
     try:
-        action = Action(text(form, "action"))
+        action = ReviewAction(text(form, "action"))
     except ValueError:
         raise RejectedError(_("action: wanted one of the buttons, got none; load the page again")) from None
-    return action, text(form, "reason") or (KEPT if action is Action.KEEP else None)
+    return action, text(form, "reason") or (KEPT if action is ReviewAction.KEEP else None)
 
 
 def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:

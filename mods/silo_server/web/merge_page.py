@@ -94,7 +94,7 @@ class PageState:
     readings: Sequence[str] = ()
 
 
-class Refused(Exception):
+class RefusedDecision(Exception):
     """A form that was not carried out: how the page shows it again."""
 
     def __init__(self, asked: PageState, status: int = 409) -> None:
@@ -143,7 +143,7 @@ def decide(call: Writer, part_number: str, form: Form) -> Response:
                 f"{names.get(line_id, _('A line'))}: {said}" for line_id in story for said in story[line_id]
             ] or gone
             left = [line_id for line_id in chosen if line_id not in error.line_ids]
-            raise Refused(replace(asked, problem=problem, story=refusals, chosen=left), 412) from None
+            raise RefusedDecision(replace(asked, problem=problem, story=refusals, chosen=left), 412) from None
         return _decided_text(decisions), change
 
     return _do(call, part_number, form, work, asked)
@@ -181,7 +181,7 @@ def add_line(call: Writer, part_number: str, form: Form) -> Response:
             # Fields that were left empty keep what the line has.
             typed = {**line_form.shown(line.state), **{k: v for k, v in sent.typed.items() if v}}
             problem = f"{_sentence(error)} {_('Its line is open here with your values.')}"
-            raise Refused(replace(asked, problem=problem, edit=line.id, typed=typed)) from None
+            raise RefusedDecision(replace(asked, problem=problem, edit=line.id, typed=typed)) from None
         return _("%(number)s added.", number=isolate(added.child_part_number)), added.change_id
 
     return _do(call, part_number, form, work, asked)
@@ -193,7 +193,7 @@ def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
 
     def change(tx: Tx, line: Line, sent: LineForm, asked: PageState, news: list[str]) -> tuple[str, int]:
         if clashes := line_form.unmade(sent):
-            raise Refused(
+            raise RefusedDecision(
                 replace(asked, problem=_("Choose yours or theirs, then save."), clashes=clashes), 400
             )
         edit = line_form.edit_of(sent, line.state)
@@ -203,7 +203,7 @@ def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
                 "Choose whose value stays.",
                 number=line.child_part_number,
             )
-            raise Refused(replace(asked, problem=problem, story=news, clashes=edit.clashes), 412)
+            raise RefusedDecision(replace(asked, problem=problem, story=news, clashes=edit.clashes), 412)
         why = sent.why or None
         edited = review.change_line(tx, part_number, LineId(line.id), line_form.values_of(edit.mine), why=why)
         also = _(" Meanwhile: %(told)s.", told="; ".join(news)) if edit.theirs and news else ""
@@ -228,7 +228,7 @@ def remove_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
                 "Nothing was removed: %(number)s was changed by somebody else meanwhile.",
                 number=line.child_part_number,
             )
-            raise Refused(replace(asked, problem=problem, story=news), 412) from None
+            raise RefusedDecision(replace(asked, problem=problem, story=news), 412) from None
         return _("%(number)s removed.", number=isolate(edited.child_part_number)), edited.change_id
 
     return _do_line(call, part_number, line_id, form, remove)
@@ -260,7 +260,9 @@ def _do_line(
                 "This line is no longer in the BOM. Your values are below, ready to be added as a new line."
             )
             typed = {**sent.typed, "child": text(form, "child")}
-            raise Refused(replace(asked, problem=problem, story=news, edit="", typed=typed), 404) from None
+            raise RefusedDecision(
+                replace(asked, problem=problem, story=news, edit="", typed=typed), 404
+            ) from None
         return act(tx, line, sent, asked, news)
 
     return _do(call, part_number, form, work, asked)
@@ -285,7 +287,7 @@ def _do(
     try:
         with call.write() as tx:
             notice, change_id = work(tx)
-    except Refused as refused:
+    except RefusedDecision as refused:
         shown = replace(refused.asked, view=view)
         return _show(call, part_number, shown, refused.status)
     except SiloError as error:

@@ -19,7 +19,7 @@ from silo_server.routes.releases import frozen_now
 from silo_server.services import releases
 from silo_server.services.access import get_user
 from silo_server.services.bom import tree
-from silo_server.services.bom.frozen import Product, frozen_product
+from silo_server.services.bom.frozen import ProductContent, frozen_product
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
 from silo_server.services.releases import Release
@@ -168,7 +168,7 @@ def release_page(
     )
 
 
-def _rows(product: Product, *, flat: bool) -> Any:
+def _rows(product: ProductContent, *, flat: bool) -> Any:
     """Return the rows of the table: the line, its depth, its total, and what one piece is worth."""
     if flat:
         for row in tree.flatten(product.graph):

@@ -20,7 +20,7 @@ from silo.bom.numbers import whole_number
 from silo_server.db.engine import Tx
 from silo_server.routes.context import Call
 from silo_server.services.bom import history, review
-from silo_server.services.bom.review import Action, Waiting, decide_all, lines_for, waiting
+from silo_server.services.bom.review import ReviewAction, Waiting, decide_all, lines_for, waiting
 from silo_server.services.scene import with_model
 from silo_server.services.search import fits
 from silo_server.values import Line
@@ -184,7 +184,7 @@ def _view_of(form: FormData) -> dict[str, str]:
     return dict(Address("/waiting", {name: text(form, name, 1024) for name in _VIEW}).but())
 
 
-def _gone(call: Call, action: Action, chosen: Sequence[str]) -> dict[str, Sequence[Line]]:
+def _gone(call: Call, action: ReviewAction, chosen: Sequence[str]) -> dict[str, Sequence[Line]]:
     """Return part number → the lines that ``action`` would remove; what has changed since is left out
     here.
     """

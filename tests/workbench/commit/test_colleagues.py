@@ -25,7 +25,7 @@ from silo.platform import stamp_of
 from silo.workbench.commit.flow import Choice, CommitAnswer, CommitFlow, Look, Theirs, line_words
 from silo.workbench.commit.opened import Opened
 from silo.workbench.commit.plan import CommitPlan, plan
-from silo.workbench.pane.activity import Action, Do, Line, PaneEntry, Tone, rows
+from silo.workbench.pane.activity import Action, Do, EntryLine, PaneEntry, Tone, rows
 from silo.workbench.session.session import Newer
 
 
@@ -249,7 +249,7 @@ def test_an_answer_reaches_older_boxes(office: Office, flow: CommitFlow) -> None
 
     def asking(key: str, identity: str, *files: str) -> PaneEntry:
         same = Action(Do.SAME, "Same part", identity, objects=files)
-        return PaneEntry(key, "x", 1.0, lines=(Line("2 files", Tone.WARNING, (same,)),))
+        return PaneEntry(key, "x", 1.0, lines=(EntryLine("2 files", Tone.WARNING, (same,)),))
 
     office.session.add(asking("asked", "ID", "/v/a", "/v/b"))
     office.session.add(asking("more", "ID", "/v/a", "/v/b", "/v/c"))

@@ -12,9 +12,9 @@ from silo.workbench.pane.activity import (
     MOST_LINES,
     Action,
     Activity,
-    Batch,
     Do,
-    Line,
+    EntryBatch,
+    EntryLine,
     PaneEntry,
     Tone,
     gathered,
@@ -69,7 +69,7 @@ def test_only_so_many_are_kept() -> None:
 
 def test_a_box_is_never_longer_than_can_be_read() -> None:
     """Ten thousand findings are some lines, the last of which counts the rest."""
-    lines = tuple(Line(f"finding {i}") for i in range(10_000))
+    lines = tuple(EntryLine(f"finding {i}") for i in range(10_000))
     made = PaneEntry("k", "t", 0.0, lines=lines)
     assert len(made.lines) == MOST_LINES
     assert made.lines[-1].text == f"… and {10_001 - MOST_LINES} more lines; the preview shows all"
@@ -77,7 +77,7 @@ def test_a_box_is_never_longer_than_can_be_read() -> None:
 
 def test_text_in_boxes_is_harmless() -> None:
     """Titles, names and lines pass through the same cleaning."""
-    made = PaneEntry("k", "\x1b[2J<b>", 0.0, who="a\nb", lines=(Line("x\u202ey"),))
+    made = PaneEntry("k", "\x1b[2J<b>", 0.0, who="a\nb", lines=(EntryLine("x\u202ey"),))
     assert (made.title, made.who, made.lines[0].text) == ("[2J<b>", "a b", "x y")
 
 
@@ -89,11 +89,11 @@ def test_a_box_as_plain_text() -> None:
         "BOM Updated: ASM-001",
         0.0,
         badges=(
-            Line("+1 added", Tone.GOOD),
-            Line("~1 qty changed", Tone.CHANGED),
-            Line("⚠1 unreferenced", Tone.WARNING),
+            EntryLine("+1 added", Tone.GOOD),
+            EntryLine("~1 qty changed", Tone.CHANGED),
+            EntryLine("⚠1 unreferenced", Tone.WARNING),
         ),
-        lines=(Line("2 components have no Silo part number", Tone.WARNING, (register,)),),
+        lines=(EntryLine("2 components have no Silo part number", Tone.WARNING, (register,)),),
         actions=(Action(Do.VIEW, "View in Silo →"),),
     )
     assert entry_text(box) == (
@@ -123,7 +123,9 @@ def test_always_sorted_unique_and_never_poorer(told: list[PaneEntry]) -> None:
         assert one.rank == max(other.rank for other in told if other.key == one.key)
 
 
-def news(number: int, when: float, part_of: Batch | None = Batch.CREATED, who: str = "ann") -> PaneEntry:
+def news(
+    number: int, when: float, part_of: EntryBatch | None = EntryBatch.CREATED, who: str = "ann"
+) -> PaneEntry:
     return PaneEntry(f"e{number}", f"New item: M01-{number:04}", when, who=who, part_of=part_of)
 
 
@@ -148,8 +150,8 @@ def test_two_are_no_batch_nor_is_what_lies_apart() -> None:
         assert gathered(listed) == listed
 
 
-@given(st.lists(st.tuples(st.integers(0, 500), st.sampled_from([None, *Batch]))))
-def test_gathering_loses_nothing(told: list[tuple[int, Batch | None]]) -> None:
+@given(st.lists(st.tuples(st.integers(0, 500), st.sampled_from([None, *EntryBatch]))))
+def test_gathering_loses_nothing(told: list[tuple[int, EntryBatch | None]]) -> None:
     """Newest first, and every box is shown or counted."""
     entries = [news(n, when, part_of) for n, (when, part_of) in enumerate(told)]
     shown = gathered(activity_of(entries).entries)
@@ -159,12 +161,12 @@ def test_gathering_loses_nothing(told: list[tuple[int, Batch | None]]) -> None:
 
 
 def asking(key: str, when: float, *files: str, document: str = "/v/Top.FCStd") -> PaneEntry:
-    question = Line(
+    question = EntryLine(
         "2 files carry the same Silo identity",
         Tone.WARNING,
         (Action(Do.SAME, "Same part", "ID", document, files), Action(Do.DECIDE, "New part…")),
     )
-    other = Line("a link is broken", Tone.ERROR, (Action(Do.SHOW, "Show"),))
+    other = EntryLine("a link is broken", Tone.ERROR, (Action(Do.SHOW, "Show"),))
     return PaneEntry(key, "x", when, lines=(question, other), document=document)
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from silo.workbench.pane.activity import Do, banner
 from silo.workbench.session.session import PaneState
-from silo.workbench.settings.server import Server
+from silo.workbench.settings.server import ServerChoice
 
-SERVER = Server("https://silo.example.com")
+SERVER = ServerChoice("https://silo.example.com")
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_what_is_out_of_date_is_not_offered_again(entry: Entry) -> None:
     """A retry would undo something newer."""
     (row,) = rows([replace(entry, state=State.HELD, superseded=True, reason="x")], HERE)
     assert [a.do for a in row.actions] == [Do.SAVE_COPY, Do.DISCARD]
-    assert "would undo that" in row.reason
+    assert "would undo it" in row.reason
 
 
 def test_a_held_commit_has_the_choices_of_the_dialog(entry: Entry) -> None:

@@ -12,7 +12,7 @@ from silo.bom.errors import ReadOnlyError, SiloError
 from silo.registering.items import Journal
 from silo.registering.orders import Order
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.pane.activity import Action, Do, Line, PaneEntry, Tone
+from silo.workbench.pane.activity import Action, Do, EntryLine, PaneEntry, Tone
 from silo.workbench.register.flow import RegisterFlow
 
 
@@ -46,7 +46,7 @@ def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Docu
     plate = next(part.FileName for part in top.parts if part.Label == "Plate")
     for key, file in (("asked", plate), ("other", "/v/b")):
         same = Action(Do.SAME, "Same part", "id", objects=(file, "/v/a"))
-        office.session.add(PaneEntry(key, "x", 1.0, lines=(Line("2 files", Tone.WARNING, (same,)),)))
+        office.session.add(PaneEntry(key, "x", 1.0, lines=(EntryLine("2 files", Tone.WARNING, (same,)),)))
     flow.start(top)
     office.settle()
     (window,) = office.desk.registers

@@ -14,7 +14,7 @@ from silo.api.config import same_server
 from silo.bom.errors import ConfigError
 from silo.workbench.settings import DEFAULTS, Preferences
 from silo.workbench.settings.server import (
-    Server,
+    ServerChoice,
     ServerPreferences,
     SettingSource,
     choose_server,
@@ -96,7 +96,7 @@ def test_the_certificate_settings_are_one_value() -> None:
 
 def test_nothing_set_up_is_no_error() -> None:
     """FreeCAD without a server is a normal thing."""
-    assert choose_server(ServerPreferences(), EMPTY, {}) == Server()
+    assert choose_server(ServerPreferences(), EMPTY, {}) == ServerChoice()
     assert not choose_server(ServerPreferences(), EMPTY, {}).configured
 
 
@@ -107,54 +107,56 @@ def test_nothing_set_up_is_no_error() -> None:
             ServerPreferences(HOME, "from-preference"),
             EMPTY,
             {},
-            Server(HOME, "from-preference", True, SettingSource.PREFERENCES, SettingSource.PREFERENCES),
+            ServerChoice(HOME, "from-preference", True, SettingSource.PREFERENCES, SettingSource.PREFERENCES),
             id="preferences alone",
         ),
         pytest.param(
             ServerPreferences(HOME, "from-preference"),
             Store({HOME: "from-keyring"}),
             {},
-            Server(HOME, "from-keyring", True, SettingSource.PREFERENCES, SettingSource.KEYRING),
+            ServerChoice(HOME, "from-keyring", True, SettingSource.PREFERENCES, SettingSource.KEYRING),
             id="keyring before preference",
         ),
         pytest.param(
             ServerPreferences(HOME, "from-preference"),
             Store({HOME: "from-keyring"}),
             {"SILO_API_TOKEN": "from-env"},
-            Server(HOME, "from-env", True, SettingSource.PREFERENCES, SettingSource.ENVIRONMENT),
+            ServerChoice(HOME, "from-env", True, SettingSource.PREFERENCES, SettingSource.ENVIRONMENT),
             id="environment before keyring",
         ),
         pytest.param(
             ServerPreferences(HOME, "from-preference"),
             Store({HOME: "home", OTHER: "other"}),
             {"SILO_API_URL": OTHER},
-            Server(OTHER, "other", True, SettingSource.ENVIRONMENT, SettingSource.KEYRING),
+            ServerChoice(OTHER, "other", True, SettingSource.ENVIRONMENT, SettingSource.KEYRING),
             id="the other server's own token",
         ),
         pytest.param(
             ServerPreferences(HOME, "from-preference"),
             EMPTY,
             {"SILO_API_URL": OTHER},
-            Server(OTHER, "", True, SettingSource.ENVIRONMENT, SettingSource.NONE),
+            ServerChoice(OTHER, "", True, SettingSource.ENVIRONMENT, SettingSource.NONE),
             id="a token is sent to no other server",
         ),
         pytest.param(
             ServerPreferences(HOME, "from-preference"),
             EMPTY,
             {"SILO_API_URL": HOME + "/"},
-            Server(HOME + "/", "from-preference", True, SettingSource.ENVIRONMENT, SettingSource.PREFERENCES),
+            ServerChoice(
+                HOME + "/", "from-preference", True, SettingSource.ENVIRONMENT, SettingSource.PREFERENCES
+            ),
             id="the same server, written otherwise",
         ),
         pytest.param(
             ServerPreferences(HOME, "t", verify=True),
             EMPTY,
             {"SILO_SSL_VERIFY": "false"},
-            Server(HOME, "t", False, SettingSource.PREFERENCES, SettingSource.PREFERENCES),
+            ServerChoice(HOME, "t", False, SettingSource.PREFERENCES, SettingSource.PREFERENCES),
             id="environment decides about certificates",
         ),
     ],
 )
-def test_who_wins(known: ServerPreferences, store: Store, env: dict[str, str], wanted: Server) -> None:
+def test_who_wins(known: ServerPreferences, store: Store, env: dict[str, str], wanted: ServerChoice) -> None:
     """Environment, then keyring, then preference; a token belongs to its server."""
     assert choose_server(known, store, env) == wanted
 
@@ -162,7 +164,7 @@ def test_who_wins(known: ServerPreferences, store: Store, env: dict[str, str], w
 def test_the_configuration_file_comes_last() -> None:
     """What `silo-mod` uses is found, unless the preferences name another server."""
     file = SimpleNamespace(url=HOME, token="from-file", verify="ca.pem")
-    assert choose_server(ServerPreferences(), EMPTY, {}, file) == Server(
+    assert choose_server(ServerPreferences(), EMPTY, {}, file) == ServerChoice(
         HOME, "from-file", "ca.pem", SettingSource.FILE, SettingSource.FILE
     )
     chosen = choose_server(ServerPreferences(OTHER), EMPTY, {}, file)
@@ -185,7 +187,7 @@ def test_the_variable_may_name_a_file_with_authorities(tmp_path: Path) -> None:
 
 def test_a_token_is_never_shown() -> None:
     """Not in a log, not in a test's message."""
-    assert "secret" not in repr(Server(HOME, "secret"))
+    assert "secret" not in repr(ServerChoice(HOME, "secret"))
 
 
 def test_no_address_is_like_no_other() -> None:

@@ -339,7 +339,7 @@ class _Package:
     def _root(self) -> str:
         names = self._archive.namelist()
         if _RELATIONS in names:
-            finder = _Relations()
+            finder = _Relationships()
             self._parse(_RELATIONS, finder.start)
             if finder.target.lstrip("/") in names:
                 return finder.target.lstrip("/")
@@ -460,7 +460,7 @@ class _Package:
         raise DocumentError(str(self._path), reason)
 
 
-class _Relations:
+class _Relationships:
     def __init__(self) -> None:
         self.target = ""
 

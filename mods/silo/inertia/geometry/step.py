@@ -300,7 +300,7 @@ def load(
     with scratch_folder("silo-step-") as folder:
         text = text or prepare(path, Path(folder), max_instances)
         document, reader = _transferred(text.source, path)
-    step = _Walk(path, prefix, document, reader, text.products).run()
+    step = _StepWalk(path, prefix, document, reader, text.products).run()
     step.kept = (document, reader)
     return step
 
@@ -331,7 +331,7 @@ class _Used:
     made_up: bool
 
 
-class _Walk:
+class _StepWalk:
     """From the kernel's document to nodes; lives for one file."""
 
     def __init__(self, path: Path, prefix: str, document: Any, reader: Any, products: Products) -> None:

@@ -56,7 +56,7 @@ from silo.workbench.commit.plan import (
     refusal,
     take_each,
 )
-from silo.workbench.pane.activity import Action, Do, Line, PaneEntry, Tone, not_in_silo_key
+from silo.workbench.pane.activity import Action, Do, EntryLine, PaneEntry, Tone, not_in_silo_key
 from silo.workbench.session.session import Session
 from silo.workbench.settings import ALLOW, Preferences
 from silo.workbench.words import counted, filled, plain, quantity, translate
@@ -249,7 +249,7 @@ def look(
     for check in files:
         if (item := items.get(check.identity)) is None:
             continue
-        file = _File(check.path, item.part_number, check.identity, check.base.settle(outbox))
+        file = _CommitFile(check.path, item.part_number, check.identity, check.base.settle(outbox))
         if (stands := file.standing(client, outbox)) is not None:
             lines: tuple[ThreeLines, ...] = ()
             with suppress(SiloError):  # the question stands without its details
@@ -298,13 +298,13 @@ def look_held(
         mine = top_of(from_plain(json.loads(extraction)))
     except ValueError:
         return None  # sending it says so
-    file = _File(entry.path, entry.part_number, entry.identity, entry.origin)
+    file = _CommitFile(entry.path, entry.part_number, entry.identity, entry.origin)
     stands = file.standing(client, outbox)
     return None if stands is None else file.theirs(stands, file.lines(client, stands, mine, cancelled))
 
 
 @dataclass(frozen=True)
-class _File:
+class _CommitFile:
     path: str
     part_number: str
     identity: str
@@ -799,7 +799,7 @@ class CommitFlow:
                 title=translate("Silo", "Not committed: {name}", name=label),
                 when=time.time(),
                 tone=Tone.ERROR,
-                lines=(Line(text, Tone.ERROR),),
+                lines=(EntryLine(text, Tone.ERROR),),
                 rank=1,
                 icon="silo-commit",
             )
@@ -850,7 +850,7 @@ def not_in_silo(taken: Snapshot) -> PaneEntry:
         title=translate("Silo", "Saved, but not in Silo: {name}", name=name),
         when=time.time(),
         tone=tone,
-        lines=(Line(text, tone),),
+        lines=(EntryLine(text, tone),),
         actions=() if taken.problem else (register,),
         rank=1,
         icon="silo-commit",

@@ -304,7 +304,7 @@ _USERS = ("LinkedObject", "Base", "Source", "Links", "Objects", "Tool", "Shapes"
 
 
 @dataclass(frozen=True)
-class Difference:
+class SolidDifference:
     """An object that shows other solids than the BOM explains."""
 
     object: str
@@ -337,7 +337,7 @@ class SolidCount:
     beside: int = 0
     sources: int = 0
     left_out: int = 0
-    differences: list[Difference] = field(default_factory=list)
+    differences: list[SolidDifference] = field(default_factory=list)
 
     @property
     def agrees(self) -> bool:
@@ -351,7 +351,7 @@ class SolidCount:
 
     def differ(self, obj: Any, shown: int, explained: int, why: str) -> None:
         """Add a difference."""
-        self.differences.append(Difference(obj.Name, obj.Label, shown, explained, why))
+        self.differences.append(SolidDifference(obj.Name, obj.Label, shown, explained, why))
 
     def sentence(self) -> str:
         """Return the sentence for people."""
@@ -477,7 +477,9 @@ class _Witness:
         for (path, name), number in left.items():
             if number:
                 total = pieces[path, name]
-                account.differences.append(Difference(name, name, total, total - number, "line of the BOM"))
+                account.differences.append(
+                    SolidDifference(name, name, total, total - number, "line of the BOM")
+                )
 
 
 def _members(

@@ -39,7 +39,7 @@ from silo.workbench.commit.plan import CommitPlan, Snapshot, leaves_first
 from silo.workbench.freecad import host, live, saving
 from silo.workbench.freecad.facts import SHOWN_NUMBER, SHOWN_STATE
 from silo.workbench.gui import qt
-from silo.workbench.pane.activity import Line, PaneEntry, Tone
+from silo.workbench.pane.activity import EntryLine, PaneEntry, Tone
 from silo.workbench.words import filled, plain, translate
 
 if TYPE_CHECKING:
@@ -336,7 +336,7 @@ class LossGuard:
                 ),
                 when=time.time(),
                 tone=Tone.WARNING,
-                lines=tuple(Line(text, Tone.WARNING) for text in lines),
+                lines=tuple(EntryLine(text, Tone.WARNING) for text in lines),
                 rank=1,
                 icon="silo-commit",
             )

@@ -67,7 +67,7 @@ class MassFlow:
         from silo.workbench.mass import shapes
         from silo.workbench.mass.rows import shown
 
-        with Waiting(plain(doc.Label, 60)) as waiting:
+        with WaitingWindow(plain(doc.Label, 60)) as waiting:
             assembly = shapes.read_live(doc, ReadOptions(hardware=self._hardware), waiting.report)
         rule = Options(step_density=True, unknown_is_zero=True, own_bom=True)
         # Without anything placed there is nothing for a pattern to match, which would be reported as a fault.
@@ -77,7 +77,7 @@ class MassFlow:
         return shown(calculate(assembly, None, task))
 
 
-class Waiting:
+class WaitingWindow:
     """A progress window with Cancel; :meth:`report` raises CancelledError once it was pressed."""
 
     def __init__(self, name: str) -> None:
@@ -91,7 +91,7 @@ class Waiting:
         self._window.setRange(0, 0)
         self._window.setLabelText(translate("Silo", "Reading the assembly…"))
 
-    def __enter__(self) -> Waiting:
+    def __enter__(self) -> WaitingWindow:
         self._window.setValue(0)
         return self
 

@@ -45,7 +45,7 @@ class Tone(StrEnum):
     ERROR = "error"
 
 
-class Batch(StrEnum):
+class EntryBatch(StrEnum):
     """What comes by the dozen."""
 
     COMMITTED = "committed"
@@ -93,7 +93,7 @@ class Action:
 
 
 @dataclass(frozen=True)
-class Line:
+class EntryLine:
     """One line of a box."""
 
     text: str
@@ -130,13 +130,13 @@ class PaneEntry:
     when: float
     tone: Tone = Tone.PLAIN
     who: str = ""
-    badges: tuple[Line, ...] = ()
-    lines: tuple[Line, ...] = ()
+    badges: tuple[EntryLine, ...] = ()
+    lines: tuple[EntryLine, ...] = ()
     actions: tuple[Action, ...] = ()
     rank: int = 0
     also: tuple[str, ...] = ()
     icon: str = ""
-    part_of: Batch | None = None
+    part_of: EntryBatch | None = None
     document: str = ""
 
     def __post_init__(self) -> None:
@@ -197,9 +197,9 @@ def gathered(entries: Iterable[PaneEntry]) -> tuple[PaneEntry, ...]:
 def _together(group: list[PaneEntry]) -> PaneEntry:
     newest = group[0]
     words = {
-        Batch.COMMITTED: translate("Silo", "{n} items committed"),
-        Batch.CREATED: translate("Silo", "{n} new items"),
-        Batch.REVISED: translate("Silo", "{n} new revisions"),
+        EntryBatch.COMMITTED: translate("Silo", "{n} items committed"),
+        EntryBatch.CREATED: translate("Silo", "{n} new items"),
+        EntryBatch.REVISED: translate("Silo", "{n} new revisions"),
     }
     names = [entry.title.partition(": ")[2] or entry.title for entry in reversed(group)]
     shown = ", ".join(names[:MOST_NAMES]) + (", …" if len(names) > MOST_NAMES else "")
@@ -211,14 +211,14 @@ def _together(group: list[PaneEntry]) -> PaneEntry:
         when=newest.when,
         who=newest.who,
         tone=newest.tone,
-        lines=(Line(shown, Tone.QUIET), *(Line(text) for text in comments if len(comments) == 1)),
+        lines=(EntryLine(shown, Tone.QUIET), *(EntryLine(text) for text in comments if len(comments) == 1)),
         icon=newest.icon,
     )
 
 
 def shortened(
-    lines: tuple[Line, ...], most: int = MOST_LINES, actions: tuple[Action, ...] = ()
-) -> tuple[Line, ...]:
+    lines: tuple[EntryLine, ...], most: int = MOST_LINES, actions: tuple[Action, ...] = ()
+) -> tuple[EntryLine, ...]:
     """Return the first lines, and how many more there are; ``actions`` is the way to see those."""
     if len(lines) <= most:
         return lines
@@ -228,7 +228,7 @@ def shortened(
         translate("Silo", "… and {n} more line"),
         translate("Silo", "… and {n} more lines; the preview shows all"),
     )
-    return (*lines[: most - 1], Line(more, Tone.QUIET, actions))
+    return (*lines[: most - 1], EntryLine(more, Tone.QUIET, actions))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from silo.workbench.pane.activity import (
     Action,
     Banner,
     Do,
-    Line,
+    EntryLine,
     PaneEntry,
     Tone,
     WaitingRow,
@@ -202,7 +202,7 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
         layout.addWidget(when, 0, QtCore.Qt.AlignmentFlag.AlignTop)
         return layout
 
-    def _line(self, layout: Any, line: Line) -> None:
+    def _line(self, layout: Any, line: EntryLine) -> None:
         sign = {Tone.WARNING: "⚠ ", Tone.ERROR: "✗ "}.get(line.tone, "")
         layout.addWidget(widgets.label(sign + line.text, line.tone))
         if line.actions:

@@ -30,7 +30,16 @@ from silo.bom_sync import (
     unregistered_text,
 )
 from silo.outbox.send import Sent
-from silo.workbench.pane.activity import Action, Batch, Do, Line, PaneEntry, Tone, not_in_silo_key, shortened
+from silo.workbench.pane.activity import (
+    Action,
+    Do,
+    EntryBatch,
+    EntryLine,
+    PaneEntry,
+    Tone,
+    not_in_silo_key,
+    shortened,
+)
 from silo.workbench.session.session import Newer
 from silo.workbench.words import counted, filled, plain, quantity, translate
 
@@ -89,14 +98,14 @@ def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> Pan
     )
     when = time.time() if now is None else now
     return PaneEntry(
-        "team-freecad", shown, when, Tone.WARNING, lines=(Line(text, Tone.WARNING),), icon="silo-commit"
+        "team-freecad", shown, when, Tone.WARNING, lines=(EntryLine(text, Tone.WARNING),), icon="silo-commit"
     )
 
 
-def _batch_of(sent: Sent, tone: Tone) -> Batch | None:
+def _batch_of(sent: Sent, tone: Tone) -> EntryBatch | None:
     """Return a commit without anything that a person should see is one of many."""
     quiet = tone not in (Tone.WARNING, Tone.ERROR)
-    return Batch.COMMITTED if quiet and sent.status not in (Status.MERGED, Status.BLOCKED) else None
+    return EntryBatch.COMMITTED if quiet and sent.status not in (Status.MERGED, Status.BLOCKED) else None
 
 
 _JUST_NOW_S = 120.0
@@ -126,20 +135,20 @@ def _name(sent: Sent) -> str:
     return sent.entry.label
 
 
-def _badges(sent: Sent) -> tuple[Line, ...]:
+def _badges(sent: Sent) -> tuple[EntryLine, ...]:
     if sent.result is not None:
         return badges(sent.result.diff, sent.result.warnings)
     if sent.status is Status.UNCHANGED:
-        return (Line(translate("Silo", "BOM unchanged"), Tone.QUIET),)
+        return (EntryLine(translate("Silo", "BOM unchanged"), Tone.QUIET),)
     return ()
 
 
-def badges(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> tuple[Line, ...]:
+def badges(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> tuple[EntryLine, ...]:
     """Return the counts of a merge, as the spec's box has them; what is zero is left out."""
     texts = count_texts(diff, warnings, translate)
     if not texts:
-        return (Line(no_changes(translate), Tone.QUIET),)
-    return tuple(Line(text, _TONES[kind]) for kind, text in texts.items())
+        return (EntryLine(no_changes(translate), Tone.QUIET),)
+    return tuple(EntryLine(text, _TONES[kind]) for kind, text in texts.items())
 
 
 _TONES = {
@@ -150,23 +159,23 @@ _TONES = {
 }
 
 
-def _revision_lines(sent: Sent) -> tuple[Line, ...]:
+def _revision_lines(sent: Sent) -> tuple[EntryLine, ...]:
     if sent.revision is not None:
         text = translate("Silo", "Revision {n} uploaded", n=sent.revision)
         comment = plain(sent.entry.comment, 120)
-        return (Line(f"{text}: {comment}" if comment else text, Tone.PLAIN),)
+        return (EntryLine(f"{text}: {comment}" if comment else text, Tone.PLAIN),)
     if sent.entry.has_file:
-        return (Line(translate("Silo", "The file is in Silo already"), Tone.QUIET),)
+        return (EntryLine(translate("Silo", "The file is in Silo already"), Tone.QUIET),)
     return ()
 
 
-def _status_lines(sent: Sent) -> tuple[Line, ...]:
+def _status_lines(sent: Sent) -> tuple[EntryLine, ...]:
     lines = []
     if sent.entry.remark:
-        lines.append(Line(sent.entry.remark, Tone.WARNING))
+        lines.append(EntryLine(sent.entry.remark, Tone.WARNING))
     if draft := draft_text(sent.result or sent.uploaded, translate):
-        lines.append(Line(draft, Tone.PLAIN))
-    lines += [Line(plain(message, 300), Tone.WARNING) for message in unusual(sent.result)]
+        lines.append(EntryLine(draft, Tone.PLAIN))
+    lines += [EntryLine(plain(message, 300), Tone.WARNING) for message in unusual(sent.result)]
     removed = len(sent.result.diff.removed) if sent.result is not None else 0
     if sent.status is Status.UNCHANGED and sent.plan is not None:
         removed = len(sent.plan.diff.removed)
@@ -177,17 +186,17 @@ def _status_lines(sent: Sent) -> tuple[Line, ...]:
         many = translate(
             "Silo", "{n} items in the Silo BOM are not referenced by components in this assembly."
         )
-        lines.append(Line(counted(removed, sentence, many), Tone.WARNING))
+        lines.append(EntryLine(counted(removed, sentence, many), Tone.WARNING))
     missing = sum(entry.missing for entry in sent.resolved.entries) if sent.resolved is not None else 0
     if missing:
         sentence = translate("Silo", "Incomplete: {n} component is missing; its known line stays as it is.")
         many = translate(
             "Silo", "Incomplete: {n} components are missing; their known lines stay as they are."
         )
-        lines.append(Line(counted(missing, sentence, many), Tone.WARNING))
+        lines.append(EntryLine(counted(missing, sentence, many), Tone.WARNING))
     if sent.status is Status.BLOCKED:
         text = translate("Silo", "The file is in Silo. The BOM waits until these are mended:")
-        lines.append(Line(text, Tone.ERROR, _blocked_actions(sent.entry.path, missing)))
+        lines.append(EntryLine(text, Tone.ERROR, _blocked_actions(sent.entry.path, missing)))
     return tuple(lines)
 
 
@@ -202,7 +211,7 @@ def _blocked_actions(path: str, missing: int) -> tuple[Action, ...]:
     )
 
 
-def _resolved_lines(sent: Sent) -> tuple[Line, ...]:
+def _resolved_lines(sent: Sent) -> tuple[EntryLine, ...]:
     resolved = sent.resolved
     if resolved is None:
         return ()
@@ -215,7 +224,7 @@ def _resolved_lines(sent: Sent) -> tuple[Line, ...]:
     )
 
 
-def _product_lines(sent: Sent) -> tuple[Line, ...]:
+def _product_lines(sent: Sent) -> tuple[EntryLine, ...]:
     """Return what is open in the sub-assemblies, and what the product weighs and costs, as the server keeps
     it.
     """
@@ -225,9 +234,11 @@ def _product_lines(sent: Sent) -> tuple[Line, ...]:
     value_lines, values = summary_texts(sent.summary, translate)
     below = translate("Silo", "Open in {bom}")
     lines = tuple(
-        Line(below.replace("{bom}", line), Tone.WARNING) for line in value_lines if not line.startswith(own)
+        EntryLine(below.replace("{bom}", line), Tone.WARNING)
+        for line in value_lines
+        if not line.startswith(own)
     )
-    return (*shortened(lines, MOST_OPEN), *((Line(" · ".join(values), Tone.QUIET),) if values else ()))
+    return (*shortened(lines, MOST_OPEN), *((EntryLine(" · ".join(values), Tone.QUIET),) if values else ()))
 
 
 # However many of a kind there are, the box has room for the other kinds and their buttons.
@@ -237,13 +248,13 @@ MOST_FINDINGS, MOST_CONFLICTS, MOST_OPEN = 6, 4, 4
 _NOT_HERE = (FindingCode.UNREGISTERED, FindingCode.CONSOLIDATION)
 
 
-def _finding_lines(resolved: Resolved, base: str) -> list[Line]:
+def _finding_lines(resolved: Resolved, base: str) -> list[EntryLine]:
     lines = []
     order = {Severity.ERROR: 0, Severity.WARNING: 1}
     findings = [f for f in resolved.findings if f.severity in order and f.code not in _NOT_HERE]
     for finding in sorted(findings, key=lambda f: order[f.severity]):
         tone = Tone.ERROR if finding.severity is Severity.ERROR else Tone.WARNING
-        lines.append(Line(shorten(finding.message, base), tone, finding_actions(finding, resolved)))
+        lines.append(EntryLine(shorten(finding.message, base), tone, finding_actions(finding, resolved)))
     return lines
 
 
@@ -267,7 +278,7 @@ def _identity_at(finding: Finding, resolved: Resolved) -> str:
     return next((e.silo_uuid for e in entries if e.key in places and e.silo_uuid), "")
 
 
-def _conflict_lines(sent: Sent, resolved: Resolved) -> list[Line]:
+def _conflict_lines(sent: Sent, resolved: Resolved) -> list[EntryLine]:
     if sent.plan is None:
         return []
     text = translate("Silo", "{number}: the assembly has {cad}, a manual line in Silo says {silo}")
@@ -280,7 +291,7 @@ def _conflict_lines(sent: Sent, resolved: Resolved) -> list[Line]:
             cad=quantity(change.local_quantity),
             silo=change.on_server(quantity(change.remote_quantity)),
         )
-        lines.append(Line(conflict_text, Tone.WARNING, _show(entries.get(change.part_number), resolved)))
+        lines.append(EntryLine(conflict_text, Tone.WARNING, _show(entries.get(change.part_number), resolved)))
     return lines
 
 
@@ -291,7 +302,7 @@ def _show(entry: BomEntry | None, resolved: Resolved) -> tuple[Action, ...]:
     return (Action(Do.SHOW, text, document=resolved.assembly.doc_path, objects=entry.instances),)
 
 
-def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
+def unregistered_lines(resolved: Resolved) -> tuple[EntryLine, ...]:
     """Return ``⚠ 2 components have no Silo part number [Register Parts…]``, and which they are."""
     count = len(resolved.unresolved)
     if not count:
@@ -300,8 +311,8 @@ def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
     names = ", ".join(plain(display_name(entry), 40) for entry in resolved.unresolved[:5])
     more = ", …" if count > 5 else ""
     return (
-        Line(unregistered_text(count, translate), Tone.WARNING, (register,)),
-        Line(f"{names}{more}", Tone.QUIET),
+        EntryLine(unregistered_text(count, translate), Tone.WARNING, (register,)),
+        EntryLine(f"{names}{more}", Tone.QUIET),
     )
 
 
@@ -325,10 +336,10 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> PaneEn
         title=title,
         when=when,
         who=_text(data, "user", "created_by"),
-        lines=tuple(Line(text) for text in (_text(data, "comment", "description", "name"),) if text),
+        lines=tuple(EntryLine(text) for text in (_text(data, "comment", "description", "name"),) if text),
         actions=_view(f"/items/{number}", page),
         icon="silo-commit" if event.type == "revision.created" else "silo-register",
-        part_of={"revision.created": Batch.REVISED, "item.created": Batch.CREATED}.get(event.type),
+        part_of={"revision.created": EntryBatch.REVISED, "item.created": EntryBatch.CREATED}.get(event.type),
     )
 
 
@@ -353,7 +364,7 @@ def of_gap(when: float) -> PaneEntry:
         key="gap",
         title=translate("Silo", "Some activity may be missing"),
         when=when,
-        lines=(Line(text, Tone.QUIET),),
+        lines=(EntryLine(text, Tone.QUIET),),
         icon="silo-activity",
     )
 

@@ -27,7 +27,7 @@ from silo.platform import cache_folder, one_path
 from silo.workbench.commit.flow import Choice, CommitFlow, Desk, Theirs, theirs_of
 from silo.workbench.commit.opened import Base
 from silo.workbench.commit.plan import MOST_S
-from silo.workbench.pane.activity import Line, PaneEntry, Tone
+from silo.workbench.pane.activity import EntryLine, PaneEntry, Tone
 from silo.workbench.session.session import Session
 from silo.workbench.words import filled, plain, translate
 
@@ -281,7 +281,7 @@ class RevisionFlow:
             title=title,
             when=time.time(),
             tone=tone,
-            lines=(Line(text, tone),) if text else (),
+            lines=(EntryLine(text, tone),) if text else (),
             rank=1,
             icon="silo-open",
         )

@@ -22,7 +22,7 @@ from silo.workbench.pane import entries
 from silo.workbench.pane.activity import PaneEntry
 from silo.workbench.session import Control, collection_off
 from silo.workbench.session.session import Newer
-from silo.workbench.settings.server import Server, ServerPreferences, TokenStore, choose_server
+from silo.workbench.settings.server import ServerChoice, ServerPreferences, TokenStore, choose_server
 from silo.workbench.words import translate
 
 
@@ -44,7 +44,7 @@ class Online:
         sent: Callable[[Sent], None],
         state: Callable[[str, str], None],
         newer: Callable[[str, Newer | None], None] = lambda _identity, _newer: None,
-        make_client: Callable[[Server], Any] | None = None,
+        make_client: Callable[[ServerChoice], Any] | None = None,
     ) -> None:
         self._make_client = make_client or _client
         self._outbox = outbox
@@ -52,7 +52,7 @@ class Online:
         self._last_ids = LastIds(outbox.path.with_name("last-events.json"))
         self._own: set[str] = set()  # merges of ours whose event was not heard yet
         self._client: SiloClient | None = None
-        self._server = Server()
+        self._server = ServerChoice()
         self._listener: EventListener | None = None
 
     @property
@@ -91,7 +91,7 @@ class Online:
             force=force,
         )
 
-    def connect(self, preferences: ServerPreferences, store: TokenStore, *, live: bool) -> Server:
+    def connect(self, preferences: ServerPreferences, store: TokenStore, *, live: bool) -> ServerChoice:
         """Use the server that the settings name; begin to listen to it where ``live``."""
         self._use(choose_server(preferences, store, file_server=file_server()))
         if self.address:
@@ -122,7 +122,7 @@ class Online:
         if self._client is not None:
             self._client.close()
 
-    def _use(self, server: Server) -> None:
+    def _use(self, server: ServerChoice) -> None:
         if server == self._server and self._client is not None:
             return
         self._stop_listening()
@@ -198,7 +198,7 @@ class _SharedPauses(Pauses):
             self._outbox.set_pause(self._url, pause)
 
 
-def _client(server: Server) -> SiloClient:
+def _client(server: ServerChoice) -> SiloClient:
     return SiloClient(server.url, server.token or None, verify=server.verify)
 
 

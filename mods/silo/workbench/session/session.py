@@ -22,7 +22,7 @@ from silo.outbox.entry import Entry as Waiting
 from silo.outbox.store import OutboxError, Store
 from silo.workbench.pane.activity import Action, Activity, PaneEntry
 from silo.workbench.session import Busy, Control, Deliver, Job, Worker, in_gui
-from silo.workbench.settings.server import Server, ServerPreferences, TokenStore
+from silo.workbench.settings.server import ServerChoice, ServerPreferences, TokenStore
 from silo.workbench.words import translate
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class PaneState:
         the same in words, for the documents that are open.
     """
 
-    server: Server = field(default_factory=Server)
+    server: ServerChoice = field(default_factory=ServerChoice)
     connection: str = "stopped"
     reason: str = ""
     busy: Busy | None = None
@@ -177,7 +177,7 @@ class Session:
         *,
         listener: Listener | None = None,
         folder: Path | None = None,
-        make_client: Callable[[Server], Any] | None = None,
+        make_client: Callable[[ServerChoice], Any] | None = None,
         drawing: Callable[[], Sequence[str]] | None = None,
     ) -> None:
         self._make_client, self._drawing = make_client, drawing
@@ -215,7 +215,7 @@ class Session:
         self._known = preferences
         self.begin(live=live)
 
-    def _connect(self, _control: Control) -> tuple[Server, _Looked]:
+    def _connect(self, _control: Control) -> tuple[ServerChoice, _Looked]:
         server = self._need_online().connect(self._known, self._store, live=self._live)
         return server, self._look()
 
@@ -237,7 +237,7 @@ class Session:
             )
         return self._online
 
-    def _connected(self, result: tuple[Server, _Looked]) -> None:
+    def _connected(self, result: tuple[ServerChoice, _Looked]) -> None:
         server, looked = result
         for entry in looked[0]:
             self._colleagues.sending(entry.identity)

@@ -25,7 +25,7 @@ from silo.workbench.session.session import Session
 from silo.workbench.settings import ALLOW, HOLD, Preferences
 from silo.workbench.settings.server import (
     Keyring,
-    Server,
+    ServerChoice,
     ServerPreferences,
     begin_login,
     in_use,
@@ -190,7 +190,7 @@ class PreferencePage:
             failed=lambda error: finished(lambda: self._tell(str(error), Tone.ERROR)),
         )
 
-    def _looked(self, outcome: tuple[Server, str]) -> None:
+    def _looked(self, outcome: tuple[ServerChoice, str]) -> None:
         server, keyring = outcome
         self.in_use.setText(in_use(server, dict(os.environ)))
         if keyring and self.place.findData(KEYRING) < 0:

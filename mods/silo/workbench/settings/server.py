@@ -100,7 +100,7 @@ class SettingSource(StrEnum):
 
 
 @dataclass(frozen=True)
-class Server:
+class ServerChoice:
     """The server in use, and where its address and token come from. ``url`` is "" where none is set up."""
 
     url: str = ""
@@ -149,7 +149,7 @@ def choose_server(
     store: TokenStore,
     env: Mapping[str, str] = os.environ,
     file_server: Any = None,
-) -> Server:
+) -> ServerChoice:
     """Return the server to use.
 
     file_server
@@ -165,7 +165,7 @@ def choose_server(
         (SettingSource.FILE, file_url),
     )
     if url is None or url_from is None:
-        return Server()
+        return ServerChoice()
     verify = file_server.verify if url_from is SettingSource.FILE else _verify_from(env, preferences.verify)
     token, token_from = first_of(
         (SettingSource.ENVIRONMENT, env.get(TOKEN)),
@@ -173,7 +173,7 @@ def choose_server(
         (SettingSource.PREFERENCES, lambda: preferences.token if same_server(url, preferences.url) else None),
         (SettingSource.FILE, lambda: file_token if same_server(url, file_url) else None),
     )
-    return Server(url, token or "", verify, url_from, token_from or SettingSource.NONE)
+    return ServerChoice(url, token or "", verify, url_from, token_from or SettingSource.NONE)
 
 
 def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
@@ -183,7 +183,7 @@ def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
     return verify_of(VERIFY, text) if text else otherwise
 
 
-def look(preferences: ServerPreferences, keyring: Keyring) -> tuple[Server, str]:
+def look(preferences: ServerPreferences, keyring: Keyring) -> tuple[ServerChoice, str]:
     """Return the server in use, and the keyring's name ("" for none). Worker: a keyring may take its time."""
     from silo.workbench.session.online import file_server
 
@@ -249,7 +249,7 @@ def is_let_in(login: BrowserLogin, wanted: ServerPreferences, preferences: Serve
     return True
 
 
-def in_use(server: Server, env: Mapping[str, str]) -> str:
+def in_use(server: ServerChoice, env: Mapping[str, str]) -> str:
     """Return which server and token are in use, and where they come from."""
     if not server.configured:
         return translate("Silo", "No server is set up. To try it out, run: silo-mod serve")

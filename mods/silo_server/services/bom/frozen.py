@@ -23,7 +23,7 @@ from silo.bom.numbers import plain
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import document_items, document_links, documents, revisions
 from silo_server.services.bom.history import (
-    Happened,
+    PastChange,
     PastLine,
     compare,
     data_differs,
@@ -36,11 +36,11 @@ from silo_server.services.bom.lines import state_to_json, stored_state
 from silo_server.services.bom.summary import MassAndCost, OpenBom, Summary, summaries
 from silo_server.services.bom.tree import Graph, RolledItem, load_graph, order_of, with_supplier
 from silo_server.services.items import by_ids
-from silo_server.services.releases import Frozen, Release, find_release, item_of, read_records
+from silo_server.services.releases import FrozenProduct, Release, find_release, item_of, read_records
 from silo_server.values import Item, Line, bought, dumps
 
 
-class Product(NamedTuple):
+class ProductContent(NamedTuple):
     """A product to be shown or exported: its lines over all levels, its parts, what one of each is worth."""
 
     graph: Graph
@@ -50,7 +50,7 @@ class Product(NamedTuple):
     items: Mapping[int, Item] = {}
 
 
-def freeze(tx: Tx, item: Item) -> Frozen:
+def freeze(tx: Tx, item: Item) -> FrozenProduct:
     """Read a product as it is now. Raises CycleError, TooLargeError.
 
     ``tx`` must be a read: on PostgreSQL, a write sees what others commit between its statements.
@@ -89,7 +89,7 @@ def freeze(tx: Tx, item: Item) -> Frozen:
         for each_item in without_file
         if each_item.item_type in ("part", "assembly") and not each_item.is_bought
     ]
-    return Frozen(hashes[item.id], records, sorted(blocks), tx.stamp)
+    return FrozenProduct(hashes[item.id], records, sorted(blocks), tx.stamp)
 
 
 def _record(
@@ -165,7 +165,7 @@ def _files(tx: Tx, items: Mapping[int, Item]) -> dict[int, dict[str, dict[str, A
     return reached
 
 
-def frozen_product(tx: Tx, item: Item, release: Release) -> Product:
+def frozen_product(tx: Tx, item: Item, release: Release) -> ProductContent:
     """Return a revision as it was frozen, to be shown by whatever shows a product."""
     records = read_records(tx, release.record)
     ids = {record: number for number, record in enumerate(records, start=1)}
@@ -199,7 +199,7 @@ def frozen_product(tx: Tx, item: Item, release: Release) -> Product:
                     stored_state(dumps(written["state"])),
                 )
             )
-    return Product(Graph(frozen[ids[release.record]], lines), parts, worths, items=frozen)
+    return ProductContent(Graph(frozen[ids[release.record]], lines), parts, worths, items=frozen)
 
 
 def _part(made: Mapping[str, Any]) -> RolledItem:
@@ -220,7 +220,7 @@ class Changes(NamedTuple):
 
     first: str
     last: str
-    found: Sequence[Happened]
+    found: Sequence[PastChange]
 
 
 def changes_of(tx: Tx, item: Item, since: str, until: str = "") -> Changes:
@@ -255,7 +255,7 @@ _DATA = ("name", "description", "item_type", "category", *ItemTexts.model_fields
 Records = Mapping[str, Mapping[str, Any]]
 
 
-def _differences(root: str, before: Records, after: Records) -> Iterator[Happened]:
+def _differences(root: str, before: Records, after: Records) -> Iterator[PastChange]:
     """Yield what differs between two products, as records by the UUID of their item."""
     sides = (before, after)
     owned = [_own_files(side) for side in sides]
@@ -269,7 +269,7 @@ def _differences(root: str, before: Records, after: Records) -> Iterator[Happene
         if uuid == root:
             data = [of | _in_all(made) for of, made in zip(data, (old, new), strict=True)]
         if differences := data_differs(*data):
-            yield Happened("data", "", number, name, *differences, "", "")
+            yield PastChange("data", "", number, name, *differences, "", "")
         files = [{line["document"]: line for line in side.get(uuid, ())} for side in owned]
         for document in files[0].keys() | files[1].keys():
             pair = [side.get(document) for side in files]
@@ -277,7 +277,7 @@ def _differences(root: str, before: Records, after: Records) -> Iterator[Happene
                 then, now = (
                     f"{line['file_name']}, revision {line['revision']}" if line else "" for line in pair
                 )
-                yield Happened("file", "", number, name, then, now, "", "")
+                yield PastChange("file", "", number, name, then, now, "", "")
 
 
 def _in_all(made: Mapping[str, Any]) -> dict[str, float]:

@@ -26,7 +26,7 @@ from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts, 
 from silo_server.services.bom.lines import (
     ChangeKind,
     ChangeNote,
-    LineChange,
+    LineRecord,
     apply_changes,
     check_no_cycle,
     lines_of,
@@ -238,13 +238,13 @@ def restore(
         wanted = target.get(line_id)
         after = wanted.state if wanted else None
         if after != line.state:
-            changes.append(LineChange(line_id, line.child_id, line.state, after, line.position))
+            changes.append(LineRecord(line_id, line.child_id, line.state, after, line.position))
     missing = [line for line_id, line in target.items() if line_id not in current]
     archived = sorted({line.child.part_number for line in missing if line.child.archived_at})
     if archived and not with_archived:
         raise ArchivedPartsError(archived)
     check_no_cycle(tx, parent, [line.child.id for line in missing])
-    changes.extend(LineChange(m.line_id, m.child.id, None, m.state, m.position) for m in missing)
+    changes.extend(LineRecord(m.line_id, m.child.id, None, m.state, m.position) for m in missing)
     text = f"restored as of change {change_id}: {len(changes)} lines changed"
     note = ChangeNote(kind=ChangeKind.RESTORE, summary=text, reason=reason, refers_to=change_id)
     return apply_changes(tx, parent, changes, note)
@@ -287,7 +287,7 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
             "restore the BOM of that time instead, or change the lines"
         )
     check_no_cycle(tx, parent, [line.child.id for line in lines if line.after is None])
-    changes = [LineChange(n.line_id, n.child.id, n.after, n.before, n.position) for n in lines]
+    changes = [LineRecord(n.line_id, n.child.id, n.after, n.before, n.position) for n in lines]
     _reopen(tx, parent, change, current)
     text = f"undone: {change.summary}"
     return apply_changes(
@@ -295,7 +295,7 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
     )
 
 
-class Happened(NamedTuple):
+class PastChange(NamedTuple):
     """One thing that differs in a product between two times, and who did it last ("" if it is not known).
 
     what
@@ -342,13 +342,13 @@ def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
     )
 
 
-def what_changed(tx: Tx, root: Item, since: str, until: str) -> list[Happened]:
+def what_changed(tx: Tx, root: Item, since: str, until: str) -> list[PastChange]:
     """Return what differs in a product between two times, by item; what was added or removed is not looked
     into.
     """
     since, until = sorted((since, until))
     walked = _Walked(tx, since, until)
-    happenings: list[Happened] = []
+    happenings: list[PastChange] = []
     before, after = (walked.reached(root.id, side) for side in (0, 1))
     common = before & after
     numbers = by_ids(tx, walked.changed.keys() & common)
@@ -361,7 +361,7 @@ def what_changed(tx: Tx, root: Item, since: str, until: str) -> list[Happened]:
     return in_order(happenings)
 
 
-def in_order(happenings: Iterable[Happened]) -> list[Happened]:
+def in_order(happenings: Iterable[PastChange]) -> list[PastChange]:
     """Sort by BOM or item."""
     return sorted(
         happenings, key=lambda change: (change.within or change.part_number, change.part_number, change.what)
@@ -410,7 +410,7 @@ class _Walked:
             self._children[item.id] = (next(sides), next(sides))
 
 
-def line_happened(within: str, difference: Difference, at: str, who: str) -> Happened:
+def line_happened(within: str, difference: Difference, at: str, who: str) -> PastChange:
     what = difference.status
     before, after = (
         "" if state is None else f"{plain(state.quantity)} {state.unit or ''}".rstrip()
@@ -422,7 +422,9 @@ def line_happened(within: str, difference: Difference, at: str, who: str) -> Hap
         if what == "line":
             names = others or list(difference.fields)
             before, after = (_fields(state, names) for state in (difference.before, difference.after))
-    return Happened(what, within, difference.child.part_number, difference.child.name, before, after, at, who)
+    return PastChange(
+        what, within, difference.child.part_number, difference.child.name, before, after, at, who
+    )
 
 
 # What changes with a quantity, or when CAD loses and finds a line.
@@ -440,7 +442,7 @@ def _text(value: Any) -> str:
     return "–" if value in (None, "", {}, False) else "yes" if value is True else str(value)[:200]
 
 
-def _items_happened(tx: Tx, ids: Collection[int], since: str, until: str) -> Iterator[Happened]:
+def _items_happened(tx: Tx, ids: Collection[int], since: str, until: str) -> Iterator[PastChange]:
     row = revisions.c
     within = one_of(tx, row.item_id, ids) & (row.created_at <= until)
     touched = set(tx.conn.scalars(select(row.item_id).where(within, row.created_at > since).distinct()))
@@ -455,14 +457,14 @@ def _items_happened(tx: Tx, ids: Collection[int], since: str, until: str) -> Ite
         sides = json.loads(old[-1].properties) if old else {}, json.loads(last.properties)
         if differences := data_differs(*sides):
             what = ("data", "", item.part_number, item.name, *differences)
-            yield Happened(*what, last.created_at, last.created_by)
+            yield PastChange(*what, last.created_at, last.created_by)
         files = [each_row for each_row in rows if each_row.file_checksum]
         older = [file for file in files if file.created_at <= since]
         if files and (not older or older[-1].file_checksum != files[-1].file_checksum):
             newest = files[-1]
             before, after = (_file(some) for some in (older, files))
             what = ("file", "", item.part_number, item.name, before, after)
-            yield Happened(*what, newest.created_at, newest.created_by)
+            yield PastChange(*what, newest.created_at, newest.created_by)
 
 
 def data_differs(then: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, str] | None:

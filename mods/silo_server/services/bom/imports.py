@@ -49,7 +49,7 @@ from silo_server.schema import find_schema
 from silo_server.services.bom.lines import (
     ChangeKind,
     ChangeNote,
-    LineChange,
+    LineRecord,
     apply_changes,
     check_no_cycle,
     find_rings,
@@ -548,10 +548,10 @@ def apply_import(
     for row in plan.rows:
         child_id = create_item(tx, row.new)[0].id if row.new else row.child_id
         if row.status == "add" and child_id is not None:
-            changes.append(LineChange(new_line_id(), child_id, None, row.after))
+            changes.append(LineRecord(new_line_id(), child_id, None, row.after))
         elif row.status == "change" and row.line is not None:
             changes.append(
-                LineChange(row.line.id, row.line.child_id, row.before, row.after, row.line.position)
+                LineRecord(row.line.id, row.line.child_id, row.before, row.after, row.line.position)
             )
     check_no_cycle(tx, parent, [c.child_id for c in changes if c.before is None])
     text = f"imported: {plan.count('add')} added, {plan.count('change')} changed"

@@ -253,7 +253,7 @@ class ChangeKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class LineChange:
+class LineRecord:
     """One line that becomes something else: ``before`` None = new, ``after`` None = removed.
 
     ``position`` is its place in the BOM, None for a new line at the end.
@@ -323,7 +323,7 @@ def check_version(parent: Item, expected: int | None) -> None:
         )
 
 
-def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineChange], note: ChangeNote) -> tuple[int, int]:
+def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineRecord], note: ChangeNote) -> tuple[int, int]:
     """Write ``changes`` to the parent's BOM (whose lock the caller holds) and to its history.
 
     Returns (change id, version after). The version moves only when a line does. What is no merge is announced
@@ -415,7 +415,7 @@ def _ring(tx: Tx, parent_id: int, child_id: int, above: Mapping[int, int]) -> li
     return [names[i] for i in ids]
 
 
-def _placed(tx: Tx, parent: Item, changes: Sequence[LineChange]) -> list[LineChange]:
+def _placed(tx: Tx, parent: Item, changes: Sequence[LineRecord]) -> list[LineRecord]:
     if all(change.position is not None for change in changes):
         return list(changes)
     last = tx.conn.scalar(select(func.max(bom_lines.c.position)).where(bom_lines.c.parent_id == parent.id))
@@ -423,7 +423,7 @@ def _placed(tx: Tx, parent: Item, changes: Sequence[LineChange]) -> list[LineCha
     return [c if c.position is not None else replace(c, position=next(places)) for c in changes]
 
 
-def _write_lines(tx: Tx, parent: Item, changes: Sequence[LineChange]) -> None:
+def _write_lines(tx: Tx, parent: Item, changes: Sequence[LineRecord]) -> None:
     added = [(c, c.after) for c in changes if c.before is None and c.after is not None]
     changed = [(c, c.after) for c in changes if c.before is not None and c.after is not None]
     removed = [c.line_id for c in changes if c.after is None]
@@ -443,7 +443,7 @@ def _write_lines(tx: Tx, parent: Item, changes: Sequence[LineChange]) -> None:
     insert_rows(tx, bom_lines, rows)
 
 
-def history_row(change: LineChange) -> dict[str, Any]:
+def history_row(change: LineRecord) -> dict[str, Any]:
     """Return a changed line as the history stores it."""
     return {
         "line_id": change.line_id,

@@ -49,7 +49,7 @@ from silo_server.services.bom.history import state_at
 from silo_server.services.bom.lines import (
     ChangeKind,
     ChangeNote,
-    LineChange,
+    LineRecord,
     apply_changes,
     check_no_cycle,
     check_version,
@@ -564,10 +564,10 @@ def _overrides_gone(lines: Sequence[Line], numbers: set[str]) -> list[QuantityCh
     ]
 
 
-def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineChange]:
+def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineRecord]:
     plan = prepared.plan
     changes = [
-        LineChange(
+        LineRecord(
             new_line_id(),
             prepared.child_ids[added.part_number],
             None,
@@ -585,7 +585,7 @@ def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineChange]:
             continue
         since = tx.stamp if name in flag else None if name in unflag else before.unreferenced_since
         after = replace(before, quantity=quantities.get(name, before.quantity), unreferenced_since=since)
-        changes.append(LineChange(line.id, line.child_id, before, after, line.position))
+        changes.append(LineRecord(line.id, line.child_id, before, after, line.position))
     return changes
 
 
@@ -611,7 +611,7 @@ def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:
 
 
 def _without_unchanged(
-    prepared: _Prepared, changes: Sequence[LineChange], answer: Mapping[str, Any]
+    prepared: _Prepared, changes: Sequence[LineRecord], answer: Mapping[str, Any]
 ) -> str | None:
     """Return the answer's JSON without its unchanged lines, which the history has; None if it has not.
 

@@ -51,8 +51,8 @@ from silo_server.services.bom.history import Change, last_merge
 from silo_server.services.bom.lines import (
     ChangeKind,
     ChangeNote,
-    LineChange,
     LineId,
+    LineRecord,
     apply_changes,
     check_no_cycle,
     component_of,
@@ -103,7 +103,7 @@ def add_line(
                 f"{child.part_number} is in the BOM of {parent.part_number} already; change its line instead"
             )
     check_no_cycle(tx, parent, [child.id])
-    change = LineChange(new_line_id(), child.id, None, state)
+    change = LineRecord(new_line_id(), child.id, None, state)
     text = f"{child.part_number} added, quantity {plain(state.quantity)}"
     return _apply(tx, parent, change, child.part_number, text, why)
 
@@ -136,7 +136,7 @@ def change_line(
         quantity = f"quantity {plain(line.state.quantity)} → {plain(after.quantity)}"
         fields = [quantity, *(name for name in fields if name != "quantity")]
     what = ", ".join(name.replace("_", " ") for name in fields) or "source"
-    change = LineChange(line.id, line.child_id, line.state, after, line.position)
+    change = LineRecord(line.id, line.child_id, line.state, after, line.position)
     return _apply(
         tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {what}", why
     )
@@ -160,7 +160,7 @@ def remove_line(
     line = line_of(lines_of(tx, parent), which, parent)
     if seen is not None and seen != mark_of(line.state):
         raise LinesChangedError(f"{line.child_part_number} was changed meanwhile", [line.id])
-    change = LineChange(line.id, line.child_id, line.state, None, line.position)
+    change = LineRecord(line.id, line.child_id, line.state, None, line.position)
     return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} removed", why)
 
 
@@ -214,7 +214,7 @@ def _check_free(tx: Tx, parent: Item, line: Line, rel_type: str) -> None:
             raise DuplicateError(f"{line.child_part_number} is in this BOM as {rel_type} already")
 
 
-def _apply(tx: Tx, parent: Item, change: LineChange, child: str, text: str, why: str | None = None) -> Edited:
+def _apply(tx: Tx, parent: Item, change: LineRecord, child: str, text: str, why: str | None = None) -> Edited:
     note = ChangeNote(kind=ChangeKind.EDIT, summary=text, reason=why)
     change_id, version = apply_changes(tx, parent, [change], note)
     after = None
@@ -223,7 +223,7 @@ def _apply(tx: Tx, parent: Item, change: LineChange, child: str, text: str, why:
     return Edited(parent, after, version, change_id, child)
 
 
-class Action(StrEnum):
+class ReviewAction(StrEnum):
     """What a person decides about a line."""
 
     REMOVE = "remove"  # take it out of the BOM
@@ -243,7 +243,7 @@ class Decision:
     """
 
     child_part_number: str
-    action: Action
+    action: ReviewAction
     reason: str | None = None
     line_id: str | None = None
     seen: str | None = None
@@ -313,7 +313,7 @@ def resolve(
     parent = parent_to_change(tx, part_number, expected)
     lines = lines_of(tx, parent)
     conflicts = {c.line.id: c for c in open_conflicts(tx, parent, lines)}
-    changes: list[LineChange] = []
+    changes: list[LineRecord] = []
     problems: list[str] = []
     settled: list[Decision] = []
     seen: set[str] = set()
@@ -341,10 +341,10 @@ def resolve(
         except (RejectedError, NotFoundError, ConflictError) as error:
             problems.append(f"decisions[{index}]: {error}")
             continue
-        if decision.action is Action.KEEP_SILO:
+        if decision.action is ReviewAction.KEEP_SILO:
             _accept(tx, parent, line)
         if after != line.state:
-            changes.append(LineChange(line.id, line.child_id, line.state, after, line.position))
+            changes.append(LineRecord(line.id, line.child_id, line.state, after, line.position))
     if problems:
         raise RejectedError(f"nothing was changed: {problems[0]}", problems)
     return _write(tx, parent, settled, changes)
@@ -358,15 +358,15 @@ def marks_of(lines: Sequence[Line], conflicts: Mapping[str, Conflict]) -> dict[s
 
 def _decided(line: Line, decision: Decision, conflict: Conflict | None) -> LineState | None:
     state, reason = line.state, decision.reason
-    if decision.action is Action.REMOVE:
+    if decision.action is ReviewAction.REMOVE:
         return None
-    if decision.action is Action.KEEP:
+    if decision.action is ReviewAction.KEEP:
         if state.unreferenced_since is None:
             raise RejectedError(f"{line.child_part_number} is not unreferenced; there is nothing to keep")
         return replace(state, source="manual", unreferenced_since=None, reason=reason)
     if conflict is None:
         raise RejectedError(f"{line.child_part_number} is not in conflict")
-    if decision.action is Action.KEEP_SILO:
+    if decision.action is ReviewAction.KEEP_SILO:
         return replace(state, override=False, cad_quantity=None, reason=reason or state.reason)
     if conflict.cad_quantity == 0:
         return None
@@ -390,17 +390,17 @@ def _accept(tx: Tx, parent: Item, line: Line) -> None:
 
 
 _WORDS = {
-    Action.REMOVE: "removed",
-    Action.KEEP: "kept as intentional",
-    Action.TAKE_CAD: "set to the assembly's quantity",
-    Action.KEEP_SILO: "kept at Silo's quantity",
+    ReviewAction.REMOVE: "removed",
+    ReviewAction.KEEP: "kept as intentional",
+    ReviewAction.TAKE_CAD: "set to the assembly's quantity",
+    ReviewAction.KEEP_SILO: "kept at Silo's quantity",
 }
 
 
 def _write(
-    tx: Tx, parent: Item, decisions: Sequence[Decision], changes: Sequence[LineChange]
+    tx: Tx, parent: Item, decisions: Sequence[Decision], changes: Sequence[LineRecord]
 ) -> tuple[int, int]:
-    counts = {action: sum(d.action is action for d in decisions) for action in Action}
+    counts = {action: sum(d.action is action for d in decisions) for action in ReviewAction}
     text = ", ".join(f"{count} {_WORDS[action]}" for action, count in counts.items() if count)
     reasons = list(dict.fromkeys(d.reason for d in decisions if d.reason))
     note = ChangeNote(
@@ -516,23 +516,23 @@ def _mark(version: int, conflicts: Told) -> str:
     return f"{version}-{hashlib.sha256(digest.encode()).hexdigest()[:16]}"
 
 
-def lines_for(tx: Tx, part_number: str, action: Action, seen: str) -> tuple[list[Line], list[Line]]:
+def lines_for(tx: Tx, part_number: str, action: ReviewAction, seen: str) -> tuple[list[Line], list[Line]]:
     """Return the open lines of a BOM that ``action`` is about, and those of them that it would remove.
 
     seen
         the mark of what the person saw; VersionConflictError if the BOM is another one by now.
     """
     open_lines = review(tx, part_number)
-    if action in (Action.TAKE_CAD, Action.KEEP_SILO):
+    if action in (ReviewAction.TAKE_CAD, ReviewAction.KEEP_SILO):
         lines = [conflict.line for conflict in open_lines.conflicts]
         gone = [
             conflict.line
             for conflict in open_lines.conflicts
-            if action is Action.TAKE_CAD and not conflict.cad_quantity
+            if action is ReviewAction.TAKE_CAD and not conflict.cad_quantity
         ]
     else:
         lines = list(open_lines.unreferenced)
-        gone = lines if action is Action.REMOVE else []
+        gone = lines if action is ReviewAction.REMOVE else []
     conflicts = {
         conflict.line.child_id: (conflict.cad_quantity, conflict.since) for conflict in open_lines.conflicts
     }
@@ -542,7 +542,7 @@ def lines_for(tx: Tx, part_number: str, action: Action, seen: str) -> tuple[list
 
 
 def decide_all(
-    tx: Tx, part_number: str, action: Action, reason: str | None, seen: str
+    tx: Tx, part_number: str, action: ReviewAction, reason: str | None, seen: str
 ) -> tuple[int, int | None]:
     """Decide the same about all :func:`lines_for` an action; return how many, and the change, if any."""
     lines, _ = lines_for(tx, get_item(tx, part_number, lock=True).part_number, action, seen)

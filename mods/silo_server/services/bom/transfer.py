@@ -162,7 +162,7 @@ def export(
             more = f"; and {len(said) - MOST_TOLD} more" if len(said) > MOST_TOLD else ""
             notes.append(f"{head}: {'; '.join(said[:MOST_TOLD])}{more}")
 
-    def dressed(bare: Iterable[_Bare]) -> Iterator[Row]:
+    def dressed(bare: Iterable[_BareColumns]) -> Iterator[Row]:
         for some in portions(bare):
             parts = (
                 frozen.parts if frozen else some_parts(tx, {each_bare.line.child_id for each_bare in some})
@@ -180,18 +180,18 @@ def export(
                     | fields
                 )
 
-    bare: Iterator[_Bare]
+    bare: Iterator[_BareColumns]
     if view is View.FLAT:
         flat = enumerate((row for row in flatten(graph) if fitting(row.line)), start=1)
         bare = (
-            _Bare(row.line, str(place), 1, row.total * pieces, row.total, row.doubts(pieces))
+            _BareColumns(row.line, str(place), 1, row.total * pieces, row.total, row.doubts(pieces))
             for place, row in flat
         )
     else:
         depth = 1 if view is View.SINGLE else MAX_DEPTH
         hit = leading_to(graph, fitting) if filtered else fitting
         bare = (
-            _Bare(
+            _BareColumns(
                 occurrence.line,
                 item,
                 occurrence.depth,
@@ -205,7 +205,7 @@ def export(
     return Export(root, view, chain(dressed(bare), gaps), notes, pieces)
 
 
-class _Bare(NamedTuple):
+class _BareColumns(NamedTuple):
     """A row before it has what it shows of its part: the line, its place, and what is open about it."""
 
     line: Line
@@ -351,7 +351,7 @@ def to_json(made: Export, out: IO[bytes]) -> None:
     out.write(b"]}")
 
 
-def _row(bare: _Bare, part: RolledItem, amount: Exact, *, of_a_line: bool) -> Row:
+def _row(bare: _BareColumns, part: RolledItem, amount: Exact, *, of_a_line: bool) -> Row:
     """Return a row's cells; ``of_a_line`` False: not those of a line, as a part may be in the tree on
     several.
     """

@@ -456,7 +456,7 @@ class CostRollup:
 
 
 @dataclass(frozen=True, slots=True)
-class MassRow:
+class MassLine:
     """A part whose stated mass was taken [kg], as the API sends it.
 
     ``is_assembly`` where it stands for all below it.
@@ -474,7 +474,7 @@ class MassRow:
 class MassRollup:
     """The mass of one assembly [kg]; ``stated`` is what its own ``mass_kg`` says."""
 
-    rows: Sequence[MassRow]
+    rows: Sequence[MassLine]
     total: float
     missing: Sequence[str]
     stated: float | None
@@ -583,7 +583,7 @@ def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
     return float(value) if 0 <= value < 1e15 else None
 
 
-def _mass_row(item: RolledItem, amount: Exact, is_assembly: bool) -> MassRow:
+def _mass_row(item: RolledItem, amount: Exact, is_assembly: bool) -> MassLine:
     mass = positive_number(item.properties, "mass_kg")
     total = float(exact_product((mass, amount))) if mass is not None else None
-    return MassRow(item.part_number, item.name, plain(amount), mass, total, is_assembly)
+    return MassLine(item.part_number, item.name, plain(amount), mass, total, is_assembly)

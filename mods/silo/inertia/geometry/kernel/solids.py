@@ -554,7 +554,7 @@ def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
     """
     problems: list[Note] = []
     bodies: list[Body] = []
-    bares: dict[tuple[int, Any], _Bare] = {}
+    bares: dict[tuple[int, Any], _MeasuredSolid] = {}
     solids = [solid for shape in shapes for solid in occt.solids_of(shape)]
     shells, left = closed_shells(shapes)
     if shells:
@@ -599,7 +599,7 @@ class _Picture:
 
 
 @dataclass(frozen=True, eq=False)
-class _Bare:
+class _MeasuredSolid:
     """One solid in the axes of its bare geometry; ``props`` None if it has no volume.
 
     flat
@@ -613,10 +613,10 @@ class _Bare:
     flat: bool = False
 
 
-def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _Bare:
+def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _MeasuredSolid:
     notes: list[Note] = []
     if not all(occt.has_surface(face) for face in occt.faces_of(solid)):
-        return _Bare(body, *_triangulated_solid(solid, notes), notes)
+        return _MeasuredSolid(body, *_triangulated_solid(solid, notes), notes)
     props = _integrated(solid, eps, notes)
     if not BRepCheck_Analyzer(solid).IsValid():
         notes.append(INVALID)
@@ -627,10 +627,10 @@ def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _B
         note = drift_note(beside_edges(solid, props.volume_m3 / MM**3))
         notes += [note] if note is not None else []
     flat = mesh is not None and props is not None and occt.is_flat(solid)
-    return _Bare(body, props, mesh, notes, flat)
+    return _MeasuredSolid(body, props, mesh, notes, flat)
 
 
-def _placed(bare: _Bare, solid: Any) -> list[Body]:
+def _placed(bare: _MeasuredSolid, solid: Any) -> list[Body]:
     """Return the solid where it stands, with our own algebra; empty if it has no volume."""
     if bare.props is None:
         return []
