@@ -29,7 +29,7 @@ from silo_server.services.bom.tree import FlatRow, Graph, flatten, load_graph
 from silo_server.services.items import by_ids, get_item
 from silo_server.services.releases import Release, get_release, newest_release
 from silo_server.services.suppliers import (
-    Offer,
+    SupplierOffer,
     choose,
     decimal_text,
     rates_of,
@@ -105,7 +105,7 @@ class OrderRow(NamedTuple):
     ordered: Decimal
     doubts: Sequence[str]
     kind: str
-    offer: Offer | None = None
+    offer: SupplierOffer | None = None
     files: Sequence[PartFile] = ()
 
     @property

@@ -110,7 +110,7 @@ class SupplierPart:
         return next((price for least, price in reversed(self.prices) if least <= amount), None)
 
 
-class Offer(NamedTuple):
+class SupplierOffer(NamedTuple):
     """A supplier part for an order: how much, its price and cost, and that in the site's currency.
 
     cheaper
@@ -125,7 +125,9 @@ class Offer(NamedTuple):
     cheaper: tuple[Decimal, Decimal] | None = None
 
 
-def choose(parts: Sequence[SupplierPart], needed: Decimal, rates: Mapping[str, Decimal]) -> Offer | None:
+def choose(
+    parts: Sequence[SupplierPart], needed: Decimal, rates: Mapping[str, Decimal]
+) -> SupplierOffer | None:
     """Return the preferred supplier part, else the cheapest for what is needed; None without any.
 
     rates
@@ -139,7 +141,7 @@ def choose(parts: Sequence[SupplierPart], needed: Decimal, rates: Mapping[str, D
     return next((offer for offer in offers if offer.cost is not None), offers[0] if offers else None)
 
 
-def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) -> Offer:
+def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) -> SupplierOffer:
     def cost_of(amount: Decimal) -> Decimal | None:
         price = part.price_at(amount)
         return None if price is None else exact_product((amount, price))
@@ -155,7 +157,7 @@ def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) ->
         if (more := cost_of(each_rate)) is not None and more < (cost or 0)
     ]
     best = min(cheaper, default=None)
-    return Offer(part, amount, price, cost, in_base, best and (best[1], best[0]))
+    return SupplierOffer(part, amount, price, cost, in_base, best and (best[1], best[0]))
 
 
 def supplier_parts_of(item: Item) -> list[SupplierPart]:

@@ -137,7 +137,7 @@ class Branch:
         return {currency: cost * as_decimal(self.total) for currency, cost in self.worth.costs.items()}
 
 
-class Row(NamedTuple):
+class StructureRow(NamedTuple):
     """An open row of the tree before it is dressed: ``key`` names the branch, if it can be one."""
 
     line: Line
@@ -147,7 +147,7 @@ class Row(NamedTuple):
     is_open: bool
 
 
-class Structure:
+class ShownStructure:
     """The lines that a view of a product needs, with all that its rows show; the rest is never read.
 
     graph
@@ -203,11 +203,11 @@ class Structure:
             for found in [by_item.get(child)]
         }
 
-    def dressed(self, rows: Sequence[tuple[Row, Sequence[str]]]) -> list[Branch]:
+    def dressed(self, rows: Sequence[tuple[StructureRow, Sequence[str]]]) -> list[Branch]:
         """Return the rows with everything that they show; beside each stand the doubts of its line."""
         known = self._known({row.line.child_id for row, _ in rows})
 
-        def dress(row: Row, doubts: Sequence[str]) -> Branch:
+        def dress(row: StructureRow, doubts: Sequence[str]) -> Branch:
             child = row.line.child_id
             part, worth, summary = known[child]
             if summary is None:
@@ -224,7 +224,7 @@ def usual_depth(counts: Sequence[int]) -> int:
     return max(1, sum(rows <= PAGE_ROWS for rows in accumulate(counts)))
 
 
-def tree_page(shown: Structure, total: int) -> tuple[Page[Branch], Sequence[Branch]]:
+def tree_page(shown: ShownStructure, total: int) -> tuple[Page[Branch], Sequence[Branch]]:
     """Return a page of the open rows, and the branches above its first one (none on the first page).
 
     TooLargeError where more is open than anybody can page through.
@@ -241,7 +241,7 @@ def tree_page(shown: Structure, total: int) -> tuple[Page[Branch], Sequence[Bran
             )
         )
     rows_of_page = page_of(rows, total if look.is_filtered else len(rows), look.page, shown.page_rows)
-    above: list[Row] = []
+    above: list[StructureRow] = []
     for row in reversed(rows[: rows_of_page.start]):
         if row.depth < (above[-1] if above else rows[rows_of_page.start]).depth:
             above.append(row)
@@ -250,7 +250,7 @@ def tree_page(shown: Structure, total: int) -> tuple[Page[Branch], Sequence[Bran
     return page, shown.dressed([(row, ()) for row in above[::-1]])
 
 
-def _walk(shown: Structure) -> Iterator[Row]:
+def _walk(shown: ShownStructure) -> Iterator[StructureRow]:
     graph, look = shown.graph, shown.look
     filtered, flipped = look.is_filtered, set(look.flips)
     hit = tree.leading_to(graph, shown.fitting) if filtered else lambda _line: True
@@ -273,7 +273,7 @@ def _walk(shown: Structure) -> Iterator[Row]:
             )
             is_open = bool(key) and (filtered or (level < look.depth) != (key in flipped))
             inner = lines_of(line.child_id, level) if is_open else ()
-            yield Row(line, level, total, key, bool(inner))
+            yield StructureRow(line, level, total, key, bool(inner))
             if inner:
                 stack.append((level + 1, total, key, iter(inner)))
                 break
@@ -281,7 +281,7 @@ def _walk(shown: Structure) -> Iterator[Row]:
             stack.pop()
 
 
-def _tree_keys(shown: Structure) -> Mapping[str, Callable[[Line], Any]]:
+def _tree_keys(shown: ShownStructure) -> Mapping[str, Callable[[Line], Any]]:
     def times(line: Line, value: Decimal | None) -> Decimal | None:
         return None if value is None else value * as_decimal(line.state.quantity)
 
@@ -302,21 +302,21 @@ def _cost_key(costs: Mapping[str, Decimal]) -> Decimal | None:
     return max(costs.values(), default=None)
 
 
-def flat_page(shown: Structure) -> Page[Branch]:
+def flat_page(shown: ShownStructure) -> Page[Branch]:
     """Return a page of the leaf parts, each with its total over the whole tree."""
     look = shown.look
     rows = arranged([row for row in shown.leaves if shown.fitting(row.line)], look.sort, _flat_keys(shown))
     table = page_of(rows, len(shown.leaves), look.page, shown.page_rows)
     here = shown.dressed(
         [
-            (Row(row.line, 1, row.total * look.pieces, "", False), row.doubts(look.pieces))
+            (StructureRow(row.line, 1, row.total * look.pieces, "", False), row.doubts(look.pieces))
             for row in table.rows
         ]
     )
     return Page(here, table.total, table.found, table.number, table.size)
 
 
-def _flat_keys(shown: Structure) -> Mapping[str, Callable[[tree.FlatRow], Any]]:
+def _flat_keys(shown: ShownStructure) -> Mapping[str, Callable[[tree.FlatRow], Any]]:
     def worth(row: tree.FlatRow) -> MassAndCost:
         return own_worth(shown.parts[row.line.child_id].properties)
 
@@ -455,7 +455,7 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
                     most=MOST_READ,
                 )
             )
-        shown = Structure(tx, tree.load_graph(tx, item, None if whole else depth), look, size)
+        shown = ShownStructure(tx, tree.load_graph(tx, item, None if whole else depth), look, size)
         if look.is_filtered:
             narrow = tree.narrowed(shown.graph, shown.fitting, shown.leaves if look.is_flat else None)
             values |= {"totals": Totals.narrow(tx, narrow, shown.parts)}
