@@ -168,7 +168,7 @@ def test_what_waits_leads_to_its_question_in_the_model(visit: Visit, api: Api, t
     page.get_by_role("link", name=f"Show {top} in the model").click()
     model = page.locator("#model[data-ready]")
     model.wait_for()
-    expect(model.locator(".said")).to_have_text("1 of 2: M1-COVER Cover: CAD uses it no more")
+    expect(model.locator(".said")).to_have_text("1 of 2: M1-COVER Cover: CAD no longer uses it")
     assert amount(still(model.locator("canvas")), RED) > 3000
     expect(model.locator("canvas")).to_be_in_viewport()
 
