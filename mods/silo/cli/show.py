@@ -451,8 +451,9 @@ def _print_order(order: OrderList) -> None:
     from silo.api.wire import SupplierPart
 
     out = console()
-    spares = f", {order.spares} % spares" if order.spares != "0" else ""
-    head = f"{order.part_number}: what to order for {order.pieces}{spares}. {order.state}"
+    head = (
+        f"{order.part_number}: what to order for {order.pieces} with {order.spares} % spares. {order.state}"
+    )
     out.print(Text(plain(head), "bold"))
     for warning in order.warnings:
         out.print(Text(f"⚠ {plain(warning)}", "yellow"))
@@ -482,9 +483,10 @@ def _print_order(order: OrderList) -> None:
         table.add_row(*(Text(plain(cell)) for cell in cells))
     if order.parts:
         out.print(table)
-        left = f", without {order.unpriced} of the bought parts" if order.unpriced else ""
         days = "not known" if order.lead_time_days is None else f"{order.lead_time_days} days"
-        out.print(Text(f"Cost: {order.total_cost} {order.currency}{left}. Longest lead time: {days}"))
+        total = f"Cost: {order.total_cost} {order.currency}, without {order.unpriced} parts"
+        time = f"Longest lead time: {days}"
+        out.print(Text(f"{total}\n{time}"))
 
 
 def run_whoami(args: argparse.Namespace) -> int:
