@@ -456,7 +456,7 @@ def thumbnail(call: Viewer, part_number: str, key: Annotated[str, Query(max_leng
     return FileResponse(path, media_type="image/png", headers={"Cache-Control": f"private, {kept}"})
 
 
-_PNG = {"image/png": {"schema": {"type": "string", "format": "binary"}}}
+_PNG = {"image/png": {"schema": {"type": "string", "format": "binary", "minLength": 57}}}
 _DRAWN = {
     **context.refused("what is no PNG, too large a PNG"),
     "requestBody": {"required": True, "content": _PNG},
