@@ -237,10 +237,10 @@ def test_shared_children_are_written_once() -> None:
         ({}, "expected a BOM snapshot of format 1, got None"),
         ({"format": 2}, "expected a BOM snapshot of format 1, got 2"),
         ({"format": 1}, "BOM snapshot is not complete"),
-        ({"format": 1, "assembly": 0, "entries": [], "table": [], "findings": []}, "no complete"),
+        ({"format": 1, "assembly": 0, "entries": [], "table": [], "findings": []}, "is not complete"),
         (
             {"format": 1, "assembly": 0, "entries": [], "table": [{"children": [3]}], "findings": []},
-            "no complete",
+            "is not complete",
         ),
     ],
 )

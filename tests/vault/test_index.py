@@ -419,7 +419,7 @@ def test_another_current_folder_is_another_file(
 def test_a_file_that_the_user_named_and_that_is_no_index_stays(vault: Path) -> None:
     """A slip of the hand (--index top.FCStd) must not cost a drawing."""
     before = (vault / "d.FCStd").read_bytes()
-    with pytest.raises(InputError, match="no index"):
+    with pytest.raises(InputError, match="not an index"):
         Index(vault / "d.FCStd", given=True)
     assert (vault / "d.FCStd").read_bytes() == before
 

@@ -199,7 +199,7 @@ def test_a_sheet_with_more_cells_than_a_bom_can_have_is_refused() -> None:
     wide = "".join(rows.format(line, "XFD") for line in range(3, 400)) + "</sheetData>"
     many = "".join(rows.format(line, "A") for line in range(3, 600)) + "</sheetData><mergeCells>"
     merged = many + '<mergeCell ref="A1:XFD1048576"/>' * 9_000 + "</mergeCells>"
-    for sheet, words in ((wide, "too wide"), (merged, "lie on each other")):
+    for sheet, words in ((wide, "too wide"), (merged, "overlap")):
         with pytest.raises(InputError, match=words):
             BOMParser().parse_bytes(patched(xlsx(BOM=[HEAD]), SHEET, b"</sheetData>", sheet.encode()))
 
