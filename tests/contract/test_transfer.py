@@ -230,7 +230,7 @@ def test_files_of_other_spreadsheets(api: Api, encoding: str) -> None:
         (b"", "Part number"),
         (b"\x00\xff\x00", "Part number"),
         (b"a,b\r\n1,2", "Part number"),
-        (b'Part number,Quantity\r\n"broken', "does not read as such"),
+        (b'Part number,Quantity\r\n"broken', "cannot be read as CSV"),
         (b"\xff\xfe\x00", "Part number"),
         (b"PK\x03\x04" + bytes(60), "the workbook cannot be read"),
         (b"\xd0\xcf\x11\xe0" + bytes(60), "the workbook cannot be read"),

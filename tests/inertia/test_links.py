@@ -215,7 +215,7 @@ def test_map_files_that_cannot_be_read(tmp_path: Path) -> None:
     """Absent, or no YAML."""
     bad = tmp_path / "bad.yaml"
     bad.write_text("links: [a: {", "utf-8")
-    with pytest.raises(ConfigError, match="no YAML"):
+    with pytest.raises(ConfigError, match="not valid YAML"):
         read_link_map(bad)
     with pytest.raises(ConfigError, match="cannot be read"):
         read_link_map(tmp_path / "none.yaml")

@@ -91,7 +91,7 @@ def test_a_folder_outside_any_repository_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not a git repository"):
         top_of(tmp_path / "nowhere")
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="is no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         top_of(tmp_path / "file")
 
 

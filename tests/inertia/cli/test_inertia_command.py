@@ -251,7 +251,7 @@ def test_bom_and_material_options_reach_the_calculation(run: Run, arm: Path) -> 
         (["--frame", "urdf"], "needs --urdf"),
         (["--urdf-out", "x.urdf"], "without --urdf"),
         (["--urdf", "arm.urdf", "--urdf-out", "nowhere/x.urdf"], "no folder"),
-        (["--urdf", "bom.csv", "--frame", "own"], "no XML"),
+        (["--urdf", "bom.csv", "--frame", "own"], "not valid XML"),
         (["--snippet", "sdf", "--json"], "--report FILE.json"),
         (["--default-density", "0"], "from 25 to 23000"),
         (["--default-density", "nan"], "from 25 to 23000"),

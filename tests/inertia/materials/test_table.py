@@ -253,7 +253,7 @@ def test_user_table_wins(tmp_path: Path) -> None:
         ("a.csv", "name,density\nsteel,7850\nSteel,7700\n", "“Steel” has two densities, 7850 and 7700"),
         ("a.csv", "name,density,aliases\nx,900,blend\ny,950,Blend\n", "“Blend” has two densities"),
         ("a.toml", "materials = 3\n", r"\[materials\]"),
-        ("a.toml", "[materials\n", "no TOML"),
+        ("a.toml", "[materials\n", "not valid TOML"),
         ("a.xls", "", r"\.csv or \.toml"),
     ],
 )

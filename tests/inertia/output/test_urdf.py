@@ -118,8 +118,8 @@ def test_frames_follow_the_joints() -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", "no XML"),
-        (b"<robot><link name='a'></robot>", "no XML"),
+        (b"", "not valid XML"),
+        (b"<robot><link name='a'></robot>", "not valid XML"),
         (b"<sdf><link name='a'/></sdf>", "wanted a URDF"),
         (b"<!DOCTYPE robot [<!ENTITY a 'b'>]><robot>&a;</robot>", "DOCTYPE"),
         ("<robot/>".encode("utf-16"), "UTF-16"),
