@@ -45,7 +45,7 @@ if [ "$(id -u)" = 0 ] && command -v setpriv >/dev/null; then
     chown -R nobody "$work/home" "$work/tmp"
     nobody=(setpriv --reuid=nobody --regid=nogroup --clear-groups)
     # A Python below root's home is root's alone.
-    ! "${nobody[@]}" "$bin/python" -V >/dev/null 2>&1 || user=("${nobody[@]}" "${user[@]}")
+    ! "${nobody[@]}" env "$bin/python" -V >/dev/null 2>&1 || user=("${nobody[@]}" "${user[@]}")
 fi
 silo_mod="$bin/silo-mod"
 echo "README's commands"
