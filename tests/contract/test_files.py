@@ -121,7 +121,7 @@ def test_a_thumbnail_is_taken_from_an_fcstd_file(api: Api) -> None:
 
 def png(width: int = 128, height: int = 128, more: bytes = b"") -> bytes:
     """The frame of a PNG, with its size."""
-    head = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + width.to_bytes(4) + height.to_bytes(4) + b"\x08\x06\0\0\0"
+    head = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + width.to_bytes(4) + height.to_bytes(4) + b"\x08\x06\0\0\0crc!"
     return head + more + b"\0\0\0\0IEND\xaeB`\x82"
 
 
@@ -137,6 +137,7 @@ def test_an_item_without_a_picture_takes_what_a_browser_drew(api: Api) -> None:
     before = api.get(f"/api/items/{number}")
     for bad in (
         b"", b"<svg/>", png()[:-1], png(15), png(128, 513), png(1 << 31), png(more=bytes(256 * 1024)),
+        png(more=b"not a part"), png(0),
     ):  # fmt: skip
         assert drawn(api, number, bad) == 400
     assert drawn(api, "NO-SUCH", png()) == 404

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import csv
 import io
+import struct
+import zipfile
+import zlib
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +17,16 @@ from openpyxl.styles import Font
 from server_testing import Api, bom, form_body
 
 EVIL = ['=HYPERLINK("http://x")', "+1+1", "-2", "@SUM(A1)", "\t=1", "＝1"]
+
+
+def png(width: int, height: int) -> bytes:
+    """A grey picture."""
+    rows = zlib.compress(bytes(height * (width + 1)))
+    chunks = ((b"IHDR", struct.pack(">2I5B", width, height, 8, 0, 0, 0, 0)), (b"IDAT", rows), (b"IEND", b""))
+    made = b"\x89PNG\r\n\x1a\n"
+    for kind, data in chunks:
+        made += struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    return made
 
 
 def read(data: bytes) -> list[dict[str, str]]:
@@ -89,6 +102,26 @@ def test_xlsx_has_numbers_as_numbers(api: Api, tree: tuple[str, ...]) -> None:
     book = load_workbook(io.BytesIO(api.call("GET", bom(tree[0], "export.xlsx")).body))
     header = [cell.value for cell in book.active[1]]
     assert [row[header.index("Quantity")].value for row in book.active.iter_rows(min_row=2)] == [2, 3]
+
+
+def test_a_workbook_shows_its_parts(api: Api, tree: tuple[str, ...]) -> None:
+    """Each row its part's picture, if that is a whole PNG; only where pictures are asked for."""
+    top, sub, leaf, _ = tree
+    broken = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + bytes(20) + b"\xff\xff\0\0\0IEND\xaeB`\x82"
+    for number, picture in (leaf, png(64, 32)), (sub, broken):
+        out = io.BytesIO()
+        with zipfile.ZipFile(out, "w") as archive:
+            archive.writestr("thumbnails/Thumbnail.png", picture)
+        body, form = form_body({"file": ("Part.FCStd", out.getvalue())})
+        assert api.call("POST", f"/api/items/{number}/file", body=body, headers=form).status == 201
+    plain = load_workbook(io.BytesIO(api.call("GET", bom(top, "export.xlsx?view=indented")).body)).active
+    asked = bom(top, "export.xlsx?view=indented&pictures=1")
+    shown = load_workbook(io.BytesIO(api.call("GET", asked).body)).active
+    assert [(i.anchor._from.row, i.anchor._from.col) for i in shown._images] == [(2, 2), (4, 2)]
+    assert {(image.width, image.height) for image in shown._images} == {(64, 32)}
+    assert (shown.cell(1, 3).value, shown.cell(3, 4).value) == ("Picture", leaf)
+    shown.delete_cols(3)
+    assert list(shown.values) == list(plain.values)
 
 
 def test_a_purchaser_can_order_from_it(api: Api, tree: tuple[str, ...]) -> None:

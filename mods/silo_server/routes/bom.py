@@ -696,9 +696,10 @@ def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = Fa
 
 
 @transfer_router.get("/export.xlsx", response_class=Response, responses=content_of(XLSX))
-def export_xlsx(call: Viewer, part_number: str, wanted: As) -> Response:
-    """Return the BOM as a workbook."""
-    return _exported(call, part_number, wanted, transfer.to_xlsx, XLSX, "xlsx")
+def export_xlsx(call: Viewer, part_number: str, wanted: As, pictures: bool = False) -> Response:
+    """Return the BOM as a workbook. ``pictures``: the first 2000 rows show their part."""
+    shown = call.server.files.path_of if pictures else None
+    return _exported(call, part_number, wanted, partial(transfer.to_xlsx, picture=shown), XLSX, "xlsx")
 
 
 @transfer_router.get("/export.json", responses=READ_ERRORS)

@@ -138,10 +138,9 @@ def note_revision(
 
 def keep_picture(tx: Tx, store: FileStore, item: Item, picture: bytes) -> None:
     """Give an item without a picture a PNG that a browser drew. Raises RejectedError, DuplicateError."""
-    whole = picture.startswith(PNG + PNG_HEAD) and picture.endswith(PNG_END)
-    if len(picture) > MAX_DRAWN or not whole:
+    size = png_size(picture)
+    if len(picture) > MAX_DRAWN or not size:
         raise RejectedError(f"picture: wanted a whole PNG of at most {MAX_DRAWN // 1024} KiB, got another")
-    size = struct.unpack_from(">II", picture, 16)
     if not 16 <= min(size) <= max(size) <= 512:
         raise RejectedError(f"picture: wanted 16 to 512 pixels each way, got {size[0]} × {size[1]}")
     kept = store.keep("picture.png", io.BytesIO(picture)).checksum
@@ -619,6 +618,17 @@ def read_thumbnail(path: Path) -> bytes | None:
     ):
         return None
     return data if data.startswith(PNG) and data[16:24] != ICON and len(data) <= MAX_THUMBNAIL else None
+
+
+def png_size(picture: bytes) -> tuple[int, int] | None:
+    """Return width and height of a PNG [pixels]; None if it is none, or its parts do not fill it."""
+    if not picture.startswith(PNG + PNG_HEAD) or not picture.endswith(PNG_END):
+        return None
+    place = len(PNG)
+    while place < len(picture) - len(PNG_END):
+        place += 12 + struct.unpack_from(">I", picture, place)[0]
+    width, height = struct.unpack_from(">II", picture, 16)
+    return (width, height) if place == len(picture) - len(PNG_END) and width and height else None
 
 
 def _directory_size(path: Path) -> int:

@@ -16,10 +16,11 @@ import csv
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import chain
+from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from silo.api.wire import LineTexts
@@ -54,6 +55,7 @@ from silo_server.services.items import (
     get_item,
 )
 from silo_server.services.releases import get_release
+from silo_server.services.revisions import png_size
 from silo_server.settings import wire
 from silo_server.values import Item, Line, dumps
 
@@ -87,6 +89,8 @@ _WIDTHS = {
     "Supplier": 20,
 }
 MOST_TOLD = 20
+# A column of workbooks alone. So many rows have one, each in so many pixels.
+PICTURE, MOST_PICTURED, PICTURED = "Picture", 2000, 48
 _SIGNS = re.compile(r"[^a-z0-9]+")
 PROPERTIES = {
     "Supplier": "supplier",
@@ -174,6 +178,7 @@ def export(
                 worth = frozen.worths[child] if frozen else worth
                 fields = {"Incomplete": said.incomplete or None if said else None}
                 fields["Open"] = ", ".join(each_bare.doubts) or None
+                fields[PICTURE] = part.thumbnail_key
                 yield (
                     _row(each_bare, part, amount, of_a_line=view is not View.FLAT)
                     | _values(worth, amount)
@@ -280,12 +285,17 @@ def _csv_cell(value: Any, semicolons: bool) -> Any:
     return safe_cell(value)
 
 
-def to_xlsx(made: Export, out: IO[bytes]) -> Callable[[], None]:
+def to_xlsx(made: Export, out: IO[bytes], picture: Callable[[str], Path] | None = None) -> Callable[[], None]:
     """Write a workbook with one sheet; texts are texts, whatever they begin with.
 
     Returns what packs it once all rows are read: that takes seconds, in which no transaction should wait.
+
+    picture
+        the file of a picture; with it the first rows show their part.
     """
     from xlsxwriter import Workbook
+
+    columns = [*made.columns[:2], PICTURE, *made.columns[2:]] if picture else made.columns
 
     with ExitStack() as kept:
         # Each row goes to the disk when the next one begins.
@@ -299,7 +309,7 @@ def to_xlsx(made: Export, out: IO[bytes]) -> Callable[[], None]:
         sheet.repeat_rows(head)
         sheet.set_landscape()
         sheet.fit_to_pages(1, 0)
-        for index, column in enumerate(made.columns):
+        for index, column in enumerate(columns):
             sheet.set_column(index, index, _WIDTHS.get(column, max(8, len(column) + 2)))
         bold, warning = (
             book.add_format({"bold": True}),
@@ -314,16 +324,27 @@ def to_xlsx(made: Export, out: IO[bytes]) -> Callable[[], None]:
 
         for place, note in enumerate(made.notes):
             write(place, 0, note, warning)
-        for index, column in enumerate(made.columns):
+        for index, column in enumerate(columns):
             write(head, index, column, bold)
-        last, places = head, [(n, column, formats.get(column)) for n, column in enumerate(made.columns)]
+        last, places = head, [(n, column, formats.get(column)) for n, column in enumerate(columns)]
+
+        def show(row: int, path: Path) -> None:
+            with suppress(OSError):
+                if size := png_size(path.read_bytes()):
+                    scale = (PICTURED - 4) / max(size)
+                    sheet.set_row_pixels(row, PICTURED)
+                    place = {"x_scale": scale, "y_scale": scale, "x_offset": 2, "y_offset": 2}
+                    sheet.insert_image(row, 2, str(path), place | {"object_position": 1})
+
         for last, row in enumerate(made.rows, start=head + 1):
+            if picture and (key := row.pop(PICTURE, None)) and last - head <= MOST_PICTURED:
+                show(last, picture(key))
             for index, column, form in places:
                 if isinstance(value := row.get(column), str):
                     write(last, index, value)
                 elif value is not None:
                     sheet.write_number(last, index, value, form)
-        sheet.autofilter(head, 0, last, len(made.columns) - 1)
+        sheet.autofilter(head, 0, last, len(columns) - 1)
         packing = kept.pop_all()
 
     def pack() -> None:
