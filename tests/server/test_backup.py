@@ -278,7 +278,7 @@ def test_a_damaged_backup_is_refused_before_anything_is_touched(saved: Path, tmp
     next(path for path in (damaged / "files").rglob("*") if path.is_file()).unlink()
     refused("1 files of the backup are missing or damaged")
     (damaged / "manifest.json").write_text("{}")
-    refused("is no backup")
+    refused("is not a backup")
     manifest = json.loads((damaged / "manifest.json").read_text())
     (damaged / "manifest.json").write_text(json.dumps({**manifest, "format": 2}))
     refused("use a newer one")
