@@ -684,7 +684,7 @@ def _element(tag: str, text: str) -> str:
 def _list(sections: Iterable[tuple[str, Sequence[str]]]) -> str:
     text = ""
     for line, more in sections:
-        below = _list([(each_text, []) for each_text in more]) if more else ""
+        below = _list([(phrase, []) for phrase in more]) if more else ""
         text += f"<li>{escape(_clean(line))}{below}</li>"
     return f"<ul>{text}</ul>"
 

@@ -209,11 +209,11 @@ class Project:
     def files(self) -> dict[str, ProjectEntry]:
         """Return what is remembered of each file, by place."""
         files_noted = read_memory(Path(self.root, PROJECT_FILE)).get("files")
-        names = {each_field.name for each_field in fields(ProjectEntry)}
+        names = {field.name for field in fields(ProjectEntry)}
         return {
-            str(place): ProjectEntry(**{key: str(value) for key, value in each_field.items() if key in names})
-            for place, each_field in (files_noted.items() if isinstance(files_noted, dict) else ())
-            if isinstance(each_field, dict) and each_field.get("document")
+            str(place): ProjectEntry(**{key: str(value) for key, value in field.items() if key in names})
+            for place, field in (files_noted.items() if isinstance(files_noted, dict) else ())
+            if isinstance(field, dict) and field.get("document")
         }
 
     def note(self, noted: Mapping[str, ProjectEntry | None]) -> None:

@@ -656,7 +656,7 @@ class FakeSilo(FakeStore):
         if now is None:
             raise NotFoundError(f"{self.base_url} has no document {uuid}")
         files = self._files()
-        links = {key: self._targets(each_stored) for key, each_stored in files.items()}
+        links = {key: self._targets(other) for key, other in files.items()}
         linked = [self._document_of(files[link]) for link in links[stored.item.id] if link in files]
         users = [self._document_of(files[key]) for key, targets in links.items() if stored.item.id in targets]
         newest = next(revision for revision in reversed(stored.revisions) if revision.file_checksum)

@@ -376,9 +376,7 @@ class ItemCalls(FileCalls):
         # A server that does not search by content finds nothing; what has the name is compared anyway.
         with_file = self.search_items(digest, limit=4) if digest else []
         matches = []
-        for item in {
-            each_item.id: each_item for each_item in (*with_file, *self.search_items(name, limit=8))
-        }.values():
+        for item in {part.id: part for part in (*with_file, *self.search_items(name, limit=8))}.values():
             same_file = bool(digest) and digest in self._checksums(item)
             if same_file or name_key(item.name) == name_key(name):
                 matches.append(

@@ -223,7 +223,7 @@ def find_arrived(
     :class:`MayHaveArrivedError` where even that says nothing: a person looks before it is sent a second time.
     """
     doubtful: list[Revision] = []
-    for revision in sorted(revisions, key=lambda each_revision: each_revision.revision_number):
+    for revision in sorted(revisions, key=lambda other: other.revision_number):
         if revision.revision_number <= sent.base:
             continue
         if checksum := checksum_of(revision):

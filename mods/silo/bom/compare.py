@@ -163,9 +163,7 @@ def diff_bom(
             assembly_lines.append(line)
     units = {line.part_number: line.unit for line in manual_components}
     diff = _compare(local, _summed(assembly_lines), _summed(manual_lines), _summed(manual_components), units)
-    lines = _summed(
-        _Line(each_line["child_part_number"], as_number(each_line.get("quantity"))) for each_line in kept
-    )
+    lines = _summed(_Line(other["child_part_number"], as_number(other.get("quantity"))) for other in kept)
     return replace(diff, kept=tuple(BomChange(number, quantity) for number, quantity in lines.items()))
 
 

@@ -168,7 +168,7 @@ def why(
         entry = walker.entry_for(count.target)
         names = (entry.object_name, entry.label, entry.document_label, entry.standard or "")
         line_number.update(names)
-        if not (meant := [each_part for each_part in (entry.key, *names) if each_part in parts]):
+        if not (meant := [piece for piece in (entry.key, *names) if piece in parts]):
             continue
         part = meant[0] if isinstance(meant[0], str) else entry.standard or display_name(entry)
         total += count.quantity
@@ -176,7 +176,7 @@ def why(
             steps = [f"{label_of(obj)} × {times}" if times > 1 else label_of(obj) for obj, times in way]
             lines.append(" → ".join(["beside the assembly"] * count.beside + steps))
     if not lines:
-        wanted = next((each_part for each_part in parts if isinstance(each_part, str)), "This line")
+        wanted = next((piece for piece in parts if isinstance(piece, str)), "This line")
         meant_by = did_you_mean(wanted, sorted(line_number - {""})) or "."
         raise InputError(f"{wanted!r} is not a part of {label_of(assembly_obj)} itself{meant_by}")
     return [f"{total} × {part} in {label_of(assembly_obj)}:", *lines]

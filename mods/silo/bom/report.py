@@ -407,7 +407,7 @@ def remembered(
         )
     for number in kept:
         mine = fields_by_key.setdefault(number, [])
-        mine += [dict(each_fields) for each_fields in before.get(number, ()) if each_fields not in mine]
+        mine += [dict(fields) for fields in before.get(number, ()) if fields not in mine]
     return {number: components for number, components in fields_by_key.items() if components}
 
 

@@ -433,7 +433,7 @@ class Reading:
             return ObjectRole.LEFT_OUT, None
         if kind in INLINE and name not in self._wholes and not self._is_closed(obj, kind):
             return ObjectRole.HOLDER, None
-        if any(each_name in self._shown and not tree.visible(each_name) for each_name in around):
+        if any(label in self._shown and not tree.visible(label) for label in around):
             return ObjectRole.SOURCE, None
         node = self._node(name, obj, kind)
         if node is None or not node.worth:

@@ -80,9 +80,7 @@ class _Lying:
 
     def around(self, name: str) -> Iterator[tuple[Any, Kind]]:
         """Return all containers and folders around an object, at any distance, the nearest first."""
-        return (
-            self._holders[upper] for upper in climbed(name, lambda each_name: self._above.get(each_name, ()))
-        )
+        return (self._holders[upper] for upper in climbed(name, lambda label: self._above.get(label, ())))
 
     def is_inner(self, name: str) -> bool:
         """Return True for what lies in a container, also through folders, and for the copies that one
@@ -96,15 +94,14 @@ class _Lying:
         """Return True for what a folder keeps for later; of visible standard parts only Assembly4's folders
         do.
         """
-        around = {object_name(each_obj).rstrip("0123456789") for each_obj, _ in self.around(object_name(obj))}
+        around = {object_name(member).rstrip("0123456789") for member, _ in self.around(object_name(obj))}
         bought = kind_of(obj) is Kind.STANDARD and self.is_visible(obj)
         return bool(around.intersection(_SPARES) if bought else around)
 
     def is_visible(self, obj: Any) -> bool:
         """Return True for what is visible itself and lies in visible containers."""
         return all(
-            is_switched_on(each_obj)
-            for each_obj in (obj, *(outer for outer, _ in self.around(object_name(obj))))
+            is_switched_on(member) for member in (obj, *(outer for outer, _ in self.around(object_name(obj))))
         )
 
     def loose(self, kinds: frozenset[Kind]) -> list[Any]:
@@ -119,13 +116,13 @@ def _holders(survey: Survey) -> tuple[dict[str, tuple[Any, Kind]], dict[str, tup
     holders: dict[str, tuple[Any, Kind]] = {}
     above: dict[str, tuple[str, ...]] = {}
     for obj, kind in survey.of(_CONTAINERS | {Kind.FOLDER}):
-        listed = [each_name for name in ("Group", "ElementList") for each_name in own(obj, name) or ()]
+        listed = [label for name in ("Group", "ElementList") for label in own(obj, name) or ()]
         if kind is Kind.CONTAINER and is_assembly3(obj):
-            listed += [each_name for group in listed for each_name in own(group, "Group") or ()]
+            listed += [label for group in listed for label in own(group, "Group") or ()]
         holders[name := object_name(obj)] = (obj, kind)
         alone = (name,)  # one tuple for all that lie in this holder only
-        for each_name in map(object_name, listed):
-            above[each_name] = (*above[each_name], name) if each_name in above else alone
+        for label in map(object_name, listed):
+            above[label] = (*above[label], name) if label in above else alone
     return holders, above
 
 
@@ -145,7 +142,7 @@ def _holds(container: Any, reader: Reader) -> int:
     """Return 2 for components of other files, 1 for standard or declared parts only, 0 for neither."""
     hardware, shows_others = False, False
     for obj in climbed(
-        container, lambda each_obj: members(each_obj) if each_obj is container or _is_walked(each_obj) else ()
+        container, lambda member: members(member) if member is container or _is_walked(member) else ()
     ):
         kind = kind_of(obj)
         if kind in COMPONENTS:

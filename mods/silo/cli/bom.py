@@ -164,7 +164,7 @@ def _show_each(args: argparse.Namespace) -> int:
             (extraction_of_top, base_of(extraction_of_top)) for extraction_of_top in common.read_tops(args)
         ]
     if args.json:
-        common.print_json({"assemblies": [bom_json(*each_top) for each_top in tops], "errors": errors})
+        common.print_json({"assemblies": [bom_json(*root) for root in tops], "errors": errors})
     for extraction, base in tops if not args.json else ():
         out.print(show.bom_tree(extraction, base))
         if extraction.findings:
@@ -304,7 +304,7 @@ def run_where_used(args: argparse.Namespace) -> int:
             for used in answer.known.links:
                 users.setdefault(used, set()).add(top)
     if part not in users and not os.path.lexists(part):
-        relative_paths = {relative(each_path, base) for each_path in (*tops, *users)}
+        relative_paths = {relative(place, base) for place in (*tops, *users)}
         meant = did_you_mean(relative(part, base), sorted(relative_paths)) or "."
         raise InputError(f"{args.part}: there is no such file, and none in {args.root} links to one{meant}")
     above = _above(part, users)
@@ -444,9 +444,7 @@ def run_diff(args: argparse.Namespace) -> int:
         chosen = list(assemblies(whole)) if args.recursive else [whole]
         lines = [server_lines(resolved, client) for resolved in chosen]
         whole = suggest_by_identity(whole, list(zip(chosen, lines, strict=True)))
-    compared = [
-        (resolved, resolved.diff(each_lines)) for resolved, each_lines in zip(chosen, lines, strict=True)
-    ]
+    compared = [(resolved, resolved.diff(rows)) for resolved, rows in zip(chosen, lines, strict=True)]
     base = base_of(extraction)
     drifted = bool(whole.unresolved or whole.assembly.part_number is None) or any(
         diff.drifted or (blocking(resolved) and not args.allow_missing) for resolved, diff in compared

@@ -304,12 +304,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         kept.flush()
     finally:
         sys.stdout, sys.stderr = output, errors
-        for each_output in (
+        for target in (
             kept,
             main_output,
         ):  # else each is when it is collected, and its stream may be closed by then
             with suppress(OSError, ValueError):
-                each_output.close()
+                target.close()
     if kept.failure is None or isinstance(kept.failure, BrokenPipeError):
         return code
     return max(code, _failed(_system_said_no(kept.failure), ()))

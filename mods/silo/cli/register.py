@@ -430,7 +430,7 @@ class _RegisterRun:
             return Exit.DONE
         with replacing(Path(self.args.plan)) as file:
             file.write(table)
-        count = sum(not each_candidate.decided for each_candidate in self.found.candidates)
+        count = sum(not component.decided for component in self.found.candidates)
         print(
             f"{self.args.plan}: {counted(count, 'row')}. Edit it, then: "
             f"silo-mod register {shlex.quote(self.args.top)} --apply {shlex.quote(self.args.plan)}",

@@ -298,7 +298,7 @@ def run_queue(args: argparse.Namespace) -> int:
         raise InputError(f"queue {args.do}: which commit? Give the number that `silo-mod queue` shows")
     stopped = _retry(args, store, here) if args.do == "retry" else None
     for number in args.numbers:
-        entry = next((each_entry for each_entry in store.entries() if each_entry.id == number), None)
+        entry = next((pending for pending in store.entries() if pending.id == number), None)
         if entry is None:
             if args.do != "retry":
                 raise InputError(f"there is no commit {number} in the queue; `silo-mod queue` lists them")
@@ -345,23 +345,23 @@ def _show_queue(
     from silo.cli import show
     from silo.outbox.entry import parts, pause_text, words
 
-    queue_rows = [(each_entry, words(each_entry, here, is_paused=pause is not None)) for each_entry in left]
+    queue_rows = [(pending, words(pending, here, is_paused=pause is not None)) for pending in left]
     notice = pause_text(pause, here, now) if pause is not None else ""
     if args.json:
         rows = [
             {
-                "number": each_entry.id,
-                "part_number": each_entry.part_number,
-                "label": each_entry.label,
-                "path": each_entry.path,
-                "what": parts(each_entry),
+                "number": pending.id,
+                "part_number": pending.part_number,
+                "label": pending.label,
+                "path": pending.path,
+                "what": parts(pending),
                 "state": said.state,
                 "reason": said.reason,
-                "since": each_entry.taken_at,
-                "server": each_entry.server,
+                "since": pending.taken_at,
+                "server": pending.server,
                 "needs_a_person": said.urgent,
             }
-            for each_entry, said in queue_rows
+            for pending, said in queue_rows
         ]
         common.print_json({"pause": notice or None, "commits": rows})
         return

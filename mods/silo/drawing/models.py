@@ -294,8 +294,8 @@ class Looks:
     def of_faces(self, obj: Any, count: int) -> list[Rgba]:
         """Return the colour of each face of an object's shape."""
         tip = own(obj, "Tip") if derived(obj, "PartDesign::Body") else None
-        for each_obj in (tip, obj):
-            if each_obj is not None and (colours := self._listed(each_obj)):
+        for member in (tip, obj):
+            if member is not None and (colours := self._listed(member)):
                 return colours if len(colours) == count else [colours[0]] * count
         return [GREY] * count
 
@@ -404,7 +404,7 @@ def _picture(walk: FileWalk, key: str, leaf: Leaf, drawer: Drawer, unpacked: Unp
         problems.append(f"{counted(lost, 'face')} could not be drawn")
     whole = {colour: joined(meshes) for colour, meshes in groups.items()}
     return Picture(
-        {colour: welded(each_mesh.vertices, each_mesh.faces) for colour, each_mesh in whole.items()},
+        {colour: welded(surface.vertices, surface.faces) for colour, surface in whole.items()},
         "; ".join(problems),
     )
 
@@ -454,12 +454,8 @@ def _glb(pictures: Mapping[str, Picture], drawer: Drawer) -> bytes:
     """Return all products as one file. Numbers are bounded by the largest product; the file's box needs no
     walk.
     """
-    boxes = {
-        key: joined(list(each_picture.groups.values()))
-        for key, each_picture in pictures.items()
-        if each_picture.groups
-    }
-    sizes = {key: float(np.linalg.norm(each_picture.extents)) for key, each_picture in boxes.items()}
+    boxes = {key: joined(list(image.groups.values())) for key, image in pictures.items() if image.groups}
+    sizes = {key: float(np.linalg.norm(image.extents)) for key, image in boxes.items()}
     most = LOST * max(sizes.values(), default=0.0)
     glb = Glb()
     for key, picture in pictures.items():
@@ -583,12 +579,12 @@ def send_models(
         lacking = client.lacking_models(wanted)
     except SiloError:
         return 0, []  # a Silo without models, or one that cannot be reached now
-    todo = [(wanted[each_path], each_path) for each_path in sorted(lacking, key=lambda one: str(wanted[one]))]
+    todo = [(wanted[place], place) for place in sorted(lacking, key=lambda one: str(wanted[one]))]
     sent, problems, left = 0, list[str](), len(todo)
     at(f"drawing {counted(left, 'file')}")
     # FreeCAD's window is not kept waiting by work of ours.
-    shapes = todo if command else [each_path for each_path in todo if _has_shapes(each_path[0])]
-    bare = ((*each_path, _drawn_here(*each_path)) for each_path in todo if each_path not in shapes)
+    shapes = todo if command else [place for place in todo if _has_shapes(place[0])]
+    bare = ((*place, _drawn_here(*place)) for place in todo if place not in shapes)
     for path, sha256, model in chain(bare, _drawn(shapes, command, cancelled, problems)):
         at(f"sending models, {counted(left, 'file')} left")
         left -= 1

@@ -446,7 +446,7 @@ def _edited(
         if object_name not in data:
             raise Malformed(f"has no data of the object {object_name!r}")
         edits.append((data[object_name], lambda element: _with_all(element, properties, depth_limit)))
-    for (begin, end), edit in sorted(edits, key=lambda each_edit: each_edit[0], reverse=True):
+    for (begin, end), edit in sorted(edits, key=lambda change: change[0], reverse=True):
         text = text[:begin] + edit(text[begin:end]) + text[end:]
     return text
 

@@ -280,7 +280,7 @@ CREATE TABLE known (
 """
 
 # All but what may be large.
-_COLUMNS = ", ".join(each_field.name for each_field in fields(Entry) if each_field.name != "superseded")
+_COLUMNS = ", ".join(field.name for field in fields(Entry) if field.name != "superseded")
 SELECT = f"""SELECT {_COLUMNS}, EXISTS (
     SELECT 1 FROM sent s WHERE s.server = e.server AND s.item IN (e.identity, e.part_number) AND s.item <> ''
     AND s.entry_id > e.id AND (s.kind = 'file' AND e.file_left OR s.kind = 'bom' AND e.bom_left)

@@ -471,8 +471,7 @@ class _SendRun:
             for content in (made_from, checksum_of(newest))
         )
         before = any(
-            each_entry.newer.get("set_back") and each_entry.item == entry.item
-            for each_entry in self.store.entries()
+            pending.newer.get("set_back") and pending.item == entry.item for pending in self.store.entries()
         )
         if older == newest.revision_number and (before or (base is not None and base > older)):
             raise NewerRevisionError(

@@ -285,8 +285,8 @@ class QueueDatabase:
                 else:
                     replace_patiently(self.copies / name, self.aside(name))
                     lost.setdefault(key, "")
-        for each_row in sorted(described, key=lambda one: int(one["id"])):
-            _insert(db, "entry", each_row)
+        for record in sorted(described, key=lambda one: int(one["id"])):
+            _insert(db, "entry", record)
         for table, rows in (old or {}).items():
             for before in rows:
                 if table != "entry" or before.get("key") not in {None, *gone}:
@@ -786,7 +786,7 @@ class Store(FileOrigins):
         with suppress(OSError):
             # The mark that it has ended goes last: a copy alone would be taken for a lost commit.
             names = [name for name in os.listdir(self.copies) if _key_of(name) == key]
-            for name in sorted(names, key=lambda each_name: each_name.endswith(".gone")):
+            for name in sorted(names, key=lambda label: label.endswith(".gone")):
                 remove_patiently(self.copies / name)
 
     def _entry_where(self, where: str, *values: Any) -> Entry | None:

@@ -233,11 +233,7 @@ class CandidateFiles:
         """Return the first candidate with the same content in another file."""
         same = self._by_sha256.get(candidate.sha256, ()) if candidate.sha256 else ()
         return next(
-            (
-                each_candidate
-                for each_candidate in same
-                if each_candidate.entry.doc_path != candidate.entry.doc_path
-            ),
+            (component for component in same if component.entry.doc_path != candidate.entry.doc_path),
             None,
         )
 
@@ -334,8 +330,7 @@ def offer(
         contents.add(candidate)
     twins = [(candidate, contents.twin(candidate)) for candidate in looked]
     with_twins = tuple(
-        replace(each_candidate, twin=twin.proposal.name) if twin else each_candidate
-        for each_candidate, twin in twins
+        replace(component, twin=twin.proposal.name) if twin else component for component, twin in twins
     )
     recent = tuple(code for code in learnt.recent if code in categories)
     return Offer(with_twins, categories, numbers_next, registered, unsearched, recent)
@@ -477,9 +472,9 @@ def _with_look_alikes(
     """Return the candidates with what they may be already; why nobody knows, where the server did not say."""
     # An item of a standard part's designation is joined, no matter who made it.
     asked = [
-        each_candidate
-        for each_candidate in candidates[:most]
-        if not each_candidate.entry.is_standard and not each_candidate.decided
+        component
+        for component in candidates[:most]
+        if not component.entry.is_standard and not component.decided
     ]
     look_alikes: dict[tuple[str, str], list[Any]] = {}
     try:
@@ -487,7 +482,7 @@ def _with_look_alikes(
             some = asked[start : start + _IN_ONE]
             control.check()
             control.progress(some[0].proposal.name, start / len(asked))
-            look_alikes |= api.find_look_alikes(_searched(each_candidate) for each_candidate in some)
+            look_alikes |= api.find_look_alikes(_searched(component) for component in some)
     except CancelledError:
         raise
     except SiloError as error:
@@ -502,12 +497,10 @@ def _with_look_alikes(
             if like.part_number != candidate.same_as and like.id != own
         )
 
-    looked = {id(each_candidate) for each_candidate in asked}
+    looked = {id(component) for component in asked}
     return [
-        replace(each_candidate, similar=of(each_candidate))
-        if id(each_candidate) in looked
-        else each_candidate
-        for each_candidate in candidates
+        replace(component, similar=of(component)) if id(component) in looked else component
+        for component in candidates
     ], ""
 
 

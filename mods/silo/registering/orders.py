@@ -618,9 +618,7 @@ def orders_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name:
     registered.
     """
     candidates = {
-        key_of(each_candidate, base): each_candidate
-        for each_candidate in offer.candidates
-        if not each_candidate.decided
+        key_of(component, base): component for component in offer.candidates if not component.decided
     }
     registered = {(relative(path, base), obj): number for (path, obj), number in offer.registered.items()}
     counts = Counter(row.key for row in rows)
@@ -651,9 +649,9 @@ def orders_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name:
         raise InputError(f"{name}: nothing was registered, because some rows have problems", problems)
     listed = {row.key for row in rows}
     unlisted = tuple(
-        each_candidate
-        for key, each_candidate in candidates.items()
-        if key not in listed and each_candidate.article is None and not each_candidate.same_as
+        component
+        for key, component in candidates.items()
+        if key not in listed and component.article is None and not component.same_as
     )
     return Planned(tuple(order for order in orders if order is not None), done, unlisted)
 

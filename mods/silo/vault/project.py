@@ -226,7 +226,7 @@ def _reached(
         entered.add(top)
         while stack:
             path, below = stack[-1]
-            following = next((each_path for each_path in below if each_path not in entered), None)
+            following = next((source for source in below if source not in entered), None)
             if following is None:
                 stack.pop()
                 order.append(path)

@@ -214,9 +214,7 @@ class _Fetch:
         holder = self.holder(item)
         revisions = self.revisions(holder)
         wanted = (
-            revisions
-            if number is None
-            else [each_revision for each_revision in revisions if each_revision.revision_number == number]
+            revisions if number is None else [other for other in revisions if other.revision_number == number]
         )
         if self.release is not None:
             wanted = list(filter(None, [self.frozen(holder)]))
@@ -507,9 +505,7 @@ def lay_out(files: Iterable[tuple[str, str | None]]) -> list[str]:
     files
         (position, ``file_path`` of the revision); the paths name folders that the positions only step out of.
     """
-    split = [
-        (*_ups(position), (each_place or "").replace("\\", "/").split("/")) for position, each_place in files
-    ]
+    split = [(*_ups(position), (spot or "").replace("\\", "/").split("/")) for position, spot in files]
     most = max((ups for ups, _, _ in split), default=0)
     # names[n]: the folder n steps above the top file's own.
     names: dict[int, str] = {}
@@ -521,8 +517,8 @@ def lay_out(files: Iterable[tuple[str, str | None]]) -> list[str]:
     above_top = [names.get(step, "folder") for step in range(most)]
     places = ["/".join([*reversed(above_top[ups:]), *parts]) for ups, parts, _ in split]
     # A link may spell a name in another way than its file does.
-    spelt = [("/".join(each_place), place) for (_, _, each_place), place in zip(split, places, strict=True)]
-    return [each_place if folded(each_place) == folded(place) else place for each_place, place in spelt]
+    spelt = [("/".join(spot), place) for (_, _, spot), place in zip(split, places, strict=True)]
+    return [spot if folded(spot) == folded(place) else place for spot, place in spelt]
 
 
 def _ups(position: str) -> tuple[int, list[str]]:
@@ -541,11 +537,7 @@ def _anchor(tree: FileTree, places: Sequence[str], into: Path) -> Path:
         return into
     with Library() as library:
         item = top.item.lower()
-        paths = [
-            each_path
-            for each_path in into.rglob(name)
-            if identity_in(library, str(each_path)).lower() == item
-        ]
+        paths = [source for source in into.rglob(name) if identity_in(library, str(source)).lower() == item]
     if len(paths) != 1:
         return into
     base = paths[0]

@@ -399,7 +399,7 @@ def _made_before(tx: Tx, user_id: int, secret: str) -> Token | None:
     token_id = tx.conn.scalar(select(api_tokens.c.id).where(api_tokens.c.token_hash == hashed))
     if token_id is None:
         return None
-    token = next(each_token for each_token in list_tokens(tx, user_id) if each_token.id == token_id)
+    token = next(other for other in list_tokens(tx, user_id) if other.id == token_id)
     if token.revoked_at or token.created_at < stamp(tx.at - timedelta(seconds=REPEAT_SECONDS)):
         raise ConflictError(f"this form made the token {token.name} before; its secret was shown once")
     return token

@@ -300,7 +300,7 @@ def _ids_of(tx: Tx, items_by_id: Mapping[int, Item]) -> dict[int, int]:
     product.
     """
     query = select(items.c.uuid, items.c.id).where(
-        one_of(tx, items.c.uuid, {each_item.uuid for each_item in items_by_id.values()})
+        one_of(tx, items.c.uuid, {part.uuid for part in items_by_id.values()})
     )
     there = dict(tx.conn.execute(query).all())
     return {number: there[item.uuid] for number, item in items_by_id.items() if item.uuid in there}

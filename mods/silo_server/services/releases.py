@@ -114,7 +114,7 @@ def list_releases(tx: Tx, item: Item) -> list[Release]:
     """Return all that was ever submitted of an item, newest first."""
     row = releases.c
     result = tx.conn.execute(select(releases).where(row.item_id == item.id).order_by(row.id.desc()))
-    return [_release(each_row) for each_row in result]
+    return [_release(record) for record in result]
 
 
 def _release(row: Any) -> Release:
@@ -134,9 +134,7 @@ def get_release(tx: Tx, item: Item, label: str) -> Release:
     """Return the revision with this label. Raises NotFoundError."""
     release = find_release(tx, item, label)
     if release is None:
-        there = ", ".join(
-            each_release.label for each_release in list_releases(tx, item) if each_release.status in NUMBERED
-        )
+        there = ", ".join(other.label for other in list_releases(tx, item) if other.status in NUMBERED)
         raise NotFoundError(f"{item.part_number} has no revision {label!r}; there is {there or 'none yet'}")
     return release
 
@@ -145,7 +143,7 @@ def approvals_of(tx: Tx, release: Release) -> list[Approval]:
     """Return who approved, in order."""
     row = release_approvals.c
     query = select(release_approvals).where(row.release_id == release.id).order_by(row.at)
-    return [from_row(Approval, each_row) for each_row in tx.conn.execute(query)]
+    return [from_row(Approval, record) for record in tx.conn.execute(query)]
 
 
 def newest_release(tx: Tx, item: Item) -> Release | None:
@@ -226,12 +224,12 @@ def submit(
     """Put a frozen product up for review. Raises ConflictError if one is in review or the label is taken."""
     item = get_item(tx, part_number, lock=True)
     before = list_releases(tx, item)
-    if waiting := next((each_release for each_release in before if each_release.status == "review"), None):
+    if waiting := next((other for other in before if other.status == "review"), None):
         raise ConflictError(
             f"revision {waiting.label} of {item.part_number} is in review since {waiting.frozen_at[:10]}; "
             "release, reject or withdraw it first"
         )
-    taken = [each_release.label for each_release in before if each_release.status in NUMBERED]
+    taken = [other.label for other in before if other.status in NUMBERED]
     label = label or next_label(taken, tx.settings.release_labels)
     if not re.fullmatch(RELEASE_LABEL, label, re.ASCII):
         raise RejectedError(
@@ -291,7 +289,7 @@ def approve(tx: Tx, part_number: str, label: str, comment: str, override: str = 
     if blocks and not tx.settings.release_override:
         raise ForbiddenError("this server releases nothing that is blocked (SILO_RELEASE_OVERRIDE)")
     given = approvals_of(tx, release)
-    if tx.actor.username in {each_approval.username for each_approval in given}:
+    if tx.actor.username in {other.username for other in given}:
         raise ConflictError(f"you approved revision {label} already; {_approvals_text(tx, len(given))}")
     approval = {"release_id": release.id, "username": tx.actor.username, "at": tx.stamp, "comment": comment}
     tx.conn.execute(insert(release_approvals).values(approval))
@@ -344,7 +342,7 @@ def end(tx: Tx, part_number: str, label: str, status: str, note: str) -> Release
     ended = {"ended_at": tx.stamp, "ended_by": tx.actor.username} if status != "obsolete" else {}
     _change(tx, release, status=status, note=note, **ended)
     _announce(tx, item, release, status)
-    return next(each_release for each_release in list_releases(tx, item) if each_release.id == release.id)
+    return next(other for other in list_releases(tx, item) if other.id == release.id)
 
 
 def _in_review(tx: Tx, part_number: str, label: str) -> tuple[Item, Release]:
@@ -394,16 +392,14 @@ def read_records(tx: Tx, record: str) -> dict[str, dict[str, Any]]:
     while level:
         row = frozen_items.c
         rows = tx.conn.execute(select(frozen_items).where(one_of(tx, row.hash, level)).order_by(row.hash))
-        read = {each_record.hash: json.loads(each_record.record) for each_record in rows}
+        read = {entry.hash: json.loads(entry.record) for entry in rows}
         records |= read
-        lines += sum(len(each_record["lines"]) for each_record in read.values())
+        lines += sum(len(entry["lines"]) for entry in read.values())
         if lines > tx.settings.max_expanded_rows:
             raise TooLargeError(
                 f"this revision has more than {tx.settings.max_expanded_rows} lines; look at one of its parts"
             )
         level = (
-            {line["child"] for each_record in read.values() for line in each_record["lines"]}
-            - records.keys()
-            - {None}
+            {line["child"] for entry in read.values() for line in entry["lines"]} - records.keys() - {None}
         )
     return records

@@ -118,16 +118,13 @@ def note_revision(
         {"document_id": document.id, "target": target} for target in targets if target and len(target) <= 36
     ]
     insert_rows(tx, document_links, rows)
-    objects = {(each_document["item"].lower(), each_document.get("object", "")) for each_document in held}
+    objects = {(holder["item"].lower(), holder.get("object", "")) for holder in held}
     where = select(items.c.uuid, items.c.id).where(one_of(tx, items.c.uuid, {uuid for uuid, _ in objects}))
     ids = {row.uuid: row.id for row in tx.conn.execute(where)}
     pairs = {(ids[uuid], name) for uuid, name in objects if uuid in ids}
     if document.item_id is not None and document.item_id not in {item for item, _ in pairs}:
         pairs.add((document.item_id, ""))
-    rows = [
-        {"document_id": document.id, "item_id": each_document, "object": name}
-        for each_document, name in sorted(pairs)
-    ]
+    rows = [{"document_id": document.id, "item_id": holder, "object": name} for holder, name in sorted(pairs)]
     insert_rows(tx, document_items, rows)
     # What a browser drew of an older file is out of date; the picture of an item's own file stays.
     with_picture = (revisions.c.item_id == items.c.id) & (revisions.c.thumbnail_key == items.c.thumbnail_key)
@@ -180,7 +177,7 @@ def documents_by_uuid(tx: Tx, wanted: Sequence[str]) -> list[Document]:
 
 def shown(tx: Tx, several: Sequence[Document]) -> list[ShownDocument]:
     """Return documents as they are now, in the order given; one without a file yet is left out."""
-    ids = [each_document.id for each_document in several]
+    ids = [holder.id for holder in several]
     newest = (
         select(documents.c.id.label("of"), documents.c.uuid, items.c.part_number, revisions)
         .join(revisions, revisions.c.document_id == documents.c.id)

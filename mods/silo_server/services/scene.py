@@ -145,9 +145,7 @@ def check_structure(body: bytes) -> wire.Structure:
     uses = [use for product in structure.products.values() for use in product.uses]
     if len(uses) > MAX_USES:
         raise RejectedError(f"structure: wanted at most {MAX_USES} uses, got {len(uses)}")
-    texts = [
-        part for each_use in uses for part in (each_use.member, each_use.file, each_use.target, each_use.uuid)
-    ]
+    texts = [part for usage in uses for part in (usage.member, usage.file, usage.target, usage.uuid)]
     texts += [
         part
         for key, model_product in structure.products.items()
@@ -158,15 +156,11 @@ def check_structure(body: bytes) -> wire.Structure:
         for model_product in structure.products.values()
         if model_product.stated is not None
     ]
-    texts += [text for each_use in stated for text in (each_use.material, each_use.description) if text]
+    texts += [text for usage in stated for text in (usage.material, usage.description) if text]
     if problem := character_problem("".join([*texts, *structure.roots])):
         raise RejectedError(f"structure: {problem}")
     lost = [key for key in structure.roots if key not in structure.products]
-    lost += [
-        each_use.target
-        for each_use in uses
-        if not each_use.file and each_use.target not in structure.products
-    ]
+    lost += [usage.target for usage in uses if not usage.file and usage.target not in structure.products]
     if lost:
         raise RejectedError(f"structure: wanted a product for each key, got none for {lost[0]!r}")
     return structure

@@ -152,9 +152,7 @@ def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) ->
     in_base = None if cost is None or rate is None else exact_product((cost, rate))
     larger = {part.amount(least) for least, _ in part.prices if least > amount}
     cheaper = [
-        (more, each_rate)
-        for each_rate in larger
-        if (more := cost_of(each_rate)) is not None and more < (cost or 0)
+        (more, other) for other in larger if (more := cost_of(other)) is not None and more < (cost or 0)
     ]
     best = min(cheaper, default=None)
     return SupplierOffer(part, amount, price, cost, in_base, best and (best[1], best[0]))
@@ -371,7 +369,7 @@ def supplier_changes_of(tx: Tx, item: Item, limit: int = 20) -> list[SupplierCha
     """Return the newest changes of an item's list, newest first."""
     row = supplier_changes.c
     query = select(supplier_changes).where(row.item_id == item.id).order_by(row.id.desc()).limit(limit)
-    return [from_row(SupplierChange, each_row) for each_row in tx.conn.execute(query)]
+    return [from_row(SupplierChange, record) for record in tx.conn.execute(query)]
 
 
 def list_version(tx: Tx, item: Item) -> int:
@@ -448,8 +446,7 @@ def plan_suppliers(tx: Tx, records: Sequence[Record], layout: Layout) -> list[Im
     new one; those that the file does not name stay. Rows of one with another "from quantity" are its prices.
     """
     records = [
-        (row, {_CELLS.get(name, name): text for name, text in each_record.items()})
-        for row, each_record in records
+        (row, {_CELLS.get(name, name): text for name, text in entry.items()}) for row, entry in records
     ]
     numbers = ("prices", "pack_size", "minimum", "from")
     texts = [record.get(name, "") for _, record in records for name in numbers]
@@ -555,10 +552,8 @@ def set_rates(tx: Tx, own: str, texts: Iterable[tuple[str, str]]) -> dict[str, D
             problems.append(f"{currency}: {reading.problem or f'wanted a rate above 0, got {text!r}'}")
         else:
             rates[currency] = reading.value
-    wrong = [each_currency for each_currency in rates if not re.fullmatch("[A-Z]{3}", each_currency)]
-    problems += [
-        f"Currency: wanted three letters such as EUR, got {each_currency[:20]!r}" for each_currency in wrong
-    ]
+    wrong = [other for other in rates if not re.fullmatch("[A-Z]{3}", other)]
+    problems += [f"Currency: wanted three letters such as EUR, got {other[:20]!r}" for other in wrong]
     if problems:
         raise RejectedError("; ".join(problems), problems)
     rate_texts = {currency: decimal_text(rate) for currency, rate in rates.items()}

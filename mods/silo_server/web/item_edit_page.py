@@ -237,7 +237,7 @@ def property_text(value: Any) -> str:
 
 def shown_properties(item: Item) -> list[tuple[str, str, str]]:
     """Return (label, text, unit) of an item's properties: those of the schema first, in its order."""
-    fields = {each_field.name: each_field for each_field in find_schema(item.schema).fields}
+    fields = {column.name: column for column in find_schema(item.schema).fields}
     order = [name for name in fields if name in item.properties]
     order += sorted(name for name in item.properties if name not in fields)
     if item.supplier_parts:  # they have a page of their own, which counts
@@ -252,10 +252,10 @@ def shown_properties(item: Item) -> list[tuple[str, str, str]]:
         label, text_, unit = name, property_text(value), ""
         if property_field:
             label, unit = _(property_field.label), property_field.unit
-        elif name in _MEASURED and all(isinstance(each_field, int | float) for each_field in _listed(value)):
+        elif name in _MEASURED and all(isinstance(column, int | float) for column in _listed(value)):
             label, factor, digits, unit = _MEASURED[name]
             label = _(label)
-            text_ = " × ".join(f"{each_field * factor:.{digits}g}" for each_field in _listed(value))
+            text_ = " × ".join(f"{column * factor:.{digits}g}" for column in _listed(value))
         if from_where := item.origins.get(name):
             word = {"cad": _("from CAD"), "scale": _("weighed"), "hand": _("by hand")}[from_where["source"]]
             unit = f"{unit} ({word}, {from_where['at'][:10]})".strip()

@@ -102,11 +102,7 @@ class Look:
     def flipped(self, key: str) -> str:
         """Return ``flip`` if this branch is the other way round."""
         keys = self.flips
-        return (
-            ",".join(each_key for each_key in keys if each_key != key)
-            if key in keys
-            else ",".join([*keys, key])
-        )
+        return ",".join(name for name in keys if name != key) if key in keys else ",".join([*keys, key])
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +185,7 @@ class ShownStructure:
     def worth(self, line: Line) -> MassAndCost:
         """Return what the child of a line is worth, to sort by it."""
         if line.child_id not in self._worths:
-            known = self._known({each_line.child_id for each_line in self._lines[line.parent_id]})
+            known = self._known({other.child_id for other in self._lines[line.parent_id]})
             self._worths |= {child: worth for child, (_part, worth, _summary) in known.items()}
         return self._worths[line.child_id]
 

@@ -139,14 +139,8 @@ def release_page(
         product = frozen_product(tx, item, release)
         record = releases.read_record(tx, release.record)
         approvals = releases.approvals_of(tx, release)
-        numbered = [
-            each_release
-            for each_release in releases.list_releases(tx, item)
-            if each_release.status in releases.NUMBERED
-        ]
-    before = next(
-        (each_release for each_release in numbered if each_release.frozen_at < release.frozen_at), None
-    )
+        numbered = [other for other in releases.list_releases(tx, item) if other.status in releases.NUMBERED]
+    before = next((other for other in numbered if other.frozen_at < release.frozen_at), None)
     rows = list(islice(_rows(product, flat=view == "flat"), MOST_ROWS))
     table = page_of(rows, len(rows), number)
     at = Address(f"{_path(item.part_number)}/{segment(label)}", {"view": view} if view != "tree" else {})
@@ -161,9 +155,7 @@ def release_page(
         at=at,
         flat=view == "flat",
         worth=product.worths[product.graph.root.id],
-        files=sorted(
-            record["files"], key=lambda each_release: each_release["file_path"] or each_release["file_name"]
-        ),
+        files=sorted(record["files"], key=lambda other: other["file_path"] or other["file_name"]),
         cut=len(rows) == MOST_ROWS,
     )
 

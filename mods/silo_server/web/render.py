@@ -126,9 +126,7 @@ def translated(template: str, translate: Callable[[str], str]) -> str:
     for match in _PIECE.finditer(template):
         source = match[0]
         if match["tag"]:
-            source = _ATTRIBUTE.sub(
-                lambda each_match: each_match[1] + _value(each_match[2], translate), source
-            )
+            source = _ATTRIBUTE.sub(lambda hit: hit[1] + _value(hit[2], translate), source)
         if match["text"] or match["expression"] or match["name"] in _WITHIN:
             run += _BETWEEN.split(source) if match["text"] else [source]
         else:

@@ -232,10 +232,10 @@ class Walk:
         if obj is None and not getattr(top, "is_document_root", False):
             counted = {object_name(count.shown.obj) for count in self._reader.contents(top).counts}
             names = [
-                f"“{label_of(each_obj)}”"
-                for each_obj in seen_beside(top, self._reader)
-                if object_name(each_obj) not in counted
-                and (self.hardware or kind_of(each_obj) is not Kind.STANDARD)
+                f"“{label_of(member)}”"
+                for member in seen_beside(top, self._reader)
+                if object_name(member) not in counted
+                and (self.hardware or kind_of(member) is not Kind.STANDARD)
             ]
             if names:
                 words = f"{listed(names, 4)}: beside “{label_of(top)}” in the document, and in no mass"
@@ -268,7 +268,7 @@ class Walk:
 
     def _container(self, key: str, obj: Any, contents: Contents, moved: dict[str, Floats]) -> None:
         if contents.hidden:
-            names = listed([f"“{label_of(each_obj)}”" for each_obj in contents.hidden], 4)
+            names = listed([f"“{label_of(member)}”" for member in contents.hidden], 4)
             self._note("hidden", f"bodies hidden beside visible ones are not counted: {names}")
         shapes = [use for count in contents.own for use in self._uses(obj, count, contents, moved)]
         bodies = [(end, place) for end, _, place in shapes if not is_container(end)]
@@ -487,9 +487,9 @@ class Walk:
         if len(listed_ones := elements(link)) == count:
             wanted = listed_ones if index is None else listed_ones[index : index + 1]
             return [
-                self._link_placement(each_matrix) @ scale(each_matrix)
-                for each_matrix in wanted
-                if index is not None or not left_out_by(each_matrix)
+                self._link_placement(step) @ scale(step)
+                for step in wanted
+                if index is not None or not left_out_by(step)
             ]
         places = self.facts.places(link)
         scales = [_diagonal(list(vector)) for vector in own(link, "ScaleList") or ()]

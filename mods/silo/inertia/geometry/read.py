@@ -546,7 +546,7 @@ class Cache:
             with suppress(OSError):
                 stat = path.stat()
                 kept.append((stat.st_mtime_ns, stat.st_size, path))
-        size = sum(each_size for _, each_size, _ in kept)
+        size = sum(count for _, count, _ in kept)
         for _, one, path in sorted(kept):
             if size <= self.max_bytes:
                 return

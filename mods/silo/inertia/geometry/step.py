@@ -777,7 +777,7 @@ def _operator(operator: Any, factors: Any) -> gp_Trsf:
         for axes in ([xyz(StepToGeom.MakeDirection_s(given).Dir())] if given is not None else []) + [
             *np.roll(np.eye(3), -default, axis=0)
         ]:
-            left = np.array(axes) - sum(np.dot(axes, each_axis) * each_axis for each_axis in across)
+            left = np.array(axes) - sum(np.dot(axes, direction) * direction for direction in across)
             if np.linalg.norm(left) > 1e-6:
                 break
         result: Floats = left / np.linalg.norm(left)

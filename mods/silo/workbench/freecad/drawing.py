@@ -229,7 +229,7 @@ def _place(whole: Any, path: Sequence[str]) -> Any | None:
     import Part
 
     try:
-        shape = Part.getShape(whole, "".join(f"{each_path}." for each_path in path), transform=False)
+        shape = Part.getShape(whole, "".join(f"{place}." for place in path), transform=False)
     except Exception:  # noqa: BLE001 - FreeCAD says "no such object" with several types
         return None
     return None if shape.isNull() else _matrix(shape.Placement)
@@ -269,19 +269,19 @@ def _node(mesh: _Triangles, colour: str, clear: float, through: bool) -> Any:
     node, points, faces = coin.SoSeparator(), coin.SoCoordinate3(), coin.SoIndexedFaceSet()
     style, material, hints = coin.SoPickStyle(), coin.SoMaterial(), coin.SoShapeHints()
     style.style = coin.SoPickStyle.UNPICKABLE
-    material.diffuseColor = tuple(each_node / 255 for each_node in bytes.fromhex(colour[1:]))
+    material.diffuseColor = tuple(channel / 255 for channel in bytes.fromhex(colour[1:]))
     material.transparency = clear
     hints.vertexOrdering = coin.SoShapeHints.COUNTERCLOCKWISE
     corners, rows = mesh
     points.point.setValues(0, len(corners), [tuple(corner) for corner in corners])
-    index = [each_node for row in rows for each_node in (*row, -1)]
+    index = [corner for row in rows for corner in (*row, -1)]
     faces.coordIndex.setValues(0, len(index), index)
     if through:
         depth = coin.SoDepthBuffer()
         depth.test = False
         node.addChild(depth)
-    for each_node in (style, material, hints, points, faces):
-        node.addChild(each_node)
+    for child in (style, material, hints, points, faces):
+        node.addChild(child)
     return node
 
 
@@ -291,7 +291,7 @@ def _add(doc: Any, drawn: Iterable[_Drawn]) -> list[tuple[Any, Any]]:
     if not hasattr(view, "getSceneGraph"):
         return []
     try:
-        made = [_node(*each_node) for each_node in drawn]
+        made = [_node(*shape) for shape in drawn]
         import pivy.coin  # noqa: F401 - FreeCAD wraps its scene graph with it
     except ImportError:
         return []

@@ -147,7 +147,7 @@ class Pieces:
             if key not in self._own_shapes:
                 self._own_shapes[key] = _solids(obj)
             return (self._own_shapes[key], 0, 0)
-        pieces = [self.of(each_obj, is_visible) for each_obj, is_visible in inside]
+        pieces = [self.of(member, is_visible) for member, is_visible in inside]
         visible, hidden, left_out = map(sum, zip(*pieces, strict=True)) if pieces else (0, 0, 0)
         return (visible, hidden, left_out)
 
@@ -160,7 +160,7 @@ def real(obj: Any) -> Any:
 def sub_objects(obj: Any) -> list[tuple[Any, bool]] | None:
     """Return what an object shows within itself, and if it is visible there; None for a shape of its own."""
     if {"BuildShape", "Freeze", "Group"}.issubset(obj.PropertiesList):
-        return [each_obj for group in obj.Group for each_obj in _in_group(group)]
+        return [member for group in obj.Group for member in _in_group(group)]
     names = obj.getSubObjects()
     if not names or (obj.isDerivedFrom("Part::Feature") and not obj.hasExtension("App::LinkBaseExtension")):
         return None
@@ -193,15 +193,13 @@ def root_objects(document: Any) -> list[tuple[Any, bool]]:
     """Return what FreeCAD shows at the root of a document: all that no part, link group, array or body
     holds.
     """
-    holders = [
-        each_obj for each_obj in document.Objects if not each_obj.isDerivedFrom("App::DocumentObjectGroup")
-    ]
+    holders = [member for member in document.Objects if not member.isDerivedFrom("App::DocumentObjectGroup")]
     held = {
-        each_obj.Name
+        member.Name
         for holder in holders
         for name in ("Group", "ElementList")
         if name in holder.PropertiesList
-        for each_obj in getattr(holder, name)
+        for member in getattr(holder, name)
     }
     return [(obj, obj.Visibility) for obj in holders if obj.Name not in held]
 

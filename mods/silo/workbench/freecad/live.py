@@ -444,7 +444,7 @@ class _Witness:
         # An array is its own only member.
         shown = [(top, True)] if is_array else _members(inside, roles)
         seen_by_path: dict[str, _Seen] = {}
-        for one, is_visible in (*shown, *((each_obj, each_obj.Visibility) for each_obj in beside.values())):
+        for one, is_visible in (*shown, *((member, member.Visibility) for member in beside.values())):
             seen_by_path.setdefault(one.Name, _Seen(one)).add(see.of(one, is_visible))
         for name in {**seen_by_path, **predicted}:
             seen = seen_by_path.get(name) or _Seen(obj.Document.getObject(name))

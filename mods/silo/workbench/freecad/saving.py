@@ -183,7 +183,7 @@ def _is_made_again(obj: Any, unknown: list[Any]) -> bool:
     if obj.TypeId != "App::Point":
         return False
     # A coordinate system that is lost as well is named itself.
-    lost = {each_name.Name for each_name in unknown}
+    lost = {label.Name for label in unknown}
     others = [obj.Document.getObject(name) for name in obj.Document.mentioning(obj.Name) if name not in lost]
     return all(other.TypeId == "App::Origin" for other in others)
 

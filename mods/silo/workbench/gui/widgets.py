@@ -495,12 +495,12 @@ def _passing_view(doc: Any) -> Iterator[None]:
         before, was = area.subWindowList(), area.activeSubWindow()
         host.activate(doc)
         host.run_command("Std_ViewCreate")
-        made = [each_window for each_window in area.subWindowList() if each_window not in before]
+        made = [widget for widget in area.subWindowList() if widget not in before]
         try:
             yield
         finally:
-            for each_window in made:
-                each_window.close()
+            for widget in made:
+                widget.close()
             if was is not None:
                 area.setActiveSubWindow(was)
     finally:

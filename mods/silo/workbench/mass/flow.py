@@ -177,5 +177,5 @@ class MassDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
 
     def _copy(self) -> None:
         """Copy the table to the clipboard, with plain numbers in kg."""
-        name, quantity, each_mass, whole, *rest = self.headings()
-        qt.copy(self._content.table((name, quantity, f"{each_mass}, kg", f"{whole}, kg", *rest)))
+        name, quantity, mass, whole, *rest = self.headings()
+        qt.copy(self._content.table((name, quantity, f"{mass}, kg", f"{whole}, kg", *rest)))

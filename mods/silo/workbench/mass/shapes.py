@@ -295,7 +295,7 @@ class LiveFacts:
 
     def places(self, obj: Any) -> list[Floats]:
         """Return (4, 4) [mm] each, the object's own ``PlacementList``."""
-        return [matrix_of(each_place) for each_place in own(obj, "PlacementList") or ()]
+        return [matrix_of(place) for place in own(obj, "PlacementList") or ()]
 
     def shape(self, obj: Any) -> Any:
         """Return FreeCAD's shape of the object; None if it has none, or an empty one."""
@@ -390,9 +390,9 @@ class _Product:
     def _find(self, solid: Any, where: str) -> tuple[_Solid, Floats]:
         """Return the solid or an equal one that was measured before, and (4, 4) [mm] from there to here."""
         here = matrix_of(solid.Placement)
-        for each_solid in self.known:
-            if solid.isPartner(each_solid.shape) and solid.Orientation == each_solid.shape.Orientation:
-                return each_solid, here @ np.linalg.inv(matrix_of(each_solid.shape.Placement))
+        for body in self.known:
+            if solid.isPartner(body.shape) and solid.Orientation == body.shape.Orientation:
+                return body, here @ np.linalg.inv(matrix_of(body.shape.Placement))
         notes: list[Note] = []
         measured_solid = self._measure(solid, notes)
         self.problems += [replace(note, message=where + note.message) for note in notes]

@@ -160,10 +160,8 @@ def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
         control.progress(assembly.assembly.part_number or assembly.assembly.label)
         lines.append(server_lines(assembly, api))
     whole = suggest_by_identity(whole, list(zip(assemblies(whole), lines, strict=True)))
-    compared = [
-        _compared(resolved, each_lines) for resolved, each_lines in zip(assemblies(whole), lines, strict=True)
-    ]
-    all_lines = [line for each_compared in compared for line in each_compared.lines]
+    compared = [_compared(resolved, other) for resolved, other in zip(assemblies(whole), lines, strict=True)]
+    all_lines = [line for pair in compared for line in pair.lines]
     number = whole.assembly.part_number
     page = api.web_url(f"/items/{number}/bom") if number else ""
     return Preview(snapshot, tuple(compared), names_of(whole, all_lines), blocking(whole), page)

@@ -232,10 +232,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._drawn.clear()
         candidates = grouped(offer.candidates[:MOST_ROWS])
         names = told_apart(candidate.entry.doc_path for candidate in candidates)
-        self._rows = [
-            EditedRow.of(each_candidate, names[each_candidate.entry.doc_path])
-            for each_candidate in candidates
-        ]
+        self._rows = [EditedRow.of(component, names[component.entry.doc_path]) for component in candidates]
         self._filling = True
         self._lay_out()
         for number, row in enumerate(self._rows):

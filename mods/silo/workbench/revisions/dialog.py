@@ -320,7 +320,7 @@ class HistoryDialog(_Window):
         if self._known is None or not number:
             return
         numbers = [revision.revision_number for revision in self._known.revisions]
-        older = next((each_number for each_number in numbers if each_number < number), None)
+        older = next((part_number for part_number in numbers if part_number < number), None)
         self.change.setText(translate("Silo", "Comparing…"))
         self._first((), 0)
 

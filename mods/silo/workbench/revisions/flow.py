@@ -660,9 +660,9 @@ def _not_here(path: str) -> list[str]:
     except DocumentError:
         return []  # FreeCAD says what it cannot read
     return [
-        os.path.basename(each_path)
-        for each_path in recorded
-        if not isinstance(locator.find(each_path, folder), FoundFile)
+        os.path.basename(place)
+        for place in recorded
+        if not isinstance(locator.find(place, folder), FoundFile)
     ]
 
 

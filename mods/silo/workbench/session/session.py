@@ -142,7 +142,7 @@ class Colleagues:
         self._mine[identity] = max(revision, self._mine.get(identity, 0))
         newer = self.newer.get(identity)
         if newer is not None and newer.revision <= revision:
-            self.newer = {key: each_newer for key, each_newer in self.newer.items() if key != identity}
+            self.newer = {key: later for key, later in self.newer.items() if key != identity}
 
     def sent(self, still_going: Iterable[str]) -> None:
         """Note that a run of sending has ended. What was announced meanwhile and is not ours is a

@@ -61,7 +61,7 @@ def freeze(tx: Tx, item: Item) -> FrozenProduct:
     items = by_ids(tx, ids)
     worths = summaries(tx, ids)
     files = _files(tx, items)
-    without_file = [each_item for each_item in items.values() if not files[each_item.id]]
+    without_file = [part for part in items.values() if not files[part.id]]
     hashes: dict[int, str] = {}
     records: dict[str, str] = {}
     # Children come before their parents; an item that is no assembly comes first.
@@ -85,9 +85,9 @@ def freeze(tx: Tx, item: Item) -> FrozenProduct:
         records[hashes[item_id]] = text
     blocks = [f"{bom.part_number}: {bom.words}" for bom in worths[item.id].open.values()]
     blocks += [
-        f"{each_item.part_number}: no file"
-        for each_item in without_file
-        if each_item.item_type in ("part", "assembly") and not each_item.is_bought
+        f"{part.part_number}: no file"
+        for part in without_file
+        if part.item_type in ("part", "assembly") and not part.is_bought
     ]
     return FrozenProduct(hashes[item.id], records, sorted(blocks), tx.stamp)
 
@@ -129,11 +129,11 @@ def _files(tx: Tx, items: Mapping[int, Item]) -> dict[int, dict[str, dict[str, A
     level = set[int]().union(*holding.values())
     link = document_links.c
     while level:
-        targets |= {each_item_id: set() for each_item_id in level}
+        targets |= {part_id: set() for part_id in level}
         pairs = select(link.document_id, documents.c.id).join(documents, documents.c.uuid == link.target)
         for source, target in tx.conn.execute(pairs.where(one_of(tx, link.document_id, level))):
             targets[source].add(target)
-        level = set[int]().union(*(targets[each_item_id] for each_item_id in level)) - targets.keys()
+        level = set[int]().union(*(targets[part_id] for part_id in level)) - targets.keys()
     newest = (
         select(documents.c.id, documents.c.uuid, revisions)
         .join(revisions, revisions.c.document_id == documents.c.id)
@@ -155,12 +155,10 @@ def _files(tx: Tx, items: Mapping[int, Item]) -> dict[int, dict[str, dict[str, A
     for item_id, own in holding.items():
         seen, level = set(own), set(own)
         while level:
-            level = set[int]().union(*(targets[each_item_id] for each_item_id in level)) - seen
+            level = set[int]().union(*(targets[part_id] for part_id in level)) - seen
             seen |= level
         reached[item_id] = {
-            written[each_item_id]["document"]: written[each_item_id]
-            for each_item_id in seen
-            if each_item_id in written
+            written[part_id]["document"]: written[part_id] for part_id in seen if part_id in written
         }
     return reached
 

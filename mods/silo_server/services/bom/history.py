@@ -448,17 +448,17 @@ def _items_happened(tx: Tx, ids: Collection[int], since: str, until: str) -> Ite
     touched = set(tx.conn.scalars(select(row.item_id).where(within, row.created_at > since).distinct()))
     query = select(revisions).where(one_of(tx, row.item_id, touched), row.created_at <= until)
     items_before: dict[int, list[Any]] = {}
-    for each_row in tx.conn.execute(query.order_by(row.item_id, row.revision_number)):
-        items_before.setdefault(each_row.item_id, []).append(each_row)
+    for record in tx.conn.execute(query.order_by(row.item_id, row.revision_number)):
+        items_before.setdefault(record.item_id, []).append(record)
     for item in by_ids(tx, touched).values():
         rows = items_before[item.id]
-        old = [each_row for each_row in rows if each_row.created_at <= since]
+        old = [record for record in rows if record.created_at <= since]
         last = rows[-1]
         sides = json.loads(old[-1].properties) if old else {}, json.loads(last.properties)
         if differences := data_differs(*sides):
             what = ("data", "", item.part_number, item.name, *differences)
             yield PastChange(*what, last.created_at, last.created_by)
-        files = [each_row for each_row in rows if each_row.file_checksum]
+        files = [record for record in rows if record.file_checksum]
         older = [file for file in files if file.created_at <= since]
         if files and (not older or older[-1].file_checksum != files[-1].file_checksum):
             newest = files[-1]

@@ -476,7 +476,7 @@ def _identified(tx: Tx, records: Iterable[Record]) -> Iterator[Record]:
         same_items, _ = list_items(tx, ItemQuery(search=maker, limit=100))
         numbers = ((item.part_number, item.properties.get("manufacturer_part_number")) for item in same_items)
         by_maker[maker] = [
-            each_number for each_number, said in numbers if str(said).casefold() == maker.casefold()
+            part_number for part_number, said in numbers if str(said).casefold() == maker.casefold()
         ]
     for number, record in records:
         maker, name = record.get("manufacturer_part_number", ""), _name_of(record)

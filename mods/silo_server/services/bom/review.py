@@ -468,17 +468,17 @@ def waiting(tx: Tx) -> list[Waiting]:
     )
     waitings = [
         Waiting(
-            *(each_row, number, name, version, folder or "", file or "", at),
+            *(record, number, name, version, folder or "", file or "", at),
             *(
-                conflicts.get(each_row, nobody),
+                conflicts.get(record, nobody),
                 who or "",
-                unreferenced[each_row],
-                *gaps.get(each_row, (0, 0)),
+                unreferenced[record],
+                *gaps.get(record, (0, 0)),
             ),
         )
-        for each_row, number, name, version, folder, file, at, who in tx.conn.execute(query)
+        for record, number, name, version, folder, file, at, who in tx.conn.execute(query)
     ]
-    return sorted(waitings, key=lambda each_row: each_row.part_number.casefold())
+    return sorted(waitings, key=lambda record: record.part_number.casefold())
 
 
 def waiting_count(tx: Tx) -> int:

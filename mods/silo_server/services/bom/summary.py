@@ -246,17 +246,12 @@ def _make(tx: Tx, wanted: Collection[int], most: int | None = None) -> dict[int,
     children = {line.child_id for below in lines.values() for line in below}
     own = _own(tx, {*wanted, *lines, *children} - nodes.keys())
     maker = _Maker(lines, nodes, own, _open(tx, lines, own), _bom_changes(tx, lines))
-    edges = {
-        each_item_id: [line.child_id for line in rows if _followed(line)]
-        for each_item_id, rows in lines.items()
-    }
+    edges = {part_id: [line.child_id for line in rows if _followed(line)] for part_id, rows in lines.items()}
     for item_id in _children_first(
-        edges, wanted, {each_item_id: own_facts.part_number for each_item_id, own_facts in own.items()}
+        edges, wanted, {part_id: own_facts.part_number for part_id, own_facts in own.items()}
     ):
         maker.node(item_id)
-    products = {
-        each_item_id for each_item_id in own if each_item_id in lines or own[each_item_id].is_assembly
-    }
+    products = {part_id for part_id in own if part_id in lines or own[part_id].is_assembly}
     if products and tx.built is not None:
         head = events.bounds(tx)[1]
         tx.built.append(
@@ -266,7 +261,7 @@ def _make(tx: Tx, wanted: Collection[int], most: int | None = None) -> dict[int,
                 [_row(product, nodes[product]) for product in sorted(products) if product in nodes],
             )
         )
-    return {each_item_id: nodes[each_item_id] for each_item_id in wanted}
+    return {part_id: nodes[part_id] for part_id in wanted}
 
 
 def _followed(line: Line) -> bool:
@@ -387,9 +382,7 @@ def _children_first(
                 yield item_id
             elif child in way:
                 ring = list(way)
-                raise CycleError(
-                    [names[each_item_id] for each_item_id in [*ring[ring.index(child) :], child]]
-                )
+                raise CycleError([names[part_id] for part_id in [*ring[ring.index(child) :], child]])
             elif child in below and child not in done:
                 way[child] = iter(below[child])
 
@@ -417,7 +410,7 @@ class _Maker:
         worth = _sum_of(below) if below else own.worth
         states_all = not worth.mass_whole and own.worth.mass is not None
         as_part = worth._replace(mass=own.worth.mass, mass_whole=True) if states_all else worth
-        open_ones = {each_item_id: bom for node in nodes for each_item_id, bom in node.summary.open.items()}
+        open_ones = {part_id: bom for node in nodes for part_id, bom in node.summary.open.items()}
         changes = [own.changed, *(node.summary.changed for node in nodes)]
         if item_id in self.open:
             open_ones[item_id] = self.open[item_id]
@@ -428,9 +421,7 @@ class _Maker:
         unweighed = [node for node in nodes if not node.summary.as_part.mass_whole]
         no_mass = (set() if worth.mass_whole else me).union(*(node.no_mass for node in unweighed))
         no_cost = (set() if worth.cost_whole else me).union(*(node.no_cost for node in nodes))
-        assemblies = {
-            each_item_id: counts for node in nodes for each_item_id, counts in node.assemblies.items()
-        }
+        assemblies = {part_id: counts for node in nodes for part_id, counts in node.assemblies.items()}
         older = sum(newer_exists(line) for line in lines)
         summary = Summary(
             open=open_ones,

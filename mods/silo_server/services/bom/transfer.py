@@ -168,19 +168,17 @@ def export(
 
     def dressed(bare: Iterable[_BareColumns]) -> Iterator[Row]:
         for some in portions(bare):
-            parts = (
-                frozen.parts if frozen else some_parts(tx, {each_bare.line.child_id for each_bare in some})
-            )
-            for each_bare in some:
-                child, amount = each_bare.line.child_id, each_bare.total * pieces
+            parts = frozen.parts if frozen else some_parts(tx, {cells.line.child_id for cells in some})
+            for cells in some:
+                child, amount = cells.line.child_id, cells.total * pieces
                 part, summary, said = parts[child], summed.get(child), still.get(child)
                 worth = summary.as_part if summary else own_worth(part.properties)
                 worth = frozen.worths[child] if frozen else worth
                 fields = {"Incomplete": said.incomplete or None if said else None}
-                fields["Open"] = ", ".join(each_bare.doubts) or None
+                fields["Open"] = ", ".join(cells.doubts) or None
                 fields[PICTURE] = part.thumbnail_key
                 yield (
-                    _row(each_bare, part, amount, of_a_line=view is not View.FLAT)
+                    _row(cells, part, amount, of_a_line=view is not View.FLAT)
                     | _values(worth, amount)
                     | fields
                 )

@@ -561,10 +561,7 @@ def roll_up_mass(graph: Graph, parts: Mapping[int, RolledItem], assemblies: Coll
     for row in flatten(graph, assemblies):
         item_id = row.line.child_id
         amounts[item_id] = _counted(amounts.get(item_id, 0) + row.total, row.line)
-    rows = [
-        _mass_row(parts[each_item_id], amount, each_item_id in assemblies)
-        for each_item_id, amount in amounts.items()
-    ]
+    rows = [_mass_row(parts[part_id], amount, part_id in assemblies) for part_id, amount in amounts.items()]
     return MassRollup(
         rows,
         float(exact_sum(row.total_mass_kg for row in rows if row.total_mass_kg is not None)),

@@ -490,9 +490,7 @@ def closed_shells(shapes: list[Any]) -> tuple[list[Any], list[Any]]:
         size = max(box(shape)[1] for shape in shapes)
         sewing = _sewn(loose, MEETING * size)
         if sewing is not None:
-            left = [
-                each_shell for each_shell in left if not all(map(occt.has_surface, occt.faces_of(each_shell)))
-            ]
+            left = [other for other in left if not all(map(occt.has_surface, occt.faces_of(other)))]
             sewn = sewing.SewedShape()
             for shell in occt.loose_shells_of(sewn):
                 (closed if _is_closed(shell) else left).append(shell)
