@@ -166,7 +166,7 @@ def test_the_bom_of_another_item_is_no_answer(server: Any, client: SiloClient) -
     server.on("POST /api/items/boms", {"boms": {"A01-0001": [line], "A01-0002": [line]}})
     assert len(client.get_bom("A01-0001")) == 1
     for ask in (client.get_bom, lambda number: client.get_boms(["A01-0001", number])):
-        with pytest.raises(ServerFaultError, match="A01-0002: the server answered with that of a01-0001"):
+        with pytest.raises(ServerFaultError, match="A01-0002: the server answered with the BOM of a01-0001"):
             ask("A01-0002")
 
 

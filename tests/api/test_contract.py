@@ -106,13 +106,15 @@ def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> Non
         }
 
     client, fake = methods(SiloClient), methods(FakeSilo)
-    # The fake has no connection, no pages, no pictures and no models.
+    # The fake has no connection, no pages, no orders, no pictures and no models.
     own = {
         "begin_login",
         "close",
         "events",
         "get_changes",
         "get_geometry",
+        "get_order",
+        "get_order_table",
         "get_scene",
         "modules",
         "thumbnail",

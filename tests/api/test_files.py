@@ -95,7 +95,7 @@ def test_the_servers_checksum_is_compared(server: Any, client: SiloClient, sourc
         UPLOAD, {"revision_number": 1, "file_checksum": told}, {"revision_number": 2, "sha256": "0" * 64}
     )
     client.upload_file("A01-0001", source)
-    with pytest.raises(ConflictError, match=r"another content than was sent.*revision 2"):
+    with pytest.raises(ConflictError, match=r"other content than was sent.*revision 2"):
         client.upload_file("A01-0001", source)
 
 

@@ -178,7 +178,7 @@ def test_an_object_that_is_not_there(tmp_path: Path) -> None:
 @pytest.mark.parametrize("identity", ["", "  ", " u", "a\nb", "a\0", "x" * 201, "\ufffe", "\x85"])
 def test_what_is_no_identity(tmp_path: Path, identity: str) -> None:
     """One line of text, as long as an identity may be."""
-    assert "is no identity" in refused(part().save(tmp_path / "p.FCStd"), identity)
+    assert "is not an identity" in refused(part().save(tmp_path / "p.FCStd"), identity)
 
 
 def test_read_only_files_stay(tmp_path: Path) -> None:

@@ -357,7 +357,7 @@ def add_order(parser: argparse.ArgumentParser) -> None:
     common.options(
         parser,
         {
-            "--revision LABEL": "of a released revision, such as B (else of the draft)",
+            "--revision REVISION": "of a released revision, such as B (else of the draft)",
             "--spares PERCENT": "so many percent more of each part",
             "--rest": "without what was ordered already",
             "--csv FILE": "write a table as CSV (- for standard output)",

@@ -241,10 +241,10 @@ def add_pull(parser: argparse.ArgumentParser) -> None:
     common.add_each(parser, "part_number", "--revision", metavar="PART_NUMBER", help="the item")
     parser.add_argument(
         "--revision",
-        metavar="N|LABEL",
+        metavar="REVISION",
         type=_revision,
-        help="revision N of the file, with the linked files as they were then; or the released revision "
-        "LABEL, such as B, with all files as they were frozen; else the newest of all",
+        help="the number of a revision of the file, with the linked files as they were then; or the label of "
+        "a released revision, such as B, with all files as they were frozen; else the newest of all",
     )
     common.options(
         parser, {"--replace": "replace files with edits that are not in Silo; a copy of each is kept"}
