@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import uuid
+from collections import namedtuple
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from datetime import timedelta
@@ -334,7 +335,8 @@ def test_a_value_is_read_and_written_by_its_own_names() -> None:
         since: str | None
         note: str = ""
 
-    row = SimpleNamespace(id=7, flat=True, created_at="2026-02-08T22:15:00.000000Z", since=None, other="x")
+    kind = namedtuple("kind", "id flat created_at since other")
+    row = kind(7, True, "2026-02-08T22:15:00.000000Z", None, "x")
     value = from_row(Value, row, note="given")
     assert value == Value(7, True, "2026-02-08T22:15:00.000000Z", None, "given")
     told = {"flat": True, "created_at": "2026-02-08T22:15:00Z", "since": None, "note": "given"}

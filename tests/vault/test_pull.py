@@ -280,7 +280,7 @@ def test_a_hostile_path_leaves_the_folder_alone(project: Project, tmp_path: Path
     reasons = [lost.reason for lost in pulled.lost]
     assert not any("no item in Silo" in reason for reason in reasons)
     assert sum("absolute path" in reason for reason in reasons) == 3
-    assert sum("no FreeCAD file" in reason for reason in reasons) == 2
+    assert sum("not a FreeCAD file" in reason for reason in reasons) == 2
     assert set(states(pulled, into)) == {"Arm.FCStd", "parts/Plate.FCStd"}
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()

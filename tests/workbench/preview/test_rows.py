@@ -154,7 +154,7 @@ def test_what_is_not_counted_has_the_reason_of_the_diff(preview: Preview, diff: 
     told = {child.note for row in groups for child in row.children if child.kind is RowKind.NOT_COUNTED}
     elsewhere = ("unregistered", "unreferenced", "conflict")
     assert told == {f["message"] for f in diff["findings"] if f["code"] not in elsewhere}
-    assert any("construction geometry, not counted" in text for text in told)
+    assert any("construction geometry, which is not a part: not counted" in text for text in told)
     unregistered = [
         child.name for row in groups for child in row.children if child.kind is RowKind.UNREGISTERED
     ]
