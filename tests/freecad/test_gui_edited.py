@@ -36,7 +36,7 @@ def test_only_what_was_edited_is_checked(said: dict[str, Any]) -> None:
     assert told["none"] == [0, False]
     assert told["this"] == [1, True]
     assert told["edited"] == [2, True]
-    assert "40 more were only recomputed" in "\n".join(told["texts"])
+    assert "40 more files were only recomputed" in "\n".join(told["texts"])
 
 
 def test_what_was_committed_has_no_edits_any_more(said: dict[str, Any]) -> None:
