@@ -16,7 +16,7 @@ Each of ``DOMAINS`` has ``locale/<language>/LC_MESSAGES/<domain>.po`` in its pac
 library's gettext, and the compiled ``.mo`` beside it. Their texts stand in ``_("…")``, in ``N_("…")``, which
 is translated when it is shown, or in ``plural(n, "line", "lines")`` (without the last: with an s), in Python,
 templates and scripts. The texts of templates are all that a person reads in them. Those of silo, without the
-add-on, are its English sentences with ``{name}`` for what is filled in (``silo.bom.errors.spoken``): each
+add-on, are its English sentences with ``{name}`` for what is filled in (``silo.spoken``): each
 literal of several words. Its single words stand in ``_WORDS``.
 """
 

@@ -13,8 +13,9 @@ from typing import Any
 
 import pytest
 
+from silo import spoken
 from silo.bom import errors
-from silo.bom.errors import Sentences, spoken
+from silo.bom.errors import Sentences
 from silo.bom.findings import FindingCode
 from silo.cli.main import THEMES, build_parser
 

@@ -34,12 +34,9 @@ and sent; :func:`spoken` says it in the language of a person where it is shown.
 from __future__ import annotations
 
 import difflib
-import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
-from functools import cache
-from pathlib import Path
 from typing import Any, ClassVar
 
 
@@ -94,23 +91,6 @@ def listed(names: Sequence[str], most: int = 5) -> str:
     """Return the first ``most`` names, and how many more there are: a, b and 3 more."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
-
-
-def spoken(text: str, language: str = "") -> str:
-    """Say a finished English text of ours in a language (default: that of the environment)."""
-    if not language:
-        names = ("SILO_LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG")
-        language = next(filter(None, map(os.environ.get, names)), "en")
-    return text if language.startswith(("en", "C")) else _sentences(re.split("[_.@-]", language)[0])(text)
-
-
-@cache
-def _sentences(language: str) -> Sentences:
-    import gettext  # an English start does not pay for it
-
-    folder = Path(__file__).parents[1] / "locale"
-    found = gettext.translation("silo-mod", folder, [language], fallback=True)
-    return Sentences(getattr(found, "_catalog", {}))  # texts cannot be listed in another way
 
 
 class Sentences:

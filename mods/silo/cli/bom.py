@@ -17,6 +17,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from silo import spoken
 from silo.bom.document import relative
 from silo.bom.errors import (
     BusyError,
@@ -27,7 +28,6 @@ from silo.bom.errors import (
     SiloError,
     counted,
     did_you_mean,
-    spoken,
 )
 from silo.bom.findings import FindingCode
 from silo.bom.headers import safe_cell

@@ -19,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
+from silo import spoken
 from silo.bom.errors import (
     InputError,
     NotFoundError,
@@ -26,7 +27,6 @@ from silo.bom.errors import (
     SeveralAssembliesError,
     SiloError,
     duration,
-    spoken,
 )
 from silo.bom.findings import respelt_findings
 from silo.bom.links import extract

@@ -21,8 +21,9 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 from xml.etree import ElementTree
 
+from silo import spoken
 from silo.batch import source_document
-from silo.bom.errors import DocumentError, Exit, InputError, ServerFaultError, spoken
+from silo.bom.errors import DocumentError, Exit, InputError, ServerFaultError
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
 from silo.bom.resolve import consolidation_findings

@@ -18,7 +18,8 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext, redirect_stdout, suppress
 from typing import Any, NoReturn, TextIO, TypeVar
 
-from silo.bom.errors import CancelledError, Exit, InputError, SiloError, did_you_mean, exit_of, spoken
+from silo import spoken
+from silo.bom.errors import CancelledError, Exit, InputError, SiloError, did_you_mean, exit_of
 
 T = TypeVar("T")
 

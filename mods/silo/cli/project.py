@@ -7,7 +7,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import Exit, UnreachableError, counted, exit_of, spoken
+from silo import spoken
+from silo.bom.errors import Exit, UnreachableError, counted, exit_of
 from silo.bom_sync import draft_text
 from silo.cli import common
 

@@ -21,8 +21,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo import spoken
 from silo.bom.document import relative
-from silo.bom.errors import ConflictError, DocumentError, Exit, InputError, SiloError, counted, spoken
+from silo.bom.errors import ConflictError, DocumentError, Exit, InputError, SiloError, counted
 from silo.bom.model import Extraction, walk_entries
 from silo.bom.report import base_of
 from silo.bom.resolve import Proposal, propose

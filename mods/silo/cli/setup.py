@@ -23,6 +23,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from silo import spoken
 from silo.bom.errors import (
     AuthError,
     ConfigError,
@@ -33,7 +34,6 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
     exit_of,
-    spoken,
 )
 from silo.bom_sync import activity_text
 from silo.cli import common

@@ -16,8 +16,9 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
+from silo import spoken
 from silo.bom.document import relative
-from silo.bom.errors import ConfigError, Exit, NotFoundError, counted, spoken
+from silo.bom.errors import ConfigError, Exit, NotFoundError, counted
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.report import MOST_LINES, base_of, check_tree_size, diff_rows, shorten

@@ -19,8 +19,9 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo import spoken
 from silo.batch import SyncOptions, TopResult
-from silo.bom.errors import ConfigError, Exit, InputError, SiloError, counted, exit_of, spoken
+from silo.bom.errors import ConfigError, Exit, InputError, SiloError, counted, exit_of
 from silo.cli import common
 from silo.files import check_writable, documents_in
 from silo.outbox.store import KEPT_ASIDE_DAYS
