@@ -25,7 +25,7 @@ def test_an_order_for_ten(api: Api, visit: Visit, tmp_path: Path) -> None:
     page.get_by_role("button", name="Show").click()
     page.get_by_text("Export for 10").click()
     with page.expect_download() as waiting:
-        page.get_by_role("link", name="flat, with totals as XLSX").click()
+        page.get_by_role("link", name="flat, with totals as XLSX", exact=True).click()
     file = tmp_path / waiting.value.suggested_filename
     assert file.name == f"{top}-bom-flat-for-10.xlsx"
     waiting.value.save_as(file)

@@ -191,7 +191,7 @@ def test_two_admins_at_one_user(api: Api, visit: Visit, user: str) -> None:
     assert (known["role"], known["active"]) == ("viewer", False)
     third.get_by_label(f"Role of {user}").select_option("admin")
     third.get_by_role("button", name=f"Save {user}").click()
-    expect(third.get_by_role("alert")).to_contain_text("changed by somebody else")
+    expect(third.get_by_role("alert")).to_contain_text("Somebody else changed")
     known = next(one for one in api.get("/api/users") if one["username"] == user)
     assert known["role"] == "viewer"
 
