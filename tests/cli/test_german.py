@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
+import silo
 from silo import spoken
-from silo.bom import errors
 from silo.bom.errors import Sentences
 from silo.bom.findings import FindingCode
 from silo.cli.main import THEMES, build_parser
 
-CLI = Path(errors.__file__).parents[1] / "cli"
+CLI = Path(silo.__file__).parent / "cli"
 COMMANDS = [command for commands in THEMES.values() for command in commands]
 WORDS = re.compile(r"[A-Za-z]{2}\b")
 
@@ -104,10 +104,10 @@ def test_the_language_is_that_of_the_environment(
 
 
 def test_english_reads_no_catalogue(run: Any) -> None:
-    errors._sentences.cache_clear()
+    silo._sentences.cache_clear()
     assert run("--help").code == 0
     assert run("bom", "nothing.FCStd").code == 2
-    assert errors._sentences.cache_info().currsize == 0
+    assert silo._sentences.cache_info().currsize == 0
 
 
 def test_names_stay(german: None) -> None:
