@@ -440,11 +440,10 @@ def run_order(args: argparse.Namespace) -> int:
             elif path:
                 with replacing(Path(path)) as file:
                     file.write(data)
-        order = client.get_order(number, **given)
-    if args.json:
-        common.print_json(order.model_dump(mode="json"))
-    elif args.csv != "-":
-        _print_order(order)
+        if args.json:
+            common.print_json(client.get_order(number, **given).model_dump(mode="json"))
+        elif args.csv != "-":
+            _print_order(client.get_order(number, **given))
     return Exit.DONE
 
 

@@ -465,9 +465,7 @@ _DRAWN = {
 
 @revisions_router.put("/thumbnail", status_code=204, responses=WRITE_ERRORS, openapi_extra=_DRAWN)
 async def put_thumbnail(call: Editor, part_number: str) -> Response:
-    """Return a picture of an item that has none: what a browser drew of its model. A new file takes it
-    away.
-    """
+    """Keep a picture of an item that has none: what a browser drew of its model. A new file takes it away."""
     picture = await call.request.body()
 
     def work() -> Response:
