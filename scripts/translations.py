@@ -15,9 +15,9 @@ FreeCAD loads compiled files, so each ``silo_de.ts`` has its ``silo_de.qm``, as 
 Each of ``DOMAINS`` has ``locale/<language>/LC_MESSAGES/<domain>.po`` in its package, for the standard
 library's gettext, and the compiled ``.mo`` beside it. Their texts stand in ``_("…")``, in ``N_("…")``, which
 is translated when it is shown, or in ``plural(n, "line", "lines")`` (without the last: with an s), in Python,
-templates and scripts. The texts of templates are all that a person reads in them. Those of silo, without the
-add-on, are its English sentences with ``{name}`` for what is filled in (``silo.spoken``): each
-literal of several words. Its single words stand in ``_WORDS``.
+templates and scripts. The texts of templates are all that a person reads in them. Those of silo-mod are the
+English sentences of silo and of the server with ``{name}`` for what is filled in (``silo.spoken``): each
+literal of several words. Single words stand in ``_WORDS``.
 """
 
 from __future__ import annotations
@@ -312,12 +312,21 @@ paused|moved|configuration|cache|identities|address|token|mode|who|items|schema|
 inertia|live|none|{n} merged|{n} unchanged|{n} dry run|{n} blocked|{n} unregistered|{n} failed
 {n} missing|{n} min|{n} hours|{n} days|in {n} s|in {n} min|in {n} hours|in {n} days|BOM merged
 BOM unchanged|BOM blocked|BOM unregistered|BOM failed|reading {n} s|server {n} s
-it is missing
+it is missing|{n} removed|{n} added|{n} quantity changed|{n} unreferenced|{n} in conflict|{n} broken
+{n} kept as intentional|{n} set to the assembly's quantity|{n} kept at Silo's quantity|{n} refused
+{n} question open|{n} questions open|{n} unreferenced line|{n} unreferenced lines|{n} unregistered
+{n} conflict|{n} conflicts|at least {low} and at most {high}|viewer|editor|admin|review|released|obsolete
+draft|Draft|archived|changed|mass|size|volume|material|description|quantity {before} → {after}|notes|unit
+source|reason|revision|hidden|unreferenced|metadata|rel type
+reference designators|find number|child revision|override|cad quantity|unreferenced since
+Field required|Input should be a valid integer, unable to parse string as an integer
+Input should be greater than or equal to {n}|Input should be less than or equal to {n}
+String should have at most {n} characters|String should have at least {n} characters
 """
 # What no person reads as it stands, and what has a catalogue of its own.
 _WITHOUT = re.compile(
-    r"workbench/|inertia/|drawing/|testing\.py|cli/shapes\.py|bom/(headers|standard)\.py|api/wire\.py|"
-    r"fcstd/properties\.py"
+    r"silo/(workbench/|inertia/|drawing/|testing\.py|cli/shapes\.py|bom/(headers|standard)\.py|api/wire\.py|"
+    r"fcstd/properties\.py)|silo_server/services/bom/(frozen|transfer)\.py"
 )
 # No text for people.
 _NO_TEXT = re.compile(
@@ -325,11 +334,14 @@ _NO_TEXT = re.compile(
         (
             # SQL
             r"\b(SELECT|INSERT|DELETE FROM|UPDATE|PRAGMA|CREATE|REPLACE INTO|VALUES|PRIMARY|NOT NULL|NULL)\b",
-            r"\b(INTEGER|REAL|ORDER BY)\b|\{select\}|= \?|^[a-z_]+(, [a-z_]+)+$",
+            r"\b(INTEGER|REAL|ORDER BY|LISTEN|LOCK TABLE|SET LOCAL)\b|\{select\}|= \?|^[a-z_]+(, [a-z_]+)+$",
+            r"^status (=|IN) |jit=|^number name$|^(merge|import) \{|^upload document$",
             # markup, JSON, style
             r"^</?\w+|</\w+>|=\"|\": |doctype|^:?\w+\{|:[\w-]+\(|[\w-]+:[\w#./-]+;|^(bold|dim) |\{task\.",
             # HTTP, logs
-            r"Content-|^\w+/[\w+-]+;|Bearer|gzip|boundary|%s",
+            r"Content-|^\w+/[\w+-]+;|Bearer|gzip|boundary|%s|-src '|=\(\)|^private, |max-age",
+            r"Also where the form|^The file$|^Still what If|^a GLB of more|disk is full\|",
+            r"^Method Not Allowed:|^Accept-|^GET, |^Value error",
             # patterns, names of classes, programs, types
             r"\(\?|\\|signal \(SIG|^(?=\w+[A-Z])[A-Z]\w+( [A-Z]\w+)*$|\w::\w|sys; print|\w \| \w|Mapping\[",
             r"UUIDs|Client\(|module \{|^\{typeid\} \{name\} of|^\{meta_key\}",
@@ -350,13 +362,18 @@ def texts_of_sentences(path: Path) -> Iterator[tuple[str, str, Path]]:
     own. A placeholder is called as the last name of its expression. Keys of dictionaries are no texts.
     """
     found: list[tuple[int, int, str]] = []
-    for node in ast.walk(ast.parse(path.read_text("utf-8"), str(path))):
+    tree = ast.parse(path.read_text("utf-8"), str(path))
+    without = {id(inner) for part in _other_texts(tree, path) for inner in ast.walk(part)}
+    for node in ast.walk(tree):
         # Docstrings; what is compared; the parts of a literal, and its formats.
         if isinstance(node, ast.Expr | ast.Compare | ast.JoinedStr | ast.Subscript | ast.MatchValue):
             continue
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "counted":
-            one, *many = (word.value for word in node.args[1:] if isinstance(word, ast.Constant))
-            found += [(node.lineno, 0, f"{{n}} {word}") for word in (one, *(many or [f"{one}s"]))]
+        if id(node) in without:
+            continue
+        match node:
+            case ast.Call(func=ast.Name("counted"), args=[_, ast.Constant(str(one)), *many]):
+                plurals = [word.value for word in many if isinstance(word, ast.Constant)] or [f"{one}s"]
+                found += [(node.lineno, 0, f"{{n}} {word}") for word in (one, *plurals)]
         for child in ast.iter_child_nodes(node):
             if not isinstance(child, ast.Constant | ast.JoinedStr):
                 continue
@@ -370,6 +387,24 @@ def texts_of_sentences(path: Path) -> Iterator[tuple[str, str, Path]]:
             core = _core(text)
             if re.search("[A-Za-z]{2}", re.sub(r"\{\w+\}", "", core)) and " " in core:
                 yield core, "", path
+
+
+def _other_texts(tree: ast.Module, path: Path) -> Iterator[ast.AST]:
+    """Yield what holds other texts: those of gettext, of logs, of numbers for Prometheus, of the API's
+    description.
+    """
+    for node in ast.walk(tree):
+        match node:
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                yield from node.decorator_list
+            case ast.Call(func=ast.Name("_" | "N_" | "plural" | "_gauge" | "Counter" | "Histogram")):
+                yield node
+            case ast.Call(func=ast.Attribute(value=ast.Name("logger")) | ast.Attribute(attr="_gauge")):
+                yield node
+    if path.parent.name == "routes":
+        inside = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+        yield from (node for node in tree.body if not isinstance(node, inside))
+        yield from (node.args for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
 
 
 def _core(text: str) -> str:
@@ -408,15 +443,29 @@ def _texts_of_silo(package: Path) -> Iterator[tuple[str, str, Path]]:
     lists |= {"{ask}", "{read}", "{servers}", "html", ".html", ".md", "md", ".json", ".xml", ".csv"}
     for word in (*THEMES, *re.split(r"[|\n]", _WORDS.strip())):
         yield word, "", package / "cli" / "main.py"
-    for path in sorted(package.rglob("*.py")):
-        name = path.relative_to(package).as_posix()
-        if name == "bom/findings.py":
+    yield from _labels_of_server()
+    for path in sorted((*package.rglob("*.py"), *(package.parent / "silo_server").rglob("*.py"))):
+        name = path.relative_to(package.parent).as_posix()
+        if name == "silo/bom/findings.py":
             for code in FindingCode:
                 yield from ((text, "", path) for text in (code.meaning, code.sentence, code.tail) if text)
         elif not _WITHOUT.match(name):
             for text, many, where in texts_of_sentences(path):
                 if not lists.issuperset(text.split()):
                     yield text, many, where
+
+
+def _labels_of_server() -> Iterator[tuple[str, str, Path]]:
+    """Yield the names of fields as its sentences have them."""
+    from silo_server import schema
+    from silo_server.services import suppliers
+
+    path = Path(schema.__file__)
+    labels = [text for field in schema.find_schema(None).fields for text in (field.label, field.title)]
+    for label in dict.fromkeys(filter(None, (*suppliers.COLUMNS.values(), *labels))):
+        yield f"{label}: {{problem}}", "", path
+    for column in suppliers.COLUMNS.values():
+        yield f"{column.lower().replace(',', '')} {{before}} → {{after}}", "", Path(suppliers.__file__)
 
 
 DOMAINS = [

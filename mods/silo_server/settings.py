@@ -22,6 +22,7 @@ from silo.bom.errors import (
     RemoteError,
     UnreachableError,
     VersionConflictError,
+    listed,
 )
 from silo.bom.numbers import yes_or_no
 from silo.platform import data_folder
@@ -99,9 +100,8 @@ class ArchivedPartsError(ConflictError):
 
     def __init__(self, part_numbers: Sequence[str]) -> None:
         super().__init__(
-            f"nothing was restored: {', '.join(part_numbers[:10])}"
-            f"{' and others' if len(part_numbers) > 10 else ''} would come back and"
-            f" {'is' if len(part_numbers) == 1 else 'are'} archived; say that they may (with_archived)"
+            f"nothing was restored: archived parts would come back ({listed(part_numbers, 10)}); say that "
+            "they may (with_archived)"
         )
         self.part_numbers = tuple(part_numbers)
 

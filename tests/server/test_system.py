@@ -101,7 +101,7 @@ def test_a_restore_with_an_archived_part_asks(api: Api, lost: tuple[str, str, in
     top, part, change = lost
     asked = api.call("POST", bom(top, "restore"), {"change_id": change})
     assert asked.status == 409
-    assert f"{part} would come back and is archived" in asked.json()["message"]
+    assert f"archived parts would come back ({part})" in asked.json()["message"]
     assert len(api.get(bom(top))) == 1
     api.good("POST", bom(top, "restore"), {"change_id": change, "with_archived": True})
     assert {line["child_part_number"]: line["child_archived"] for line in api.get(bom(top))}[part] is True

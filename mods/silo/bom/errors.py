@@ -35,8 +35,11 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import IntEnum
+from functools import lru_cache
+from itertools import chain
 from typing import Any, ClassVar
 
 
@@ -97,25 +100,38 @@ class Sentences:
     """Says English sentences in another language.
 
     The catalogue has patterns with ``{name}`` for what is filled in, which may be a sentence as well; ``{n}``
-    is a number. Of several patterns the one with the most words of its own is taken. What the catalogue does
-    not have stays as it is.
+    is a number; ``{words}``, ``{role}`` and ``{status}`` are words of ours. Of several patterns the one with
+    the most words of its own is taken. What the catalogue does not have stays as it is. Translations are
+    remembered, so that a page can say each of its rows.
     """
 
     LONGEST = 1000
+    OURS = re.compile(r"\{(words|role|status)\d*\}")
 
     def __init__(self, catalogue: Mapping[str, str]) -> None:
         self._catalogue = {text: done for text, done in catalogue.items() if text}
         split = [(re.split(r"\{\w+\}", text), text) for text in catalogue if "{" in text]
         # The name of the program is no part of a sentence.
-        self._patterns = sorted(split, key=lambda pair: (pair[1][:4] != "silo", -sum(map(len, pair[0]))))
+        split.sort(key=lambda pair: (pair[1][:4] != "silo", -sum(map(len, pair[0]))))
+        # A pattern is looked up by the word of its own that the fewest others have; a value may touch a word.
+        words = [re.findall(r"(?<![\w}])\w+(?![\w{])", "{}".join(parts)) or [""] for parts, _ in split]
+        count = Counter(chain.from_iterable(words))
+        self._patterns: dict[str, list[tuple[int, list[str], str]]] = {}
+        for number, (own, (parts, text)) in enumerate(zip(words, split, strict=True)):
+            self._patterns.setdefault(min(own, key=count.__getitem__), []).append((number, parts, text))
+        self._known: Callable[[str, bool], str] = lru_cache(4096)(self._said)
 
     def __call__(self, text: str, whole: bool = True) -> str:
         """Say ``text``; of a part of a sentence, single words stay: they may be somebody's names."""
         if "\n" in text:
             return "\n".join(self(line, whole) for line in text.split("\n"))
+        return (self._known if len(text) <= self.LONGEST else self._said)(text, whole)
+
+    def _said(self, text: str, whole: bool) -> str:
         if text in self._catalogue and (whole or " " in text):
             return self._catalogue[text]
-        for parts, pattern in self._patterns if len(text) <= self.LONGEST else ():
+        words = {"", *re.findall(r"\w+", text)} if len(text) <= self.LONGEST else ()
+        for _number, parts, pattern in sorted(chain.from_iterable(self._patterns.get(w, ()) for w in words)):
             if all(map(text.__contains__, parts)) and (found := self._match(parts, pattern, text, whole)):
                 return re.sub(r"\{\w+\}", lambda place: found[place[0]], self._catalogue[pattern])
         before, core = re.findall(r"^([^\w{\[-]*)(.*?)\s*$", text)[0]
@@ -135,8 +151,11 @@ class Sentences:
         found = re.fullmatch(
             "".join(map("".join, zip(map(re.escape, parts), (*ways, ""), strict=True))), text
         )
-        values = (self(value, False) for value in (found.groups() if found else ()))
-        return dict(zip(places, values, strict=False))
+        values = found.groups() if found else ()
+        return {
+            place: ", ".join(map(self, value.split(", "))) if self.OURS.match(place) else self(value, False)
+            for place, value in zip(places, values, strict=False)
+        }
 
 
 class SiloError(Exception):

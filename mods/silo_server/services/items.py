@@ -197,8 +197,9 @@ def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: 
     query = select(items).where(items.c.part_number_key == part_number.casefold())
     row = tx.conn.execute(query.with_for_update(key_share=True) if lock else query).one_or_none()
     if row is None or (row.archived_at and not include_archived):
-        state = "is archived" if row is not None else "does not exist on this server"
-        raise NotFoundError(f"item {part_number!r} {state}")
+        if row is None:
+            raise NotFoundError(f"item {part_number!r} does not exist on this server")
+        raise NotFoundError(f"item {part_number!r} is archived")
     if lock:
         tx.take_time(row.updated_at)
     return to_item(row)
@@ -290,7 +291,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     if (earlier := earlier_answer(tx, request)) is not None:
         return _made_before(tx, earlier.text), False
     if uuid is not None and (others := get_by_uuids(tx, [uuid], include_archived=True)):
-        state = ", which is archived" if others[0].archived_at else " already"
+        state = ", which is archived" if others[0].archived_at else ""
         raise ConflictError(
             f"id: {uuid} is that of {others[0].part_number}{state}; a new item needs a new id"
         )

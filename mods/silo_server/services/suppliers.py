@@ -353,15 +353,16 @@ class SupplierChange:
             part = new.get(key) or old[key]
             who = f"{part.supplier} {part.number}".strip()
             if key not in old or key not in new:
-                said.append(f"{who} {'added' if key in new else 'removed'}")
+                said.append(f"{who} added" if key in new else f"{who} removed")
                 continue
             before, after = texts_of(old[key]), texts_of(new[key])
             changes = [
-                f"{COLUMNS[name].lower()} {before[name] or 'none'} → {after[name] or 'none'}"
+                f"{COLUMNS[name].lower().replace(',', '')} {before[name] or '–'} → {after[name] or '–'}"
                 for name in COLUMNS
                 if before[name] != after[name]
             ]
-            said += [f"{who}: {', '.join(changes)}"] if changes else []
+            words = ", ".join(changes)
+            said += [f"{who} changed: {words}"] if words else []
         return said or ["the order of the list"]
 
 

@@ -207,11 +207,11 @@ def as_csv(data: bytes, of: Table = BOM) -> bytes:
     grid, text = (likely or sheets)[0]
     hidden = {row for row, _ in grid.cells} & grid.hidden_rows
     struck = {row for (row, _), cell in grid.cells.items() if cell.struck}
-    for rows, what in ((hidden, "hidden"), (struck, "struck out")):
+    for rows, words in ((hidden, "hidden"), (struck, "struck out")):
         if rows:
             lines = listed([str(row + 1) for row in sorted(rows)], 8)
             raise RejectedError(
-                f"file: of sheet “{grid.name}” these lines are {what}: {lines}; show or delete them, for an "
+                f"file: of sheet “{grid.name}” these lines are {words}: {lines}; show or delete them, for an "
                 "import would take them like all others"
             )
     return text
@@ -300,9 +300,10 @@ def _refuse_clashes(
     header = header[:MAX_COLUMNS]
     seconds = second_columns(header, single, layout.columns)
     problems = [
-        f"the columns '{clash.ours}' and '{clash.other}' both mean the {clash.role.replace('_', ' ')}, and "
+        f"the columns '{clash.ours}' and '{clash.other}' both mean the {words}, and "
         f"in row {layout.header + 2 + clash.row} they say {clash.used[:40]!r} and {clash.unused[:40]!r}"
         for clash in find_clashes(header, body, layout.columns, seconds)
+        for words in [clash.role.replace("_", " ")]
     ]
     if problems:
         raise RejectedError(f"file: {'; '.join(problems)}; choose one, or rename the other", problems)

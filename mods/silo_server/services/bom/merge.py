@@ -528,10 +528,10 @@ def _children(tx: Tx, order: MergeOrder, lines: Sequence[Line]) -> tuple[dict[st
     problems = list(order.problems)
     for entry in order.entries:
         if entry.key not in names:
-            state = "is archived" if entry.key in archived else "does not exist on this server"
-            problems.append(
-                (entry.index, f"entries[{entry.index}].child_part_number: {entry.part_number!r} {state}")
-            )
+            name = f"entries[{entry.index}].child_part_number: {entry.part_number!r}"
+            gone = entry.key in archived
+            problem = f"{name} is archived" if gone else f"{name} does not exist on this server"
+            problems.append((entry.index, problem))
     if problems:
         texts = [text for _, text in sorted(problems, key=lambda problem: problem[0])]
         raise RejectedError(

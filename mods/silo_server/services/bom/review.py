@@ -135,10 +135,10 @@ def change_line(
     if not same_quantity(after.quantity, line.state.quantity):
         quantity = f"quantity {plain(line.state.quantity)} → {plain(after.quantity)}"
         fields = [quantity, *(name for name in fields if name != "quantity")]
-    what = ", ".join(name.replace("_", " ") for name in fields) or "source"
+    words = ", ".join(name.replace("_", " ") for name in fields) or "source"
     change = LineRecord(line.id, line.child_id, line.state, after, line.position)
     return _apply(
-        tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {what}", why
+        tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {words}", why
     )
 
 
