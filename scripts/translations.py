@@ -315,6 +315,7 @@ BOM unchanged|BOM blocked|BOM unregistered|BOM failed|reading {n} s|server {n} s
 it is missing|{n} removed|{n} added|{n} quantity changed|{n} unreferenced|{n} in conflict|{n} broken
 {n} kept as intentional|{n} set to the assembly's quantity|{n} kept at Silo's quantity|{n} refused
 {n} question open|{n} questions open|{n} unreferenced line|{n} unreferenced lines|{n} unregistered
+changes|event streams|summaries to be kept|Supplier
 {n} conflict|{n} conflicts|at least {low} and at most {high}|viewer|editor|admin|review|released|obsolete
 draft|Draft|archived|changed|mass|size|volume|material|description|quantity {before} → {after}|notes|unit
 source|reason|revision|hidden|unreferenced|metadata|rel type
@@ -343,8 +344,8 @@ _NO_TEXT = re.compile(
             r"Also where the form|^The file$|^Still what If|^a GLB of more|disk is full\|",
             r"^Method Not Allowed:|^Accept-|^GET, |^Value error",
             # patterns, names of classes, programs, types
-            r"\(\?|\\|signal \(SIG|^(?=\w+[A-Z])[A-Z]\w+( [A-Z]\w+)*$|\w::\w|sys; print|\w \| \w|Mapping\[",
-            r"UUIDs|Client\(|module \{|^\{typeid\} \{name\} of|^\{meta_key\}",
+            r"\(\?|\\(?! )|signal \(SIG|^(?=\w+[A-Z])[A-Z]\w+( [A-Z]\w+)*$|\w::\w|sys; print|\w \| \w",
+            r"Mapping\[|UUIDs|^1 to 64 char|Client\(|module \{|^\{typeid\} \{name\} of|^\{meta_key\}",
             # commands, and what only repeats a sentence
             r"^\s*silo-mod ([a-z-]+ |\[)|^silo-mod \w+$|^silo-mod \{version\}|^silo-mod: \{(?!text)\w+\}$",
             r"^silo-mod: \{(error\}\. |why\}: )",

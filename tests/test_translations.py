@@ -142,6 +142,16 @@ def test_no_text_of_a_template_hides_in_an_expression() -> None:
     assert not found
 
 
+def test_templates_say_sentences_of_the_server() -> None:
+    """Errors, and what is open, are English until a filter says them."""
+    shown = re.compile(
+        r"\{\{ (?:\w+[.\[])*\"?(problem|message|gap|warning|summary)\b(?!.*(spoken|sentence|_\()).*?\}\}"
+    )
+    for path in sorted((Path(render.__file__).parent / "templates").glob("*.html")):
+        found = re.findall(r"\{\{.*?\}\}", path.read_text("utf-8"))
+        assert [text for text in found if shown.match(text) and "plural(" not in text] == [], path.name
+
+
 SHOWN = re.compile(
     r"set(Text|WindowTitle|ToolTip|PlaceholderText|Title|StatusTip|HeaderLabels|HorizontalHeaderLabels|"
     r"SpecialValueText|Suffix|InformativeText|DetailedText)|add(Action|Button|Item|Items|Menu|Row|Tab)|"

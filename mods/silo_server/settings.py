@@ -275,5 +275,5 @@ def _convert(variable: str, text: str, kind: str) -> Any:
     with suppress(ValueError):
         value = readers[kind](text)
     if value is None:
-        raise ConfigError(f"{variable}: wanted {kind}, got {text!r}")
+        raise ConfigError(f"{variable}: wanted a value of the type {kind}, got {text!r}")
     return value

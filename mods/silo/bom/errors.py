@@ -145,9 +145,16 @@ class Sentences:
 
     def _match(self, parts: Sequence[str], pattern: str, text: str, whole: bool) -> dict[str, str]:
         places = re.findall(r"\{\w+\}", pattern)
-        if not whole and "{n}" not in places and len(re.findall(r"[^\W\d_]{2}\b", " ".join(parts))) < 2:
+        several = any(end in text and end not in pattern for end in (". ", "; ", ": "))
+        words = len(re.findall(r"[^\W\d_]{2}\b", " ".join(parts)))
+        # A single word says too little of a part of a sentence, and of several.
+        if "{n}" not in places and words < 2 and (several or not whole):
             return {}
-        ways = (r"(\d+)" if place == "{n}" else "(.*?)" for place in places)
+        # A name before a colon is up to the first colon.
+        ways = [
+            r"(\d+)" if place == "{n}" else "((?:(?!: ).)*?)" if behind.startswith(": ") else "(.*?)"
+            for place, behind in zip(places, parts[1:], strict=True)
+        ]
         found = re.fullmatch(
             "".join(map("".join, zip(map(re.escape, parts), (*ways, ""), strict=True))), text
         )
@@ -311,7 +318,7 @@ class CycleError(ConflictError):
     code = "cycle"
 
     def __init__(self, path: Sequence[str]) -> None:
-        super().__init__("this BOM would contain itself: " + " → ".join(path))
+        super().__init__(f"this BOM would contain itself: {' → '.join(path)}")
         self.path = tuple(path)
 
 

@@ -88,7 +88,9 @@ class PropertyField:
                 f"at least {low:g}" if low is not None else "",
                 f"at most {high:g}" if high is not None else "",
             ]
-            raise RejectedError(f"{self.title}: wanted {' and '.join(filter(None, ends))}, got {text!r}")
+            raise RejectedError(
+                f"{self.title}: wanted a number of {' and '.join(filter(None, ends))}, got {text!r}"
+            )
         return value
 
 

@@ -276,8 +276,10 @@ class _Reader:
             problems.append(f"Currency: wanted three letters such as EUR, got {currency[:40]!r}")
         days = whole_number(said["lead_time_days"], 4)
         if said["lead_time_days"] and (days is None or days > LONGEST_LEAD_TIME):
-            wanted = f"wanted a whole number up to {LONGEST_LEAD_TIME}"
-            problems.append(f"{COLUMNS['lead_time_days']}: {wanted}, got {said['lead_time_days'][:40]!r}")
+            wrong = said["lead_time_days"][:40]
+            problems.append(
+                f"Lead time [days]: wanted a whole number up to {LONGEST_LEAD_TIME}, got {wrong!r}"
+            )
         word = said["preferred"].casefold()
         preferred = word in ("x", "✓", "✔", "y") or (yes_or_no(word) if word else False)
         if preferred is None:
@@ -481,8 +483,9 @@ def _planned(rows: Sequence[Record], items_by_number: Mapping[str, Item], reader
         for name, text in record.items():
             said = before.setdefault(name, text) if name in COLUMNS and name != "prices" and text else text
             if said != text:
-                sentence = f"says {text[:40]!r}, row {before['row']} says {said[:40]!r}"
-                problems.append(f"row {row}: {COLUMNS[name]}: {sentence}")
+                problems.append(
+                    f"row {row}: {COLUMNS[name]} says {text[:40]!r}, row {before['row']} says {said[:40]!r}"
+                )
         before["prices"] = "; ".join(filter(None, (before["prices"], prices)))
     there = {} if item is None else {part.key: part for part in supplier_parts_of(item)}
     was = list(there.values())

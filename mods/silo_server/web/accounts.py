@@ -56,7 +56,7 @@ from silo_server.web.forms import (
     text,
     unpacked,
 )
-from silo_server.web.render import LANGUAGE_COOKIE, LANGUAGES, _, page, page_for, part_of, sentence
+from silo_server.web.render import LANGUAGE_COOKIE, LANGUAGES, _, page, page_for, part_of
 
 router = APIRouter(include_in_schema=False)
 
@@ -395,7 +395,7 @@ def _show(
         run=run,
         fixed=call.server.settings.read_only,
         roles=list(Role),
-        problem=sentence(problem),
+        problem=problem,
         link=link,
         typed=typed or {},
         minutes=int(call.server.settings.login_link_seconds // 60),
@@ -486,7 +486,7 @@ def _own_page(call: Call, *, problem: str = "", fresh: tuple[str, str] | None = 
         key=secrets.token_hex(16),
         scopes=[scope for scope in Scope if call.actor.role.covers(scope.role)],
         asks_password=not call.actor.by_link,
-        problem=sentence(problem),
+        problem=problem,
         fresh=fresh,
         shortest=access.MIN_PASSWORD,
     )

@@ -34,7 +34,7 @@ from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.line_form import changes, sentences
 from silo_server.web.merge_page import bom_path
-from silo_server.web.render import N_, Address, ListPart, _, isolate, page, part_of, plural, segment, sentence
+from silo_server.web.render import N_, Address, ListPart, _, isolate, page, part_of, plural, segment, spoken
 
 router = APIRouter(include_in_schema=False)
 
@@ -178,7 +178,7 @@ def _words(name: str, data: Mapping[str, Any]) -> str:
         return name
     values = {
         **data,
-        "summary": _(str(data.get("summary") or N_("changed"))),
+        "summary": spoken(str(data.get("summary") or "changed")),
         "status": _(str(data.get("status", ""))),
         "comment": f": {isolate(str(data['comment']))}" if data.get("comment") else "",
         "changes": _("no changes at the moment") if data.get("mode") == "read-only" else _("changes again"),
@@ -262,7 +262,7 @@ def changes_page(
         "changes.html",
         status=status,
         item=item,
-        problem=sentence(problem),
+        problem=problem,
         found=happenings[:MOST_CHANGES],
         more=max(0, len(happenings) - MOST_CHANGES),
         first=first,

@@ -32,7 +32,7 @@ from silo_server.web.accounts import Writer
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.line_form import changes
 from silo_server.web.merge_page import bom_path
-from silo_server.web.render import N_, _, isolate, page, plural, sentence
+from silo_server.web.render import N_, _, isolate, page, plural
 
 router = APIRouter(include_in_schema=False)
 
@@ -126,7 +126,7 @@ class Problem:
 
     @classmethod
     def of(cls, error: SiloError) -> Problem:
-        return cls(sentence(str(error).removeprefix("file: ")), error.status_hint)
+        return cls(str(error), error.status_hint)
 
 
 def layout_of(form: FormData, of: imports.Table = imports.BOM) -> Layout | None:

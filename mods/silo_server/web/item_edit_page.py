@@ -402,5 +402,4 @@ def _page(call: Call, item: Item | None, shown: FormState, uses: int = 0) -> Res
 
 
 def _problems(error: SiloError) -> list[str]:
-    problems = error.problems if isinstance(error, RejectedError) and error.problems else [str(error)]
-    return [f"{problem[:1].upper()}{problem[1:]}" for problem in problems]
+    return list(error.problems) if isinstance(error, RejectedError) and error.problems else [str(error)]

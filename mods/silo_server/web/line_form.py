@@ -47,7 +47,7 @@ MOST["quantity"] = 100
 # "6" and "m" mean something only together.
 TOGETHER = (("quantity", "unit"),)
 MINE, THEIRS = "mine", "theirs"
-KEPT = "kept on purpose, not in the CAD model"
+KEPT = N_("kept on purpose, not in the CAD model")
 DONE = {
     ReviewAction.REMOVE: N_("removed"),
     ReviewAction.KEEP: N_("kept as intentional"),
@@ -171,7 +171,7 @@ def decision_of(form: FormData) -> tuple[ReviewAction, str | None]:
         action = ReviewAction(text(form, "action"))
     except ValueError:
         raise RejectedError(_("action: wanted one of the buttons, got none; load the page again")) from None
-    return action, text(form, "reason") or (KEPT if action is ReviewAction.KEEP else None)
+    return action, text(form, "reason") or (_(KEPT) if action is ReviewAction.KEEP else None)
 
 
 def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:

@@ -34,7 +34,7 @@ from silo_server.web import (
     waiting_page,
 )
 from silo_server.web.accounts import LoginNeededError, OldFormError, send_again, to_login
-from silo_server.web.render import LANGUAGE, LANGUAGE_COOKIE, N_, _, language_for, page_for, sentence
+from silo_server.web.render import LANGUAGE, LANGUAGE_COOKIE, N_, _, language_for, page_for
 
 ROUTERS = (
     accounts.router,
@@ -162,7 +162,7 @@ def _page_above(request: Request) -> str:
 def _sentence(status: int, message: str, request: Request) -> str:
     if message.startswith(("Not Found:", "Method Not Allowed:")):
         return _("There is no page %(path)s.", path=request.url.path)
-    return sentence(message)
+    return message
 
 
 def _actor(request: Request) -> Actor | None:

@@ -8,7 +8,8 @@ address is fetched and only the table is replaced.
 
 Languages: a template holds its texts in English, and is translated as a whole when it is compiled for a
 language (:func:`translated`). ``_`` and ``plural`` translate what stands in Python, in scripts and in
-expressions. The catalogues are ``silo_server/locale/*/LC_MESSAGES/silo_server.mo``.
+expressions. The catalogues are ``silo_server/locale/*/LC_MESSAGES/silo_server.mo``. Sentences of the server,
+errors and what is open, are English until a template says them (:func:`spoken`).
 """
 
 from __future__ import annotations
@@ -344,8 +345,14 @@ def _rounded(value: Decimal) -> Decimal:
     return short.quantize(Decimal(1)) if short == short.to_integral_value() else short
 
 
+def spoken(text: str) -> str:
+    """Say a finished sentence of the server, an error or what is open, in the language of the page."""
+    return silo.spoken(text, LANGUAGE.get())
+
+
 def sentence(text: str) -> str:
-    """Return a message as a sentence: a capital first, and a full stop where it has no end."""
+    """Say a message as a sentence: a capital first, and a full stop where it has no end."""
+    text = spoken(text)
     return f"{text[:1].upper()}{text[1:]}{'' if not text or text.endswith(('.', '?', '!')) else '.'}"
 
 
@@ -372,6 +379,7 @@ def environment(language: str) -> Environment:
     made.filters.update(
         quantity=quantity, when=when, segment=segment, size=size, bdi=bdi, mass=mass, money=money
     )
+    made.filters.update(spoken=spoken, sentence=sentence)
     made.globals.update(plural=plural, _=_, languages=LANGUAGES, script_words=script_words)
     return made
 

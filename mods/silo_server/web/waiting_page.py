@@ -27,7 +27,7 @@ from silo_server.values import Line
 from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import Form, back, back_to, text, texts
 from silo_server.web.line_form import DONE, decision_of
-from silo_server.web.render import N_, Address, _, arranged, isolate, page, page_of, plural
+from silo_server.web.render import N_, Address, _, arranged, isolate, page, page_of, plural, spoken
 
 router = APIRouter(include_in_schema=False)
 
@@ -219,7 +219,7 @@ def _each(
                 _("%(name)s: it was changed meanwhile, so nothing was done there", name=isolate(name(value)))
             )
         except SiloError as error:
-            problems.append(f"{isolate(name(value))}: {error}")
+            problems.append(f"{isolate(name(value))}: {spoken(str(error))}")
     return changes, problems
 
 

@@ -289,7 +289,8 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
     check_no_cycle(tx, parent, [line.child.id for line in lines if line.after is None])
     changes = [LineRecord(n.line_id, n.child.id, n.after, n.before, n.position) for n in lines]
     _reopen(tx, parent, change, current)
-    text = f"undone: {change.summary}"
+    words = change.summary  # called so for its translation
+    text = f"undone: {words}"
     return apply_changes(
         tx, parent, changes, ChangeNote(kind=ChangeKind.UNDO, summary=text, refers_to=change_id)
     )

@@ -151,8 +151,8 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None, of: Table
     # A person may also choose the column of the names.
     roles = {*layout.columns, *(_INSTEAD[Role.PART_NUMBER] if Role.NAME in layout.columns else ())}
     if missing := of.lacking(roles):
-        names = " and ".join(f"'{role.replace('_', ' ').capitalize()}'" for role in missing)
-        raise RejectedError(f"file: say which column is {names}")
+        words = ", ".join(role.replace("_", " ").capitalize() for role in missing)
+        raise RejectedError(f"file: choose the column of {words}")
     rows = _rows(text, layout.delimiter)
     try:
         table = list(islice(rows, layout.header + 1 + max_rows + 1))
@@ -266,9 +266,9 @@ def guess(text: str, of: Table = BOM) -> Layout:
         raise RejectedError(near)
     if broken is not None:
         raise RejectedError(f"file: wanted CSV, got a file that cannot be read as CSV ({broken})")
-    names = " and ".join(f"'{role.replace('_', ' ').capitalize()}'" for role in of.needed)
+    words = ", ".join(role.replace("_", " ").capitalize() for role in of.needed)
     raise RejectedError(
-        f"file: wanted a header row with {names} among the first {HEADER_WITHIN} rows, found none"
+        f"file: wanted a header row with {words} among the first {HEADER_WITHIN} rows, found none"
     )
 
 
