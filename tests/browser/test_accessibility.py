@@ -12,7 +12,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from model_scenes import machine
@@ -72,6 +72,7 @@ ENGLISH = """() => [...document.querySelectorAll("button:not([lang]), .button, s
 HEADER = "getComputedStyle(document.querySelector('.top')).display"
 # Wide; a phone; a small one, or a zoomed page. Both phones have the same style sheet: one of them is for axe.
 WIDTHS, FOR_AXE = (1440, 390, 320), (1440, 320)
+SCHEMES: tuple[Literal["dark", "light"], ...] = ("dark", "light")
 PAGES = (
     "/login",
     "/items",
@@ -154,11 +155,10 @@ def numbers(api: Api) -> dict[str, str]:
     return {"parent": parent, "child": child}
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_no_page_has_a_finding(axe: str, numbers: dict[str, str], visit: Visit, scheme: str) -> None:
+def test_no_page_has_a_finding(axe: str, numbers: dict[str, str], visit: Visit) -> None:
     """Not a single violation of WCAG 2.2 AA or of axe's best practices, whatever its weight."""
-    page = visit("admin", color_scheme=scheme)
-    stranger = visit(None, color_scheme=scheme)
+    page = visit("admin")
+    stranger = visit(None)
     findings: list[str] = []
     for path in PAGES:
         shown = stranger if path == "/login" else page
@@ -198,12 +198,9 @@ def test_no_control_is_taller_than_its_text(api: Api, visit: Visit, locale: str)
     assert not findings, "\n".join(findings)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_answers_have_no_finding(
-    axe: str, api: Api, numbers: dict[str, str], visit: Visit, scheme: str
-) -> None:
+def test_answers_have_no_finding(axe: str, api: Api, numbers: dict[str, str], visit: Visit) -> None:
     """Pages that only a form or an event brings: an import, a token, a notice, a problem, read-only."""
-    page = visit("admin", color_scheme=scheme)
+    page = visit("admin")
     findings: list[str] = []
 
     def look(what: str) -> None:
@@ -240,12 +237,13 @@ def test_answers_have_no_finding(
 
 
 def in_each_width(page: Page, axe: str, what: str) -> list[str]:
-    """What is wrong with the page as it is shown now, in each width."""
+    """What is wrong with the page as it is shown now, in each width, light and dark."""
     findings = []
     for width in WIDTHS:
         page.set_viewport_size({"width": width, "height": 844})
-        if width in FOR_AXE:
-            findings += [f"{what} at {width}: {finding}" for finding in violations(page, axe)]
+        for scheme in SCHEMES if width in FOR_AXE else ():
+            page.emulate_media(color_scheme=scheme)
+            findings += [f"{what} at {width}, {scheme}: {finding}" for finding in violations(page, axe)]
         if measured(page, OVERFLOW) > 0:
             findings.append(f"{what} at {width}: it is wider than the window")
         findings += [f"{what} at {width}: {tall}" for tall in measured(page, TALL)]
@@ -265,12 +263,9 @@ def violations(page: Page, axe: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_pages_of_an_edit_have_no_finding(
-    axe: str, api: Api, numbers: dict[str, str], visit: Visit, scheme: str
-) -> None:
+def test_pages_of_an_edit_have_no_finding(axe: str, api: Api, numbers: dict[str, str], visit: Visit) -> None:
     """A choice, two readings, a kept form, columns by hand, a filter; at 1440, 390 and 320 px."""
-    page = visit("editor", color_scheme=scheme)
+    page = visit("editor")
     findings: list[str] = []
     parent, child = numbers["parent"], numbers["child"]
     path = f"/items/{parent}/bom?edit={child}"
@@ -318,6 +313,7 @@ def test_pages_of_an_edit_have_no_finding(
 def test_a_page_is_measured_with_its_style_sheet(visit: Visit) -> None:
     """Text comes before the style sheet; what tests measure waits for both."""
     page = visit("viewer")
+    page.goto("/items")
     plain = measured(page, HEADER)
     come_late(page.context, 1)
     page.get_by_role("link", name="Activity").click()
@@ -325,11 +321,10 @@ def test_a_page_is_measured_with_its_style_sheet(visit: Visit) -> None:
     assert measured(page, HEADER) == plain
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_pages_with_a_model_have_no_finding(axe: str, api: Api, visit: Visit, scheme: str) -> None:
+def test_pages_with_a_model_have_no_finding(axe: str, api: Api, visit: Visit) -> None:
     """The controls of the model, beside a product, a decision and a comparison."""
-    top = machine(api, f"A{scheme}")
-    page = visit("admin", color_scheme=scheme)
+    top = machine(api, "A")
+    page = visit("admin")
     findings: list[str] = []
     for path in ("", "/bom", "/compare"):
         page.goto(f"/items/{top}{path}")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,6 @@ from silo.cli.main import main
 from silo.inertia.links import read_link_map
 
 ARM = Path(__file__).parents[2] / "examples" / "arm"
-DRAWN = ["--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--ignore-gpu-blocklist"]
 
 
 @pytest.fixture(name="report", scope="module")
@@ -48,27 +46,24 @@ def _report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(name="opened")
 def _opened(chromium: Browser, report: Path) -> Iterator[Callable[..., Page]]:
-    """``opened(webgl)``: the page in a browser of its own; requests and errors are in ``page.said``."""
-    browsers = []
+    """``opened(webgl)``: the page, of nobody else's; requests and errors are in ``page.said``."""
+    pages: list[Any] = []
 
     def opened(webgl: bool = True) -> Page:
-        most = 90_000
-        flags = DRAWN if webgl else ["--disable-gpu", "--disable-3d-apis"]
-        path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-        arguments = ["--no-sandbox", *flags]
-        browsers.append(chromium.browser_type.launch(executable_path=path, args=arguments, timeout=most))
-        page: Any = browsers[-1].new_page(viewport={"width": 1300, "height": 900})
-        page.set_default_timeout(most)
+        pages.append(page := chromium.new_page(viewport={"width": 1300, "height": 900}))
+        if not webgl:
+            page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+        page.set_default_timeout(90_000)
         page.said = []
         page.on("request", lambda request: page.said.append(request.url))
         page.on("pageerror", lambda error: page.said.append(str(error)))
         page.on("dialog", lambda dialog: page.said.append(dialog.message))
         page.goto(report.as_uri())
-        return page  # type: ignore[no-any-return]
+        return page
 
     yield opened
-    for browser in browsers:
-        browser.close()
+    for page in pages:
+        page.close()
 
 
 def seen(page: Page, other_than: bytes = b"") -> bytes:
