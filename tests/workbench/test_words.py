@@ -5,12 +5,17 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from silo.bom.errors import DocumentError, NotFoundError
 from silo.workbench import words
+from silo.workbench.pane.activity import banner
+from silo.workbench.session.session import PaneState
+from silo.workbench.settings.server import ServerChoice
 from silo.workbench.words import breakable, counted, plain, quantity, tip, told_apart, visible
 
 
@@ -92,6 +97,38 @@ def test_texts_are_translated_by_what_freecad_offers() -> None:
         assert words.translate("Silo", "Sync") == "Silo:cnyS"
     finally:
         words.use(lambda _context, text: text)
+
+
+def test_sentences_are_in_the_language_of_the_translation() -> None:
+    """Errors of the server and of the library, and what FreeCAD could not do; names in them stay."""
+    said = {
+        NotFoundError(
+            "item 'A-1' does not exist on this server"
+        ): "Artikel 'A-1' gibt es auf diesem Server nicht",
+        DocumentError("Arm.FCStd", "FreeCAD did not load it"): "Arm.FCStd: FreeCAD hat es nicht geladen",
+        "The file Arm.FCStd is missing; used by Cover": "Die Datei Arm.FCStd fehlt; verwendet von Cover",
+    }
+    assert words.spoken("FreeCAD did not load it") == "FreeCAD did not load it"
+    words.use(lambda _context, text: {"en": "de"}.get(text, text))
+    try:
+        for sentence, german in said.items():
+            assert words.spoken(sentence) == german
+        reason = "the server is stopping; try again later"
+        told = banner(
+            PaneState(server=ServerChoice("https://silo.example.com"), connection="", reason=reason)
+        )
+        assert "der Server wird angehalten; später noch einmal versuchen" in told.text
+    finally:
+        words.use(lambda _context, text: text)
+
+
+def test_errors_are_shown_in_the_language_of_the_person() -> None:
+    """What is shown directly went through ``spoken``; windows, boxes and lines of news say what they get."""
+    direct = re.compile(
+        r"\.set(Text|ToolTip)\((?!spoken).*str\(error\)|console\(f\"[^\"]*\{(error|problem)\}"
+    )
+    for path in Path(words.__file__).parent.rglob("*.py"):
+        assert not direct.search(path.read_text("utf-8")), path.name
 
 
 @pytest.mark.parametrize("text", ["", "a short text", "BOM Updated: A01-0001 Torso", "x" * 26])

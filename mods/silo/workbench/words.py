@@ -14,6 +14,8 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+import silo
+
 if TYPE_CHECKING:
     from silo.bom.errors import Translate
 
@@ -41,6 +43,12 @@ def translate(context: str, text: str, **values: object) -> str:
 def filled(text: str, **values: object) -> str:
     """Put each value in place of its ``{name}``; a name without a value stays, also in a value."""
     return re.sub(r"\{(\w+)\}", lambda name: str(values.get(name[1], name[0])), text)
+
+
+def spoken(sentence: object) -> str:
+    """Say a finished sentence of silo, such as an error or a finding, in the user's language."""
+    # The translation of this text is the code of its language, so both have the same.
+    return silo.spoken(str(sentence), translate("Silo", "en"))
 
 
 def QT_TRANSLATE_NOOP(_context: str, text: str) -> str:  # the name that Qt's tools look for

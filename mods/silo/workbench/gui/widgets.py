@@ -230,7 +230,7 @@ def _message(parent: Any, title: str, text: str) -> Any:
     box.setIcon(QtWidgets.QMessageBox.Icon.Warning)
     box.setWindowTitle(title)
     box.setTextFormat(QtCore.Qt.TextFormat.PlainText)
-    box.setText(words.visible(text, 2000))
+    box.setText(words.visible(words.spoken(text), 2000))
     return box
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from silo.inertia.report import InertiaReport, MassCode, PartResult, Source
-from silo.workbench.words import counted, translate
+from silo.workbench.words import counted, spoken, translate
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def shown(report: InertiaReport) -> MassView:
             translate("Silo", "1 part has no mass; it is missing from the sum."),
             translate("Silo", "{n} parts have no mass; they are missing from the sum."),
         )
-    notes = tuple(w.message for w in report.warnings if not w.part_name)
+    notes = tuple(spoken(w.message) for w in report.warnings if not w.part_name)
     return MassView(report.assembly, _summary(report, parts), incomplete, tuple(rows), notes)
 
 
@@ -89,7 +89,7 @@ def _summary(report: InertiaReport, parts: list[PartResult]) -> str:
 
 
 def _row(part: PartResult) -> MassRow:
-    reasons = [w.message for w in part.warnings if str(w.code) != MassCode.NO_MASS_NO_MATERIAL]
+    reasons = [spoken(w.message) for w in part.warnings if str(w.code) != MassCode.NO_MASS_NO_MATERIAL]
     if part.source is Source.ZERO and part.volume > 0:
         reasons.insert(0, translate("Silo", "no material with a density"))
     material = part.material_name or part.material or ""

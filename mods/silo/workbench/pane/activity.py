@@ -22,7 +22,7 @@ from urllib.parse import urlsplit
 from silo.api.config import canonical
 from silo.outbox.entry import ASKED, State, host_of, parts, words
 from silo.outbox.entry import Entry as QueueEntry
-from silo.workbench.words import counted, plain, translate
+from silo.workbench.words import counted, plain, spoken, translate
 
 if TYPE_CHECKING:
     from silo.api.config import Pause
@@ -304,12 +304,12 @@ def _connection(shown: PaneState) -> Banner:
     again = Action(Do.RETRY, translate("Silo", "Try again"))
     if shown.connection == "packages":
         mend = Action(Do.INSTALL, translate("Silo", "Install What Silo Needs…"))
-        return Banner(plain(shown.reason, 400), ground=_RED[0], ink=_RED[1], actions=(mend, again))
+        return Banner(plain(spoken(shown.reason), 400), ground=_RED[0], ink=_RED[1], actions=(mend, again))
     if not shown.server.configured:
         text = translate("Silo", "No Silo server is set up yet.")
         return Banner(text, Tone.QUIET, actions=(settings,))
     host = plain(urlsplit(shown.server.url).netloc or shown.server.url, 80)
-    reason = plain(shown.reason, 300)
+    reason = plain(spoken(shown.reason), 300)
     kind = shown.connection
     if kind == "online":
         return Banner("● " + translate("Silo", "Connected to {host}", host=host), Tone.GOOD)
@@ -443,7 +443,7 @@ def _row(entry: QueueEntry, here: str, theirs: Theirs | None, pause: Pause | Non
         what=parts(entry, translate),
         state=row_words.state,
         since=entry.taken_at,
-        reason=plain(text, 400),
+        reason=plain(spoken(text), 400),
         urgent=row_words.urgent,
         actions=tuple(_actions(entry, here)) if row_words.urgent or entry.reason else (),
         details=tuple(details),

@@ -30,7 +30,7 @@ from silo.workbench.pane.activity import (
     rows,
 )
 from silo.workbench.session.session import PaneState
-from silo.workbench.words import plain, translate
+from silo.workbench.words import plain, spoken, translate
 
 # More boxes than this are made only when somebody asks for them: widgets cost time, values do not.
 FIRST, MORE = 40, 60
@@ -204,7 +204,7 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
 
     def _line(self, layout: Any, line: EntryLine) -> None:
         sign = {Tone.WARNING: "⚠ ", Tone.ERROR: "✗ "}.get(line.tone, "")
-        layout.addWidget(widgets.label(sign + line.text, line.tone))
+        layout.addWidget(widgets.label(sign + spoken(line.text) if sign else line.text, line.tone))
         if line.actions:
             layout.addLayout(buttons(line.actions, self._on_action))
 

@@ -11,7 +11,7 @@ from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.preview.flow import MOST_CELL, MOST_ROWS, Preview, PreviewRow, RowKind, rows, summary
-from silo.workbench.words import counted, plain, tip, translate
+from silo.workbench.words import counted, plain, spoken, tip, translate
 
 if TYPE_CHECKING:
     from silo.workbench.preview.flow import PreviewFlow
@@ -189,11 +189,13 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         """Show the result of a comparison with the 3D view, or why a line counts so many (``agrees``
         None).
         """
+        text = spoken(text)
         self._view_text.setText(plain(text, 2000) if "\n" not in text else text)
         widgets.paint(self._view_text, {True: Tone.GOOD, False: Tone.ERROR, None: Tone.PLAIN}[agrees])
         self._view_text.show()
 
     def _tell(self, text: str) -> None:
+        text = spoken(text)
         self._problem.setText(plain(text, 500) if "\n" not in text else text)
         self._problem.setVisible(bool(text))
 

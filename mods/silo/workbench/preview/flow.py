@@ -25,7 +25,7 @@ from silo.workbench.commit.flow import CommitFlow, Desk, commit_of
 from silo.workbench.commit.plan import Snapshot
 from silo.workbench.session import Control
 from silo.workbench.session.session import Session
-from silo.workbench.words import MOST_TIP, counted, plain, quantity, translate
+from silo.workbench.words import MOST_TIP, counted, plain, quantity, spoken, translate
 
 if TYPE_CHECKING:
     from silo.bom.objects import Key
@@ -360,7 +360,7 @@ def _finding_row(finding: Finding, preview: Preview, base: str) -> PreviewRow:
     return PreviewRow(
         RowKind.NOT_COUNTED,
         number={Severity.ERROR: "✗", Severity.WARNING: "⚠", Severity.INFO: "·"}[finding.severity],
-        note=shorten(finding.message, base),
+        note=spoken(shorten(finding.message, base)),
         document=top if mine else "",
         objects=mine,
     )

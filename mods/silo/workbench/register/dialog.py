@@ -34,7 +34,7 @@ from silo.workbench.register.flow import (
     source_words,
     type_words,
 )
-from silo.workbench.words import plain, tip, told_apart, translate, visible
+from silo.workbench.words import plain, spoken, tip, told_apart, translate, visible
 
 if TYPE_CHECKING:
     from silo.workbench.register.flow import RegisterFlow
@@ -303,7 +303,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
 
     def tell(self, text: str) -> None:
         """Show a problem, of one or more lines; "" takes it away."""
-        self._problem.setText(visible(text, 1000))
+        self._problem.setText(visible(spoken(text), 1000))
         self._problem.setVisible(bool(text))
 
     def registered(self, order: Order, result: Registration) -> None:

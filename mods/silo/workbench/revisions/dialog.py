@@ -24,7 +24,7 @@ from silo.workbench.revisions.flow import (
     left_alone,
     over_edits,
 )
-from silo.workbench.words import plain, tip, told_apart, translate
+from silo.workbench.words import plain, spoken, tip, told_apart, translate
 
 if TYPE_CHECKING:
     from silo.api.wire import Item, Revision
@@ -118,7 +118,7 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
 
     def say(self, text: str, tone: Tone = Tone.QUIET) -> None:
         """Show a line of news."""
-        self.news.setText(text)
+        self.news.setText(spoken(text))
         widgets.paint(self.news, tone)
 
     def fail(self, error: SiloError) -> None:
@@ -331,7 +331,7 @@ class HistoryDialog(_Window):
                 self.change.setText(sentence if text else translate("Silo", "No change of the BOM."))
 
         def failed(error: SiloError) -> None:
-            self.change.setText(str(error))
+            self.change.setText(spoken(error))
 
         item = self._known.item
         self._flow.bom_change(
@@ -442,7 +442,7 @@ class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no typ
             self.news.setText(text)
 
     def _fail(self, error: SiloError) -> None:
-        self.news.setText(str(error))
+        self.news.setText(spoken(error))
         widgets.paint(self.news, Tone.ERROR)
 
     def _choose(self, root: str) -> None:
@@ -467,8 +467,9 @@ class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no typ
                 self.files.setCurrentItem(item)
         self.files.resizeColumnToContents(0)
         if view.root:
-            self.news.setText("\n".join((view.heading(), *view.notes[:MOST_NEWS])))
-            self.news.setToolTip(tip("; ".join(view.notes)))
+            notes = [*map(spoken, view.notes)]
+            self.news.setText("\n".join((view.heading(), *notes[:MOST_NEWS])))
+            self.news.setToolTip(tip("; ".join(notes)))
             widgets.paint(self.news, Tone.WARNING if view.notes else Tone.QUIET)
         mark_in_tree({row.path: (row.words(), row.tone) for row in view.rows})
         self._enable()

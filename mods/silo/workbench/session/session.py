@@ -23,7 +23,7 @@ from silo.outbox.store import OutboxError, Store
 from silo.workbench.pane.activity import Action, Activity, PaneEntry
 from silo.workbench.session import Busy, Control, Deliver, Job, Worker, in_gui
 from silo.workbench.settings.server import ServerChoice, ServerPreferences, TokenStore
-from silo.workbench.words import translate
+from silo.workbench.words import spoken, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -388,7 +388,7 @@ class Session:
 
         def done(outcome: tuple[int, list[str]]) -> None:
             for problem in outcome[1]:
-                self._listener.console(f"[Silo] {problem}")
+                self._listener.console(f"[Silo] {spoken(problem)}")
 
         title = translate("Silo", "Drawing models")
         self._models.submit(Job(title, run, done=done))
@@ -563,7 +563,7 @@ class Session:
         if error.code != "cancelled":
             self._show(reason=str(error))
             if error.code != "bad_config":
-                self._listener.console(f"[Silo] {error}")
+                self._listener.console(f"[Silo] {spoken(error)}")
 
     def _show(self, **changes: Any) -> None:
         shown = replace(self.shown, **changes)

@@ -36,7 +36,7 @@ from silo.workbench.settings.server import (
     test,
 )
 from silo.workbench.start import INSTALL, Command, missing_packages, packages_hint
-from silo.workbench.words import QT_TRANSLATE_NOOP, translate, visible
+from silo.workbench.words import QT_TRANSLATE_NOOP, spoken, translate, visible
 
 if TYPE_CHECKING:
     from silo.api.client import BrowserLogin
@@ -287,7 +287,7 @@ class PreferencePage:
         return ServerPreferences(self.url.text().strip(), self.token.text().strip(), verify)
 
     def _tell(self, text: str, tone: Tone) -> None:
-        self.result.setText(text)
+        self.result.setText(spoken(text))
         widgets.paint(self.result, tone)
 
     def _gone(self) -> None:
@@ -434,7 +434,7 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self.button.setText(translate("Silo", "Try again"))
         by_hand = packages_hint(missing_packages(), host.packages_folder(), sys.version_info[:2])
         self.text.setText(
-            visible(translate("Silo", "They could not be installed: {reason}", reason=text), 1500)
+            visible(translate("Silo", "They could not be installed: {reason}", reason=spoken(text)), 1500)
             + "\n\n"
-            + by_hand
+            + spoken(by_hand)
         )

@@ -2384,6 +2384,11 @@ They are installed in {folder}.</source>
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../words.py" />
+            <source>en</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../../bom_sync.py" />
             <source>BOM Updated: {number}</source>
             <translation type="unfinished" />

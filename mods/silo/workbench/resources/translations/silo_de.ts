@@ -2386,6 +2386,11 @@ Sie werden in {folder} installiert.</translation>
             <translation>Silo braucht die Python-Pakete {names}. Installieren Sie sie mit silo-mod install-addon oder mit: {command} – und starten Sie FreeCAD neu.</translation>
         </message>
         <message>
+            <location filename="../../words.py" />
+            <source>en</source>
+            <translation>de</translation>
+        </message>
+        <message>
             <location filename="../../../bom_sync.py" />
             <source>BOM Updated: {number}</source>
             <translation>Stückliste aktualisiert: {number}</translation>
