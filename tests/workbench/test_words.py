@@ -115,9 +115,9 @@ def test_sentences_are_in_the_language_of_the_translation() -> None:
             assert words.spoken(sentence) == german
         reason = "the server is stopping; try again later"
         told = banner(
-            PaneState(server=ServerChoice("https://silo.example.com"), connection="", reason=reason)
+            PaneState(server=ServerChoice("https://silo.example.com"), connection="offline", reason=reason)
         )
-        assert "der Server wird angehalten; später noch einmal versuchen" in told.text
+        assert "Der Server wird angehalten; später noch einmal versuchen" in told.text
     finally:
         words.use(lambda _context, text: text)
 
