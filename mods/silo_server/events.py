@@ -540,7 +540,7 @@ HEADERS = {
 HEARTBEAT = b"event: heartbeat\ndata: {}\n\n"
 
 
-class EventStream(Response):
+class EventResponse(Response):
     """The stream. ``last``: what the client saw last, None = only what is new from now on.
 
     ``items`` (UUIDs or part numbers) lets only their events through, and those of no item.

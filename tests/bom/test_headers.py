@@ -5,24 +5,24 @@ from __future__ import annotations
 
 import pytest
 
-from silo.bom.headers import Role, alias, find_roles, missing_columns, normal
+from silo.bom.headers import Heading, alias, find_roles, missing_columns, normal
 
 
 @pytest.mark.parametrize(
     ("header", "role"),
     [
-        ("PN", Role.PART_NUMBER),
-        ("Part No.", Role.PART_NUMBER),
-        ("part_number", Role.PART_NUMBER),
-        ("Qty.", Role.QUANTITY),
-        ("QTY (pcs)", Role.QUANTITY),
-        ("Stückzahl", Role.QUANTITY),
-        ("Find no.", Role.FIND_NUMBER),
-        ("Ref. Des.", Role.REFERENCE_DESIGNATORS),
-        ("名称", Role.NAME),
+        ("PN", Heading.PART_NUMBER),
+        ("Part No.", Heading.PART_NUMBER),
+        ("part_number", Heading.PART_NUMBER),
+        ("Qty.", Heading.QUANTITY),
+        ("QTY (pcs)", Heading.QUANTITY),
+        ("Stückzahl", Heading.QUANTITY),
+        ("Find no.", Heading.FIND_NUMBER),
+        ("Ref. Des.", Heading.REFERENCE_DESIGNATORS),
+        ("名称", Heading.NAME),
     ],
 )
-def test_what_people_write(header: str, role: Role) -> None:
+def test_what_people_write(header: str, role: Heading) -> None:
     """Case, points, underlines and brackets do not count."""
     found = alias(normal(header))
     assert found is not None
@@ -38,15 +38,15 @@ def test_a_word_in_a_header_is_not_the_header() -> None:
 def test_the_better_name_wins_then_the_first() -> None:
     """Wherever it stands."""
     header = ["Component", "Name", "Title", "Name"]
-    assert find_roles(header, (Role.NAME, Role.QUANTITY)) == {Role.NAME: 1}
-    assert find_roles(header, (Role.QUANTITY,)) == {}
+    assert find_roles(header, (Heading.NAME, Heading.QUANTITY)) == {Heading.NAME: 1}
+    assert find_roles(header, (Heading.QUANTITY,)) == {}
 
 
 def test_what_is_missing_is_said_with_what_was_seen() -> None:
     """And nothing where nothing is."""
     header = ["PN", " Colour ", ""]
-    at = find_roles(header, tuple(Role))
-    assert missing_columns(header, at, (Role.PART_NUMBER,)) == ""
-    text = missing_columns(header, at, (Role.PART_NUMBER, Role.QUANTITY))
+    at = find_roles(header, tuple(Heading))
+    assert missing_columns(header, at, (Heading.PART_NUMBER,)) == ""
+    text = missing_columns(header, at, (Heading.PART_NUMBER, Heading.QUANTITY))
     assert text.startswith("there is no column 'Quantity'; the columns are PN, Colour. ")
     assert "'Quantity' may also be called qty, qnty, count" in text

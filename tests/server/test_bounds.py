@@ -20,7 +20,7 @@ from sqlalchemy import event
 
 import silo_server
 from silo.bom.errors import BusyError, RejectedError
-from silo.bom.headers import Role
+from silo.bom.headers import Heading
 from silo_server.db.engine import Database, Turnstile, Tx, insert_rows
 from silo_server.db.tables import bom_lines, items
 from silo_server.run import running_server
@@ -174,7 +174,7 @@ def test_two_columns_of_one_meaning_that_differ_are_refused(
     with pytest.raises(RejectedError, match=r"both mean the .* in row 3 they say") as caught:
         imports.read_csv(data, 20)
     assert len(caught.value.problems) == 1
-    layout = imports.Layout(",", 1, {Role.PART_NUMBER: 0, Role.QUANTITY: 1})
+    layout = imports.Layout(",", 1, {Heading.PART_NUMBER: 0, Heading.QUANTITY: 1})
     assert imports.read_csv(data, 20, layout)[0][1]["part_number"] == "A"
     for row in agree:
         assert len(imports.read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1

@@ -19,7 +19,7 @@ from web_visitor import Visitor, enter
 
 from silo_server.db.engine import Database
 from silo_server.db.migrate import upgrade
-from silo_server.events import EventStream, Hub
+from silo_server.events import EventResponse, Hub
 from silo_server.http import _database_error, _disk_error
 from silo_server.run import running_server, start_warnings
 from silo_server.settings import MIB, Settings
@@ -134,7 +134,7 @@ def test_a_stream_ends_if_its_credential_went_before_it_began(tmp_path: Path) ->
         async def send(message: Message) -> None:
             sent.append(message)
 
-        stream = EventStream(hub, None, still_allowed=lambda: False)
+        stream = EventResponse(hub, None, still_allowed=lambda: False)
         try:
             await asyncio.wait_for(stream({"type": "http"}, asyncio.Event().wait, send), 60)  # type: ignore[arg-type]
         finally:

@@ -18,7 +18,7 @@ from typing import Any
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
 
-class Role(StrEnum):
+class Heading(StrEnum):
     """What a column is used for."""
 
     NAME = "name"
@@ -55,81 +55,82 @@ class Role(StrEnum):
 
 
 # en, de, fr, es, it, ja, zh; Silo's and FreeCAD's own exports among them. The first alias fits best.
-_ALIASES: dict[Role, str] = {
-    Role.NAME: """name; part name; component; component name; product; product name; label; title; body;
+_ALIASES: dict[Heading, str] = {
+    Heading.NAME: """name; part name; component; component name; product; product name; label; title; body;
         bezeichnung; benennung; teil; teilename; bauteil; bauteilname; produkt; nom; nom de la pièce; pièce;
         composant; désignation; nombre; nombre de pieza; pieza; componente; denominación; nome; nome parte;
         nome componente; denominazione; 名前; 名称; 部品名; 品名; パーツ名; 部品; 名稱; 零件名称;
         零件; 部件名称; 이름; item name;
         objektkurztext; materialkurztext; designation; piece; denominacion; part""",
-    Role.PART_NUMBER: """part number; part no; part nr; partnumber; pn; item number; article number;
+    Heading.PART_NUMBER: """part number; part no; part nr; partnumber; pn; item number; article number;
         article no; sku; child part number; teilenummer; teile nr; artikelnummer; artikel nr; sachnummer;
         numéro de pièce; référence; réf; número de pieza; número de parte; referencia; código; numero parte;
         codice; codice articolo; 部品番号; 品番; 型番; 図番;
         零件编号; 零件号; 零件號; 料号; 料號; 物料编码; number; item id;
         bauteilnummer; komponentennummer; n de pièce; n o de pièce; numero de piece; n de pieza; n o de pieza;
         numero de pieza; numero de parte; codigo; 부품 번호""",
-    Role.DESCRIPTION: """description; desc; child description; beschreibung; descripción; descripcion;
+    Heading.DESCRIPTION: """description; desc; child description; beschreibung; descripción; descripcion;
         descrizione; 説明; 描述; 说明; 説明文; 備考""",
-    Role.MATERIAL: """material; materials; werkstoff; werkstoffe; matériau; matière; materiau; material pieza;
-        materiale; 材料; 材質; 材质; 素材; 재질; 재료; matl;
+    Heading.MATERIAL: """material; materials; werkstoff; werkstoffe; matériau; matière; materiau;
+        material pieza; materiale; 材料; 材質; 材质; 素材; 재질; 재료; matl;
         mat l; mtl; ptc material name; nx material""",
-    Role.MASS: """mass; unit mass; mass each; weight; unit weight; weight each; masse; einzelmasse; gewicht;
-        einzelgewicht; stückgewicht; masse unitaire; poids; poids unitaire; masa; masa unitaria; peso;
-        peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重; gew;
+    Heading.MASS: """mass; unit mass; mass each; weight; unit weight; weight each; masse; einzelmasse;
+        gewicht; einzelgewicht; stückgewicht; masse unitaire; poids; poids unitaire; masa; masa unitaria;
+        peso; peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重; gew;
         einzelgew; nettogewicht; pds; 単重; 単体質量; 単体重量; 净重; 单件重量; 질량; 무게;
         wt; unit wt; nx mass; sw mass; pro mp mass; mp mass""",
-    Role.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass; extended weight;
+    Heading.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass; extended weight;
         gesamtmasse; gesamtgewicht; masse totale; poids total; masa total; peso total; massa totale;
         peso totale; 总重量; 総質量; 総重量; 合計質量; 总质量; 总重; 總重; 合计重量;
         小计重量; 質量計; 重量計; total wt; ext wt; posgewicht; pos gewicht; positionsgewicht""",
-    Role.MASS_UNIT: """mass unit; mass units; weight unit; weight units; unit of mass; unit of weight;
+    Heading.MASS_UNIT: """mass unit; mass units; weight unit; weight units; unit of mass; unit of weight;
         mass uom; weight uom; gewichtseinheit; masseneinheit; unité de masse; unidad de masa""",
-    Role.QUANTITY: """quantity; qty; qnty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité; qté;
-        nb; cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量; 수량; qte; qtà;
+    Heading.QUANTITY: """quantity; qty; qnty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité;
+        qté; nb; cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量; 수량; qte; qtà;
         quantite; anz; komponentenmenge; req qty; qty reqd; qty req d; no req d""",
-    Role.ITEM: """item; item no; index; pos; position; row; line; nr; lfd nr; rang;
+    Heading.ITEM: """item; item no; index; pos; position; row; line; nr; lfd nr; rang;
         repère; article; elemento; artículo; posición; ítem; posizione; voce; 項目; 番号; 项目; 项; 序号;
         編號; 序號; 项目号; アイテム番号; 항목; 항목 번호; pos nr; positionsnummer; objekt; element; élément;
         no article; n articolo; n de elemento; n o de elemento; articulo; posicion""",
-    Role.LEVEL: """level; depth; indent; ebene; stufe; niveau; nivel; livello; レベル; 階層;
+    Heading.LEVEL: """level; depth; indent; ebene; stufe; niveau; nivel; livello; レベル; 階層;
         级别; 层级; 層級""",
-    Role.UNIT: """unit; uom; unit of measure; einheit; mengeneinheit; unité; unidad; unità; 単位; 单位""",
-    Role.REFERENCE_DESIGNATORS: """reference designators; reference designator; ref des; refdes; designators;
-        designator; references; reference; reference s; ref; refs; ref s""",
-    Role.FIND_NUMBER: """find number; find no; find nr; findnumber""",
-    Role.NOTES: """notes; note; remarks; remark; comment; comments; bemerkung; bemerkungen; notiz; remarque;
-        remarques; notas; 注記; 备注; 備註""",
-    Role.TYPE: """type; rel type; relation type""",
-    Role.REVISION: """revision""",
-    Role.VALUE: """value; val; wert; valeur; valor; valore""",
-    Role.FOOTPRINT: """footprint; package; case package; gehäuse; boîtier""",
-    Role.MANUFACTURER: """manufacturer; mfr; mfg; mfr name; manufacturer name; hersteller; fabricant;
+    Heading.UNIT: """unit; uom; unit of measure; einheit; mengeneinheit; unité; unidad; unità; 単位; 单位""",
+    Heading.REFERENCE_DESIGNATORS: """reference designators; reference designator; ref des; refdes;
+        designators; designator; references; reference; reference s; ref; refs; ref s""",
+    Heading.FIND_NUMBER: """find number; find no; find nr; findnumber""",
+    Heading.NOTES: """notes; note; remarks; remark; comment; comments; bemerkung; bemerkungen; notiz;
+        remarque; remarques; notas; 注記; 备注; 備註""",
+    Heading.TYPE: """type; rel type; relation type""",
+    Heading.REVISION: """revision""",
+    Heading.VALUE: """value; val; wert; valeur; valor; valore""",
+    Heading.FOOTPRINT: """footprint; package; case package; gehäuse; boîtier""",
+    Heading.MANUFACTURER: """manufacturer; mfr; mfg; mfr name; manufacturer name; hersteller; fabricant;
         fabricante; produttore; maker""",
-    Role.MANUFACTURER_NUMBER: """manufacturer part number; manufacturer s part number; mpn; mfr part number;
-        mfr part no; mfr pn; mfg pn; mfg part number; mfr no; manufacturer part no; manufacturer pn;
-        herstellernummer; hersteller teilenummer; herstellerteilenummer; hersteller artikelnummer""",
-    Role.SUPPLIER: """supplier; vendor; distributor; supplier name; vendor name; lieferant; händler;
+    Heading.MANUFACTURER_NUMBER: """manufacturer part number; manufacturer s part number; mpn;
+        mfr part number; mfr part no; mfr pn; mfg pn; mfg part number; mfr no; manufacturer part no;
+        manufacturer pn; herstellernummer; hersteller teilenummer; herstellerteilenummer;
+        hersteller artikelnummer""",
+    Heading.SUPPLIER: """supplier; vendor; distributor; supplier name; vendor name; lieferant; händler;
         fournisseur; proveedor; fornitore; 供应商; 仕入先""",
-    Role.SUPPLIER_NUMBER: """supplier part number; supplier s part number; spn; supplier part no; supplier pn;
-        vendor part number; distributor part number; bestellnummer; order number; order code; lcsc;
-        supplier number; supplier no; order no; vendor number; bestell nr; lieferantenartikelnummer;
+    Heading.SUPPLIER_NUMBER: """supplier part number; supplier s part number; spn; supplier part no;
+        supplier pn; vendor part number; distributor part number; bestellnummer; order number; order code;
+        lcsc; supplier number; supplier no; order no; vendor number; bestell nr; lieferantenartikelnummer;
         lieferantennummer; référence fournisseur; numéro de commande;
         lcsc part number; digikey part number; digi key part number; mouser part number""",
-    Role.NOT_FITTED: """dnp; dnf; do not populate; do not fit; do not place; not fitted""",
-    Role.LINK: """link; url; web address; web; product link; shop link""",
-    Role.PACK_SIZE: """pack size; pack; pack quantity; package size; packaging unit; pack qty; vpe;
+    Heading.NOT_FITTED: """dnp; dnf; do not populate; do not fit; do not place; not fitted""",
+    Heading.LINK: """link; url; web address; web; product link; shop link""",
+    Heading.PACK_SIZE: """pack size; pack; pack quantity; package size; packaging unit; pack qty; vpe;
         verpackungseinheit; packungsgröße; conditionnement""",
-    Role.MINIMUM: """minimum; minimum order; minimum order quantity; minimum quantity; min order; min qty;
+    Heading.MINIMUM: """minimum; minimum order; minimum order quantity; minimum quantity; min order; min qty;
         moq; mindestmenge; mindestbestellmenge; quantité minimale""",
-    Role.PRICE: """price; unit price; price each; price of one by quantity; price of one; prices; unit cost;
-        preis; stückpreis; einzelpreis; prix; prix unitaire; precio; prezzo; 单价; 単価""",
-    Role.FROM_QUANTITY: """from quantity; from; price from quantity; break; price break; break quantity;
+    Heading.PRICE: """price; unit price; price each; price of one by quantity; price of one; prices;
+        unit cost; preis; stückpreis; einzelpreis; prix; prix unitaire; precio; prezzo; 单价; 単価""",
+    Heading.FROM_QUANTITY: """from quantity; from; price from quantity; break; price break; break quantity;
         scale quantity; ab menge; staffelmenge; ab stückzahl; à partir de""",
-    Role.CURRENCY: """currency; währung; devise; moneda; valuta; 货币; 通貨""",
-    Role.LEAD_TIME: """lead time; lead time days; delivery time; lieferzeit; lieferzeit tage; délai;
+    Heading.CURRENCY: """currency; währung; devise; moneda; valuta; 货币; 通貨""",
+    Heading.LEAD_TIME: """lead time; lead time days; delivery time; lieferzeit; lieferzeit tage; délai;
         délai de livraison; plazo de entrega""",
-    Role.PREFERRED: """preferred; favourite; default; bevorzugt; préféré""",
+    Heading.PREFERRED: """preferred; favourite; default; bevorzugt; préféré""",
 }
 
 BRACKET = re.compile(r"[\(\[（【<]\s*([^)\]）】>]*)\s*[\)\]）】>]")
@@ -143,21 +144,21 @@ def normal(header: str) -> str:
     return " ".join(re.sub(r"[\W_]+", " ", text).split())
 
 
-_ROLE_OF: dict[str, tuple[Role, int]] = {
+_ROLE_OF: dict[str, tuple[Heading, int]] = {
     normal(alias): (role, rank)
     for role, aliases in reversed(_ALIASES.items())
     for rank, alias in enumerate(aliases.split(";"))
 }
 
 
-def alias(text: str) -> tuple[Role, int] | None:
+def alias(text: str) -> tuple[Heading, int] | None:
     """Return role of a :func:`normal` header, and how well it fits: 0 is best ("Name" beats "Component")."""
     return _ROLE_OF.get(text)
 
 
-def find_roles(header: Sequence[str], roles: Collection[Role]) -> dict[Role, int]:
+def find_roles(header: Sequence[str], roles: Collection[Heading]) -> dict[Heading, int]:
     """Return column index of each role. Of two columns the one whose name fits better, then the first."""
-    best: dict[Role, tuple[int, int]] = {}
+    best: dict[Heading, tuple[int, int]] = {}
     for index, cell in enumerate(header):
         role_of_cell = alias(normal(cell))
         if role_of_cell is not None and role_of_cell[0] in roles:
@@ -168,8 +169,8 @@ def find_roles(header: Sequence[str], roles: Collection[Role]) -> dict[Role, int
 
 
 def second_columns(
-    header: Sequence[str], roles: Collection[Role], at: Mapping[Role, int]
-) -> list[tuple[Role, int]]:
+    header: Sequence[str], roles: Collection[Heading], at: Mapping[Heading, int]
+) -> list[tuple[Heading, int]]:
     """Return the columns that mean what another one is used for (``at``)."""
     columns_by_role = ((alias(normal(cell)), index) for index, cell in enumerate(header))
     return [(of[0], i) for of, i in columns_by_role if of and of[0] in roles and at.get(of[0], i) != i]
@@ -179,7 +180,7 @@ def second_columns(
 class Clash:
     """Two columns of one meaning that differ in a row: index of that row, and both texts."""
 
-    role: Role
+    role: Heading
     ours: str
     other: str
     row: int
@@ -190,8 +191,8 @@ class Clash:
 def find_clashes(
     header: Sequence[str],
     rows: Sequence[Sequence[str]],
-    at: Mapping[Role, int],
-    seconds: Iterable[tuple[Role, int]],
+    at: Mapping[Heading, int],
+    seconds: Iterable[tuple[Heading, int]],
     is_empty: Callable[[str], bool] = lambda text: not text,
 ) -> list[Clash]:
     """Return one for each of the ``seconds`` that says something else than the used column (``at``)."""
@@ -213,7 +214,7 @@ def _differences(
     return []
 
 
-def missing_columns(header: Sequence[str], at: Mapping[Role, int], needed: Sequence[Role]) -> str:
+def missing_columns(header: Sequence[str], at: Mapping[Heading, int], needed: Sequence[Heading]) -> str:
     """Return which of the ``needed`` columns a header lacks, and what was seen; "" if none is missing."""
     lacking = [role for role in needed if role not in at]
     if not lacking:
@@ -224,11 +225,11 @@ def missing_columns(header: Sequence[str], at: Mapping[Role, int], needed: Seque
     return f"there is no column {names}; the columns are {seen}. {others}"
 
 
-def _title(role: Role) -> str:
+def _title(role: Heading) -> str:
     return role.replace("_", " ").capitalize()
 
 
-def _others(role: Role) -> str:
+def _others(role: Heading) -> str:
     return ", ".join(name.strip() for name in _ALIASES[role].split(";")[1:5])
 
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What each object of an assembly is, and what it brings: one pass, which everything else reads.
 
-Each object in an assembly has exactly one :class:`Role`. What is a component brings what it shows. A link
-brings what its target brings, once per element; a Draft array what its original brings, once per instance; a
-link group, a compound, an inline part or a folder what its members bring. That ends in an object of another
-file, in a standard part, in an object with an identity of its own, or in geometry of this very file: an *own
-part*, which is no item yet. How an object comes to bring something is kept (:class:`Shown`), so masses and
-people can follow the same chain.
+Each object in an assembly has exactly one :class:`~silo.bom.objects.ObjectRole`. A component brings what it
+shows. A link brings what its target brings, once per element; a Draft array what its original brings, once
+per instance; a link group, a compound, an inline part or a folder what its members bring. That ends in an
+object of another file, in a standard part, in an object with an identity of its own, or in geometry of this
+very file: an *own part*, which is no item yet. How an object comes to bring something is kept
+(:class:`Shown`), so masses and people can follow the same chain.
 
 * An object counts once, however many lists of the tree name it; each link group that shows it counts.
 * What shows others is counted; the others count where they lie only if they are visible there. The original

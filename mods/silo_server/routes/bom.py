@@ -40,12 +40,12 @@ from silo_server.routes.context import (
     raw_json,
 )
 from silo_server.routes.models import (
-    Body,
     BomsOut,
     LineChangeBody,
     LineOut,
     NewLineBody,
     NumbersBody,
+    RequestBody,
     Short,
     Text,
 )
@@ -409,7 +409,7 @@ review_router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom revi
 ChangeId = Annotated[int, Path(ge=0, le=2**62)]
 
 
-class DecisionBody(Body):
+class DecisionBody(RequestBody):
     """One decision; ``reason`` says why a line is kept.
 
     The line is named by ``line_id``, or by its child: then the component is meant.
@@ -421,13 +421,13 @@ class DecisionBody(Body):
     reason: Text | None = None
 
 
-class ResolveBody(Body):
+class ResolveBody(RequestBody):
     """``POST …/bom/resolve``: all of them as one change."""
 
     decisions: Annotated[list[DecisionBody], Field(min_length=1, max_length=20_000)]
 
 
-class RestoreBody(Body):
+class RestoreBody(RequestBody):
     """``POST …/bom/restore``: the change whose state comes back (0 = the empty BOM).
 
     ``with_archived``: archived parts may come back with it; else 409 names them.
@@ -438,7 +438,7 @@ class RestoreBody(Body):
     with_archived: StrictBool = False
 
 
-class UndoBody(Body):
+class UndoBody(RequestBody):
     """``POST …/bom/undo``."""
 
     change_id: models.ChangeId

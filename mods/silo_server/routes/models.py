@@ -90,25 +90,25 @@ Amount = Annotated[
 ]
 
 
-class Body(BaseModel):
+class RequestBody(BaseModel):
     """Base of request bodies: unknown keys are ignored."""
 
     model_config = ConfigDict(extra="ignore")
 
 
 if TYPE_CHECKING:
-    _ItemTexts = Body
-    _LineTexts = Body
+    _ItemTexts = RequestBody
+    _LineTexts = RequestBody
 else:
 
-    def _bounded(of: type[BaseModel]) -> type[Body]:
+    def _bounded(of: type[BaseModel]) -> type[RequestBody]:
         """Return the texts that a wire model names, with the server's bounds and characters."""
 
         def kind(hints: dict[str, Any]) -> Any:
             return Text if hints.get("long") else Brief if "maxLength" in hints else Short
 
         fields = {name: (kind(text_hints(field)) | None, None) for name, field in of.model_fields.items()}
-        return create_model(f"_{of.__name__}", __base__=Body, **fields)
+        return create_model(f"_{of.__name__}", __base__=RequestBody, **fields)
 
     _ItemTexts, _LineTexts = map(_bounded, (wire.ItemTexts, wire.LineTexts))
 
@@ -149,32 +149,32 @@ class ItemChangeBody(_ItemTexts):
     source: wire.FactSource = "hand"
 
 
-class UuidsBody(Body):
+class UuidsBody(RequestBody):
     """``POST /api/items/by-uuid``."""
 
     uuids: list[Short] = Field(max_length=10_000)
 
 
-class LookAlikeQuery(Body):
+class LookAlikeQuery(RequestBody):
     """A component that may be an item already: its name, and the SHA-256 of its file."""
 
     name: Short
     sha256: Short = ""
 
 
-class LookAlikesBody(Body):
+class LookAlikesBody(RequestBody):
     """``POST /api/items/look-alikes``."""
 
     wanted: list[LookAlikeQuery] = Field(max_length=1000)
 
 
-class NumbersBody(Body):
+class NumbersBody(RequestBody):
     """``POST /api/items/boms``."""
 
     part_numbers: list[Short] = Field(max_length=10_000)
 
 
-class NumberBody(Body):
+class NumberBody(RequestBody):
     """``POST /api/generate-part-number``."""
 
     model_config = ConfigDict(extra="ignore", protected_namespaces=(), populate_by_name=True)
@@ -225,7 +225,7 @@ class DocumentsOut(BaseModel):
     documents: list[wire.Document]
 
 
-class RevisionBody(Body):
+class RevisionBody(RequestBody):
     """``POST /api/items/{pn}/revisions``: a revision without a file."""
 
     properties: Properties | None = None

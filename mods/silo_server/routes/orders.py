@@ -29,7 +29,7 @@ from silo_server.routes.context import (
     etag_of,
     json_answer,
 )
-from silo_server.routes.models import Body, Brief, Short, Text
+from silo_server.routes.models import Brief, RequestBody, Short, Text
 from silo_server.services import orders, suppliers
 from silo_server.services.bom import imports, transfer
 from silo_server.services.items import get_item
@@ -58,14 +58,14 @@ Quantity = Annotated[Exact, Field(gt=0, le=10**9, max_digits=LONGEST)]
 Code = Annotated[str, Field(pattern="^[A-Z]{3}$")]
 
 
-class PriceBody(Body):
+class PriceBody(RequestBody):
     """A price of one piece from a quantity on."""
 
     quantity: Exact = Decimal(1)
     price: Exact
 
 
-class SupplierPartBody(Body):
+class SupplierPartBody(RequestBody):
     """A supplier part; see ``SupplierPart``."""
 
     supplier: Annotated[Short, Field(min_length=1)]
@@ -79,13 +79,13 @@ class SupplierPartBody(Body):
     preferred: bool = False
 
 
-class SuppliersBody(Body):
+class SuppliersBody(RequestBody):
     """``PUT …/suppliers``: the whole list, in the place of the one before."""
 
     supplier_parts: list[SupplierPartBody] = Field(max_length=suppliers.MOST_PARTS)
 
 
-class OrderedBody(Body):
+class OrderedBody(RequestBody):
     """What was ordered of an item; ``number``: the supplier's."""
 
     part_number: Short
@@ -97,14 +97,14 @@ class OrderedBody(Body):
     currency: Code | None = None
 
 
-class OrdersBody(Body):
+class OrdersBody(RequestBody):
     """``POST …/orders``: what was ordered for a product."""
 
     parts: list[OrderedBody] = Field(min_length=1, max_length=1000)
     note: Text = ""
 
 
-class RatesBody(Body):
+class RatesBody(RequestBody):
     """``PUT /api/rates``: the site's currency, and what one of each other currency is in it."""
 
     currency: Code

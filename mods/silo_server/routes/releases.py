@@ -12,7 +12,7 @@ from starlette.responses import Response
 from silo.api import wire
 from silo_server.db.engine import Tx
 from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Call, Editor, Viewer, json_answer
-from silo_server.routes.models import Body, Text
+from silo_server.routes.models import RequestBody, Text
 from silo_server.services import releases
 from silo_server.services.bom import frozen
 from silo_server.services.items import get_item
@@ -22,7 +22,7 @@ from silo_server.values import to_wire
 router = APIRouter(prefix="/api/items/{part_number}/releases", tags=["releases"])
 
 
-class SubmitBody(Body):
+class SubmitBody(RequestBody):
     """``POST …/releases``: without a label the server takes the next one of the site's scheme."""
 
     comment: Text = ""
@@ -32,14 +32,14 @@ class SubmitBody(Body):
     with_parts: StrictBool = False
 
 
-class ApproveBody(Body):
+class ApproveBody(RequestBody):
     """``POST …/releases/{label}/approval``; ``override``: why it is released in spite of what blocks."""
 
     comment: Text = ""
     override: Text = ""
 
 
-class EndBody(Body):
+class EndBody(RequestBody):
     """``POST …/releases/{label}/end``: ``rejected``, ``withdrawn`` end a review, ``obsolete`` a release."""
 
     status: Literal["rejected", "withdrawn", "obsolete"]

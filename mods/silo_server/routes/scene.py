@@ -14,7 +14,7 @@ from silo.api import wire
 from silo.bom.errors import RejectedError
 from silo_server.routes import context
 from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Call, Editor, Viewer, json_answer
-from silo_server.routes.models import Body
+from silo_server.routes.models import RequestBody
 from silo_server.services import items, scene
 
 router = APIRouter(prefix="/api", tags=["models"])
@@ -23,7 +23,7 @@ Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Checksum = Annotated[str, Path(pattern="^[0-9a-f]{64}$")]
 
 
-class ContentsBody(Body):
+class ContentsBody(RequestBody):
     """``POST /api/models/missing``, and its answer: contents by their SHA-256."""
 
     sha256: list[Sha256] = Field(max_length=10_000)

@@ -19,7 +19,7 @@ from silo.api.wire import ErrorBody
 from silo.bom.errors import RejectedError
 from silo_server import events
 from silo_server.db.engine import mode_of
-from silo_server.events import EventStream
+from silo_server.events import EventResponse
 from silo_server.housekeeping import (
     CONTENT_TYPE,
     HEALTH_SECONDS,
@@ -42,7 +42,7 @@ from silo_server.routes.context import (
     json_answer,
     server_of,
 )
-from silo_server.routes.models import Body, Short, Text
+from silo_server.routes.models import RequestBody, Short, Text
 from silo_server.services import access
 from silo_server.values import Role, Scope, to_wire
 
@@ -136,7 +136,7 @@ async def stream_events(
         except SQLAlchemyError:
             return True  # the database being away is no reason to send everybody away
 
-    return EventStream(call.server.hub, last, item or (), still_allowed)
+    return EventResponse(call.server.hub, last, item or (), still_allowed)
 
 
 @router.get("/api/modules", responses=READ_ERRORS)
@@ -200,14 +200,14 @@ LOGIN_ERRORS: dict[int | str, dict[str, Any]] = {
 NewPassword = Annotated[Text, WithJsonSchema(context.PASSWORD)]
 
 
-class LoginBody(Body):
+class LoginBody(RequestBody):
     """``POST /api/auth/login``."""
 
     username: Short
     password: Short
 
 
-class TokenBody(Body):
+class TokenBody(RequestBody):
     """``POST /api/auth/tokens``.
 
     expires_in_days
@@ -225,7 +225,7 @@ class TokenBody(Body):
     scopes: Annotated[list[Scope], Field(min_length=1, max_length=3)] | None = None
 
 
-class NewUserBody(Body):
+class NewUserBody(RequestBody):
     """``POST /api/users``; without a password only tokens and login links let the user in."""
 
     username: Annotated[Short, WithJsonSchema(context.USERNAME)]
@@ -234,7 +234,7 @@ class NewUserBody(Body):
     password: NewPassword | None = None
 
 
-class UserChangeBody(Body):
+class UserChangeBody(RequestBody):
     """``PUT /api/users/{username}``: what is absent or null stays."""
 
     role: Role | None = None
@@ -244,7 +244,7 @@ class UserChangeBody(Body):
     password: NewPassword | None = None
 
 
-class PasswordBody(Body):
+class PasswordBody(RequestBody):
     """``PUT /api/auth/password``: the new password, and the old one but after a login link."""
 
     password: NewPassword

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import func, insert, select, update
 
 from silo.bom.errors import ConflictError, RejectedError, VersionConflictError
-from silo.bom.headers import Role
+from silo.bom.headers import Heading
 from silo.bom.numbers import (
     Mark,
     as_decimal,
@@ -66,10 +66,23 @@ LARGEST_AMOUNT, LARGEST_PRICE = Decimal(10) ** 9, Decimal(10) ** 12
 LONGEST_LEAD_TIME = 3650
 # What an imported table has; several rows may have the prices of one supplier part.
 _ROLES = (
-    *(Role.PART_NUMBER, Role.SUPPLIER, Role.SUPPLIER_NUMBER, Role.LINK, Role.PACK_SIZE, Role.MINIMUM),
-    *(Role.PRICE, Role.FROM_QUANTITY, Role.CURRENCY, Role.LEAD_TIME, Role.PREFERRED),
+    *(
+        Heading.PART_NUMBER,
+        Heading.SUPPLIER,
+        Heading.SUPPLIER_NUMBER,
+        Heading.LINK,
+        Heading.PACK_SIZE,
+        Heading.MINIMUM,
+    ),
+    *(
+        Heading.PRICE,
+        Heading.FROM_QUANTITY,
+        Heading.CURRENCY,
+        Heading.LEAD_TIME,
+        Heading.PREFERRED,
+    ),
 )
-TABLE = Table(_ROLES, (Role.PART_NUMBER, Role.SUPPLIER), {}, _ROLES)
+TABLE = Table(_ROLES, (Heading.PART_NUMBER, Heading.SUPPLIER), {}, _ROLES)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from starlette.datastructures import FormData, UploadFile
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
-from silo.bom.headers import Role
+from silo.bom.headers import Heading
 from silo.bom.numbers import Mark
 from silo_server.routes.context import Call
 from silo_server.schema import find_schema
@@ -179,12 +179,12 @@ def _show(
 
 
 _LABELS = {
-    Role.TYPE: N_("Type"),
-    Role.REVISION: N_("Revision"),
-    Role.SUPPLIER_NUMBER: N_("Supplier’s part number"),
-    Role.PRICE: N_("Price"),
-    Role.FROM_QUANTITY: N_("Price from quantity"),
-    Role.LEAD_TIME: N_("Lead time [days]"),
+    Heading.TYPE: N_("Type"),
+    Heading.REVISION: N_("Revision"),
+    Heading.SUPPLIER_NUMBER: N_("Supplier’s part number"),
+    Heading.PRICE: N_("Price"),
+    Heading.FROM_QUANTITY: N_("Price from quantity"),
+    Heading.LEAD_TIME: N_("Lead time [days]"),
 }
 
 

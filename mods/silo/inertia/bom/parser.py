@@ -11,7 +11,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from silo.bom.errors import InputError, counted
-from silo.bom.headers import Role, find_clashes
+from silo.bom.headers import Heading, find_clashes
 from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
 from silo.inertia.bom import (
     FORCE_UNITS,
@@ -56,17 +56,21 @@ class MassReader:
         self._reported: set[BomCode] = set()
         self._unit_role = self._find_units(sheet)
 
-    def _find_units(self, sheet: Sheet) -> Role:
+    def _find_units(self, sheet: Sheet) -> Heading:
         """Return the column of the masses' units. A column "Unit" is of the quantities if it has pieces."""
         cell, at = sheet.columns.cell, sheet.columns.at
-        if Role.MASS_UNIT in at or Role.UNIT not in at or any(h.unit for h in sheet.columns.masses.values()):
-            return Role.MASS_UNIT
+        if (
+            Heading.MASS_UNIT in at
+            or Heading.UNIT not in at
+            or any(h.unit for h in sheet.columns.masses.values())
+        ):
+            return Heading.MASS_UNIT
         bare = [row for row in sheet.rows if any(cell(row.cells, role) for role in MASS_COLUMNS)]
-        units = {unit for row in bare if (unit := cell(row.cells, Role.UNIT))}
+        units = {unit for row in bare if (unit := cell(row.cells, Heading.UNIT))}
         masses = {unit for unit in units if unit_factor(unit) is not None}
         if not masses:
-            return Role.MASS_UNIT
-        title = sheet.header[at[Role.UNIT]].strip()
+            return Heading.MASS_UNIT
+        title = sheet.header[at[Heading.UNIT]].strip()
         words = f"the column “{title}” was read as the unit of the masses"
         if masses != units:
             words = (
@@ -74,7 +78,7 @@ class MassReader:
                 "it was read as the unit of the quantities, and not of the masses"
             )
         self._report(BomCode.FILE, words, sheet.header_line, "")
-        return Role.UNIT if masses == units else Role.MASS_UNIT
+        return Heading.UNIT if masses == units else Heading.MASS_UNIT
 
     def _report(self, code: BomCode, message: str, line: int, name: str, *, once: bool = False) -> None:
         if not (once and code in self._reported):
@@ -117,7 +121,7 @@ class MassReader:
         """Report whether the mass of one piece stands in the file, and is no share of a total."""
         return self._cells[row.line][0].kg is not None
 
-    def _cell(self, role: Role, row: SheetRow, name: str) -> MassCell:
+    def _cell(self, role: Heading, row: SheetRow, name: str) -> MassCell:
         header = self._columns.masses.get(role)
         if header is None:
             return MassCell()
@@ -257,19 +261,19 @@ class BOMParser:
 
 
 def _entry(
-    sheet: Sheet, row: SheetRow, masses: MassReader, item_role: Role, warnings: list[BomWarning]
+    sheet: Sheet, row: SheetRow, masses: MassReader, item_role: Heading, warnings: list[BomWarning]
 ) -> BOMEntry | None:
     cell = sheet.columns.cell
-    number, text = cell(row.cells, Role.PART_NUMBER), cell(row.cells, Role.DESCRIPTION)
-    name = cell(row.cells, Role.NAME) or ("" if Role.NAME in sheet.columns.at else text) or number
+    number, text = cell(row.cells, Heading.PART_NUMBER), cell(row.cells, Heading.DESCRIPTION)
+    name = cell(row.cells, Heading.NAME) or ("" if Heading.NAME in sheet.columns.at else text) or number
     if not name:
         words = "has no name and no part number; it was left out"
         warnings.append(BomWarning(BomCode.NO_NAME, words, row.line))
         return None
     _check_length(sheet, row, name, warnings)
-    quantity = _quantity(cell(row.cells, Role.QUANTITY), row.line, name, warnings)
+    quantity = _quantity(cell(row.cells, Heading.QUANTITY), row.line, name, warnings)
     mass = masses.read(row, name, quantity)
-    material = cell(row.cells, Role.MATERIAL)
+    material = cell(row.cells, Heading.MATERIAL)
     return BOMEntry(
         name=name,
         material=None if is_empty(material) else material,
@@ -279,8 +283,8 @@ def _entry(
         quantum_kg=mass.quantum_kg,
         overridden=mass.overridden,
         unsure=mass.ambiguous or bool(mass.doubt),
-        item=cell(row.cells, item_role) or cell(row.cells, Role.FIND_NUMBER),
-        level=_level(cell(row.cells, Role.LEVEL), item_role, row.line, name, warnings),
+        item=cell(row.cells, item_role) or cell(row.cells, Heading.FIND_NUMBER),
+        level=_level(cell(row.cells, Heading.LEVEL), item_role, row.line, name, warnings),
         line=row.line,
     )
 
@@ -291,9 +295,9 @@ def _indented(rows: list[BOMEntry], sheet: Sheet, warnings: list[BomWarning]) ->
     Steps of two spaces or more, never two steps down at once: a stray space makes no sub-assembly.
     """
     at = sheet.columns.at
-    if Role.LEVEL in at or any("." in row.item for row in rows):
+    if Heading.LEVEL in at or any("." in row.item for row in rows):
         return rows
-    column = next(at[role] for role in (Role.NAME, Role.DESCRIPTION, Role.PART_NUMBER) if role in at)
+    column = next(at[role] for role in (Heading.NAME, Heading.DESCRIPTION, Heading.PART_NUMBER) if role in at)
     cells = {row.line: row.cells[column] for row in sheet.rows if column < len(row.cells)}
     depths = [_depth(cells.get(row.line, "")) for row in rows]
     step = min(filter(None, depths), default=0)
@@ -323,19 +327,19 @@ def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> fl
     return None
 
 
-def _item_role(sheet: Sheet) -> Role:
+def _item_role(sheet: Sheet) -> Heading:
     """Return the column of item numbers; some tools call it the level: 1, 1.1, 1.1.2."""
 
-    def dotted(role: Role) -> bool:
+    def dotted(role: Heading) -> bool:
         return any(re.fullmatch(r"\d+(?:\.\d+)+", sheet.columns.cell(r.cells, role)) for r in sheet.rows)
 
-    return Role.LEVEL if dotted(Role.LEVEL) and not dotted(Role.ITEM) else Role.ITEM
+    return Heading.LEVEL if dotted(Heading.LEVEL) and not dotted(Heading.ITEM) else Heading.ITEM
 
 
-def _level(text: str, item_role: Role, line: int, name: str, warnings: list[BomWarning]) -> int:
+def _level(text: str, item_role: Heading, line: int, name: str, warnings: list[BomWarning]) -> int:
     """Read a level: "2", "..2" and "+2" are one below "1". Item numbers (1.1) are no levels."""
     match = re.fullmatch(r"[\s.+>·-]*(\d{1,3})[\s.]*", text)
-    if match is None and text and item_role is not Role.LEVEL:
+    if match is None and text and item_role is not Heading.LEVEL:
         words = f"the level “{text}” cannot be read; the row is taken to stand at the top"
         warnings.append(BomWarning(BomCode.FILE, words, line, name))
     return int(match[1]) if match else 1
@@ -367,7 +371,7 @@ def _doubtful_columns(sheet: Sheet) -> Iterator[BomWarning]:
         if any(parse_mass(cell).kg is not None for row in sheet.rows for cell in row.cells[index : index + 1])
     ]
     titles = [sheet.header[index].strip() for index in unused]
-    for what, is_role_known in (("mass", sheet.columns.masses), ("material", Role.MATERIAL in at)):
+    for what, is_role_known in (("mass", sheet.columns.masses), ("material", Heading.MATERIAL in at)):
         if not is_role_known:
             title = titles[0] if what == "mass" and titles else "…"
             words = f"there is no {what} column (the columns are {seen}); "

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from itertools import islice, zip_longest
 
 from silo.bom.errors import InputError, counted, listed
-from silo.bom.headers import Role, alias, normal, plain_cell
+from silo.bom.headers import Heading, alias, normal, plain_cell
 from silo.inertia.bom import MassHeader, read_mass_header
 from silo.workbook import STARTS, Grid, SheetRow, read_workbook, unicode_name
 
@@ -30,14 +30,28 @@ _NUMBER = re.compile(r"[\s+\-−~(]*[\d.,]")
 _CODE_PAGES = ("cp1252", "cp932", "gb18030", "latin-1")
 
 ROLES = (
-    *(Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION, Role.MATERIAL, Role.MASS, Role.TOTAL_MASS),
-    *(Role.QUANTITY, Role.ITEM, Role.LEVEL, Role.FIND_NUMBER, Role.MASS_UNIT, Role.UNIT),
+    *(
+        Heading.NAME,
+        Heading.PART_NUMBER,
+        Heading.DESCRIPTION,
+        Heading.MATERIAL,
+        Heading.MASS,
+        Heading.TOTAL_MASS,
+    ),
+    *(
+        Heading.QUANTITY,
+        Heading.ITEM,
+        Heading.LEVEL,
+        Heading.FIND_NUMBER,
+        Heading.MASS_UNIT,
+        Heading.UNIT,
+    ),
 )
 """What a mass calculation reads of a BOM."""
 
-MASS_COLUMNS = (Role.MASS, Role.TOTAL_MASS)
-_ONE_ONLY = (*MASS_COLUMNS, Role.MATERIAL, Role.QUANTITY)
-_NAMES = (Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION)
+MASS_COLUMNS = (Heading.MASS, Heading.TOTAL_MASS)
+_ONE_ONLY = (*MASS_COLUMNS, Heading.MATERIAL, Heading.QUANTITY)
+_NAMES = (Heading.NAME, Heading.PART_NUMBER, Heading.DESCRIPTION)
 _SILOS_OWN = {"part number", "total quantity", "unreferenced since"}
 
 
@@ -53,13 +67,13 @@ class Columns:
         masses are written in full (Silo's own export does so): a short one was not rounded.
     """
 
-    at: Mapping[Role, int]
-    masses: Mapping[Role, MassHeader]
-    others: tuple[tuple[Role, int], ...]
+    at: Mapping[Heading, int]
+    masses: Mapping[Heading, MassHeader]
+    others: tuple[tuple[Heading, int], ...]
     unused: tuple[int, ...]
     exact: bool
 
-    def cell(self, row: Sequence[str], role: Role) -> str:
+    def cell(self, row: Sequence[str], role: Heading) -> str:
         """Return the row's cell for a role; "" if there is no such column or the row is too short.
 
         An apostrophe that keeps a spreadsheet from running the cell as a formula is no part of it.
@@ -84,12 +98,12 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
         raise InputError(
             f"unknown column role {', '.join(unknown)}; the roles are {', '.join(sorted(ROLES))}"
         )
-    wanted = {Role(role): normal(text) for role, text in (given or {}).items()}
+    wanted = {Heading(role): normal(text) for role, text in (given or {}).items()}
     plain = [normal(cell) for cell in header]
     at = {role: plain.index(text) for role, text in wanted.items() if text in plain}
     taken = set(at.values())
-    best: dict[Role, int] = {}
-    seen: list[tuple[Role, int]] = []
+    best: dict[Heading, int] = {}
+    seen: list[tuple[Heading, int]] = []
     unused: list[int] = []
     for index, cell in enumerate(header):
         role_here = _role_of(cell)
@@ -108,18 +122,18 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
     return Columns(at, masses, others, tuple(unused), set(plain) >= _SILOS_OWN)
 
 
-def _role_of(cell: str) -> tuple[Role, int] | None:
+def _role_of(cell: str) -> tuple[Heading, int] | None:
     """Return role and rank of a header: "Mass", "Mass (g)", "mass_kg", "Gewicht in kg", "Summe Masse"."""
     role = alias(normal(cell.replace("/", " per ")))  # "Mass/unit" is no unit of a mass
     if role is not None and role[0] not in MASS_COLUMNS:
         return role if role[0] in ROLES else None
     header = read_mass_header(cell)
     if header.unit and not header.title and (role is None):
-        role = Role.MASS, sys.maxsize - 1  # "kg", "[g/pc]", "Total kg"
+        role = Heading.MASS, sys.maxsize - 1  # "kg", "[g/pc]", "Total kg"
     role = role or alias(header.title)
     if role is None or role[0] not in MASS_COLUMNS or header.rate:
         return None
-    return (Role.TOTAL_MASS, role[1]) if header.total else role
+    return (Heading.TOTAL_MASS, role[1]) if header.total else role
 
 
 @dataclass(frozen=True, slots=True)

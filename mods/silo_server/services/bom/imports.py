@@ -27,7 +27,7 @@ from silo import workbook
 from silo.api.wire import LineTexts
 from silo.bom.errors import InputError, RejectedError, listed
 from silo.bom.headers import (
-    Role,
+    Heading,
     designators,
     find_clashes,
     find_roles,
@@ -71,20 +71,37 @@ from silo_server.values import Item, Line, LineState
 
 # What a line says; and by what a part is known that has no number, and made.
 LINE_ROLES = (
-    *(Role.PART_NUMBER, Role.QUANTITY, Role.REFERENCE_DESIGNATORS, *map(Role, LineTexts.model_fields)),
-    *(Role.TYPE, Role.REVISION, Role.LEVEL),
+    *(
+        Heading.PART_NUMBER,
+        Heading.QUANTITY,
+        Heading.REFERENCE_DESIGNATORS,
+        *map(Heading, LineTexts.model_fields),
+    ),
+    *(Heading.TYPE, Heading.REVISION, Heading.LEVEL),
 )
 ROLES = (
-    *(*LINE_ROLES, Role.NAME, Role.DESCRIPTION, Role.VALUE, Role.FOOTPRINT, Role.MANUFACTURER),
-    *(Role.MANUFACTURER_NUMBER, Role.SUPPLIER, Role.SUPPLIER_NUMBER, Role.NOT_FITTED),
+    *(
+        *LINE_ROLES,
+        Heading.NAME,
+        Heading.DESCRIPTION,
+        Heading.VALUE,
+        Heading.FOOTPRINT,
+        Heading.MANUFACTURER,
+    ),
+    *(Heading.MANUFACTURER_NUMBER, Heading.SUPPLIER, Heading.SUPPLIER_NUMBER, Heading.NOT_FITTED),
 )
-NEEDED = (Role.PART_NUMBER, Role.QUANTITY)
+NEEDED = (Heading.PART_NUMBER, Heading.QUANTITY)
 # In place of a needed column, if the file has none.
 _INSTEAD = {
-    Role.PART_NUMBER: (Role.MANUFACTURER_NUMBER, Role.VALUE),
-    Role.QUANTITY: (Role.REFERENCE_DESIGNATORS,),
+    Heading.PART_NUMBER: (Heading.MANUFACTURER_NUMBER, Heading.VALUE),
+    Heading.QUANTITY: (Heading.REFERENCE_DESIGNATORS,),
 }
-_BOUGHT = (Role.MANUFACTURER, Role.MANUFACTURER_NUMBER, Role.SUPPLIER, Role.SUPPLIER_NUMBER)
+_BOUGHT = (
+    Heading.MANUFACTURER,
+    Heading.MANUFACTURER_NUMBER,
+    Heading.SUPPLIER,
+    Heading.SUPPLIER_NUMBER,
+)
 _RANGE = re.compile(r"([A-Za-z]+)([0-9]+)-([A-Za-z]*)([0-9]+)")
 
 
@@ -97,12 +114,12 @@ class Table(NamedTuple):
         columns that a file has once: two that differ are refused.
     """
 
-    roles: Sequence[Role]
-    needed: Sequence[Role]
-    instead: Mapping[Role, Sequence[Role]]
-    single: Sequence[Role]
+    roles: Sequence[Heading]
+    needed: Sequence[Heading]
+    instead: Mapping[Heading, Sequence[Heading]]
+    single: Sequence[Heading]
 
-    def lacking(self, there: Collection[Role]) -> list[Role]:
+    def lacking(self, there: Collection[Heading]) -> list[Heading]:
         """Return the needed columns that are neither there nor stood for by another."""
         return [
             role for role in self.needed if role not in there and not {*self.instead.get(role, ())} & {*there}
@@ -136,7 +153,7 @@ class Layout:
 
     delimiter: str
     header: int
-    columns: Mapping[Role, int] = field(default_factory=dict)
+    columns: Mapping[Heading, int] = field(default_factory=dict)
     mark: Mark | None = None
 
 
@@ -149,7 +166,10 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None, of: Table
     text = _decode(data)
     chosen, layout = layout is not None, layout or guess(text, of)
     # A person may also choose the column of the names.
-    roles = {*layout.columns, *(_INSTEAD[Role.PART_NUMBER] if Role.NAME in layout.columns else ())}
+    roles = {
+        *layout.columns,
+        *(_INSTEAD[Heading.PART_NUMBER] if Heading.NAME in layout.columns else ()),
+    }
     if missing := of.lacking(roles):
         words = ", ".join(role.replace("_", " ").capitalize() for role in missing)
         raise RejectedError(f"file: choose the column of {words}")
@@ -161,8 +181,8 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None, of: Table
     if len(table) - layout.header - 1 > max_rows:
         raise TooLargeError(f"file: this server takes at most {max_rows} rows, got more")
     header, body = table[layout.header] if table else [], table[layout.header + 1 :]
-    if of is BOM and Role.PART_NUMBER in layout.columns:
-        _refuse_flat(header, body, layout.columns[Role.PART_NUMBER])
+    if of is BOM and Heading.PART_NUMBER in layout.columns:
+        _refuse_flat(header, body, layout.columns[Heading.PART_NUMBER])
     if not chosen:
         _refuse_clashes(header, body, layout, of.single)
     gap_column = _column(header, _INCOMPLETE)
@@ -171,7 +191,7 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None, of: Table
         record = {role.value: _cell(cells, i) for role, i in layout.columns.items() if i < len(cells)}
         # Our own exports end with what a sync left out: rows that say so, and have no part number.
         if any(record.values()) and (record.get("part_number") or not _cell(cells, gap_column)):
-            if of is BOM and Role.QUANTITY not in layout.columns:
+            if of is BOM and Heading.QUANTITY not in layout.columns:
                 record["quantity"] = str(_designated(record.get("reference_designators", "")))
             records.append((number, record))
     return _with_exact_quantities(records, layout) if of is BOM else records
@@ -294,7 +314,7 @@ def _refuse_flat(header: Sequence[str], body: Sequence[Sequence[str]], part_numb
 
 
 def _refuse_clashes(
-    header: Sequence[str], body: Sequence[Sequence[str]], layout: Layout, single: Sequence[Role]
+    header: Sequence[str], body: Sequence[Sequence[str]], layout: Layout, single: Sequence[Heading]
 ) -> None:
     """Refuse two columns of one role: a person says which one counts, not the order of the file."""
     header = header[:MAX_COLUMNS]
