@@ -31,6 +31,7 @@ class Viewer {
   #due = 0;
   #moving = false;
   #quick = false; // it turns in full
+  #glance = false; // something was lit: a first picture in time, then all in full
   #settle = 0;
   #last = 0;
   #budget = 4e5; // vertices that are drawn in time while the model turns; it follows from the last frames
@@ -197,6 +198,10 @@ class Viewer {
   light(bodies, look = false) {
     this.lit = new Set(bodies);
     if (look && this.lit.size) this.fit(this.lit);
+    if (this.#budget <= Viewer.ALL) {
+      this.#glance = true;
+      this.#settled();
+    }
     this.dress();
     if (this.lit.size === 2) {
       const [one, two] = this.lit;
@@ -269,19 +274,25 @@ class Viewer {
       this.#last = -Infinity; // what came before was no frame of this turn
     }
     this.#moving = true;
+    this.#settled();
+    this.draw();
+  }
+
+  // After a while, in full.
+  #settled() {
     clearTimeout(this.#settle);
     this.#settle = setTimeout(() => {
-      this.#moving = false;
+      this.#moving = this.#glance = false;
       this.draw();
     }, Viewer.SETTLED);
-    this.draw();
   }
 
   #render(now) {
     const { renderer, camera, scene } = this;
     const { clientWidth: width, clientHeight: height } = this.view;
     if (!width || !height) return;
-    const ratio = this.#moving ? (this.#quick ? devicePixelRatio : 0.5) : this.#cost < Viewer.FINE ? 2 : devicePixelRatio;
+    const fine = this.#cost < Viewer.FINE && !this.#glance ? 2 : devicePixelRatio;
+    const ratio = this.#moving ? (this.#quick ? devicePixelRatio : 0.5) : fine;
     const size = `${width} ${height} ${ratio}`;
     if (size !== this.#size) {
       this.#size = size;
@@ -299,7 +310,8 @@ class Viewer {
     camera.updateMatrixWorld();
     renderer.clippingPlanes = this.plane ? [this.plane] : [];
     renderer.setScissorTest(this.beside);
-    const drawn = this.#moving ? this.#large(now, height) : null;
+    const drawn = this.#moving || this.#glance ? this.#large(now, height) : null;
+    this.view.dataset.drawn = drawn ? "in part" : "in full";
     sides.forEach((side, n) => {
       const area = [(n * width) / sides.length, 0, width / sides.length, height];
       renderer.setViewport(...area);
@@ -317,18 +329,24 @@ class Viewer {
     return !this.hidden.has(body) && (!side || !body.side || body.side === side);
   }
 
-  // While it turns: as many bodies as can be drawn in time, the large ones first.
+  // As many bodies as can be drawn in time, the lit and the large ones first.
   #large(now, height) {
     const { camera } = this;
     const took = now - this.#last;
     this.#last = now;
-    if (took < 5000) this.#budget = Math.min(2 * Viewer.ALL, Math.max(5e4, this.#budget * (took > 40 ? 0.8 : took < 25 ? 1.15 : 1)));
+    if (this.#moving && took < 5000) this.#budget = Math.min(2 * Viewer.ALL, Math.max(5e4, this.#budget * (took > 40 ? 0.8 : took < 25 ? 1.15 : 1)));
     this.#order ??= [...this.bodies].sort((one, two) => two.sphere.radius - one.sphere.radius);
     const frustum = new THREE.Frustum().setFromProjectionMatrix(
       new THREE.Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
     const pixels = height / Math.tan((camera.fov * Math.PI) / 360);
     const drawn = new Set();
     let left = this.#budget;
+    if (this.#glance) {
+      for (const body of this.lit) {
+        drawn.add(body);
+        left -= 2 * body.cost; // it is drawn over what covers it, too
+      }
+    }
     for (const body of this.#order) {
       if (left < 0) break;
       const seen = (body.sphere.radius / camera.position.distanceTo(body.sphere.center)) * pixels;
