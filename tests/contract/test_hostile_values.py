@@ -135,6 +135,31 @@ def test_a_revision_in_a_csv_that_is_no_number(api: Api, revision: str) -> None:
     assert "row 2: Revision" in answer["problems"][0]
 
 
+def test_a_text_that_no_database_holds_is_asked_for(api: Api) -> None:
+    """Each text in the address of each read: an answer or a sentence about it, on either database."""
+    known = {"part_number": api.item(), "username": "admin"}
+    document = api.get("/api/openapi.json")
+    asked, vague = 0, []
+    for path, operations in document["paths"].items():
+        parameters = operations.get("get", {}).get("parameters", ())
+        texts = [each["name"] for each in parameters if each["schema"].get("type") == "string"]
+        needed = {each["name"]: "1" for each in parameters if each.get("required")} | known
+        for name in texts:
+            values = needed | {name: "a\0b"}
+            inside = {key: quote(value, safe="") for key, value in values.items()}
+            query = {
+                key: value
+                for key, value in values.items()
+                if any((each["name"], each["in"]) == (key, "query") for each in parameters)
+            }
+            answer = api.call("GET", f"{path.format_map(inside)}?{urlencode(query)}")
+            asked += 1
+            if answer.status >= 500 or b"cannot be stored" in answer.body:
+                vague.append((path, name, answer.status))
+    assert asked > 60
+    assert not vague
+
+
 @pytest.mark.parametrize("number", ["9" * 23, "0", "-1", "²", "1.5"])
 def test_the_number_of_a_token_that_is_none(api: Api, number: str) -> None:
     """On the page as in the API."""

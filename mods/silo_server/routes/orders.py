@@ -183,7 +183,7 @@ def asked_of(
     spares: Annotated[
         str,
         Query(max_length=20),
-        WithJsonSchema({"type": "string", "pattern": "^([0-9]{1,2}([.][0-9]+)?)?$"}),
+        WithJsonSchema({"type": "string", "pattern": "^([0-9]{1,2}([.][0-9]{1,2})?)?$"}),
     ] = "",
     release: Annotated[str, Query(max_length=16)] = "",
     rest: bool = False,

@@ -23,6 +23,7 @@ from sqlalchemy import insert, select, update
 
 from silo.api.wire import RELEASE_LABEL, ItemTexts
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
+from silo.bom.resolve import character_problem
 from silo_server import events
 from silo_server.db.engine import Tx, insert_rows, one_of
 from silo_server.db.tables import (
@@ -123,6 +124,8 @@ def _release(row: Any) -> Release:
 
 def find_release(tx: Tx, item: Item, label: str) -> Release | None:
     """Return the revision with this label; None if there is none."""
+    if character_problem(label):
+        return None  # PostgreSQL refuses to look for some of these
     row = releases.c
     of_label = (row.item_id == item.id) & (row.label == label)
     query = select(releases).where(of_label, row.status.in_(NUMBERED))
