@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 import itertools
+import json
 import socket
 import threading
 import uuid
@@ -16,17 +17,19 @@ from urllib.parse import urlsplit
 
 import pytest
 from server_testing import Api, bom, merge_body, sqlite_database
-from sqlalchemy import event
+from sqlalchemy import Engine, event
+from web_visitor import Visitor
 
 import silo_server
 from silo.bom.errors import BusyError, RejectedError
 from silo.bom.headers import Heading
 from silo_server.db.engine import Database, Turnstile, Tx, insert_rows
 from silo_server.db.tables import bom_lines, items
-from silo_server.run import running_server
+from silo_server.run import RunningServer, running_server
 from silo_server.services.bom import imports, review, tree
 from silo_server.services.bom.lines import state_columns
 from silo_server.services.bom.merge import merge_bom, read_merge_order, remember_refusal
+from silo_server.services.bom.summary import keep_all
 from silo_server.services.items import NewItem, archive_item, create_item, get_item
 from silo_server.settings import Settings, TooLargeError
 from silo_server.values import LineState
@@ -328,6 +331,34 @@ def test_what_waits_is_listed_and_counted_without_reading_all_lines(db: Database
 
 def _plan(tx: Tx) -> str:
     return "EXPLAIN " if tx.postgres else "EXPLAIN QUERY PLAN "
+
+
+def test_pages_read_a_bom_once_and_no_whole_parts(
+    server: RunningServer, api: Api, visitors: dict[str, Visitor]
+) -> None:
+    """Of thousands of parts a page needs a few columns; the items that it reads whole are products."""
+    top, *parts = api.items(4)
+    api.merge(top, dict.fromkeys(parts, 2))
+    keep_all(server.app.state.server.db)
+    asked: list[tuple[str, Any]] = []
+
+    def note(_conn: Any, _cursor: Any, sql: str, values: Any, *_: Any) -> None:
+        asked.append((sql, values))
+
+    def reads(page: str) -> tuple[int, int]:
+        asked.clear()
+        assert visitors["viewer"].get(f"/items/{top}{page}").status == 200
+        whole = [values for sql, values in asked if "items.origins" in sql and "json_each" in sql]
+        lines = sum("FROM bom_lines JOIN items" in sql and "parent_id" in sql for sql, _ in asked)
+        return lines, max((len(json.loads(values[0])) for values in whole), default=0)
+
+    event.listen(Engine, "before_cursor_execute", note)
+    try:
+        found = {page: reads(page) for page in ("/bom", "/order", "?q=1", "?view=flat&q=1", "/changes")}
+    finally:
+        event.remove(Engine, "before_cursor_execute", note)
+    assert found.pop("/changes")[1] == 1
+    assert set(found.values()) == {(1, 0)}, found
 
 
 def returned_late(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:

@@ -153,8 +153,9 @@ def check_by_rows(tx: Tx, item: Any, told: Summary) -> None:
     """Totals, counts and levels are those of the lists of all parts."""
     graph = tree.load_graph(tx, item)
     parts = tree.parts_of(tx, graph)
-    cost = tree.roll_up_cost(graph, parts)
-    mass = tree.roll_up_mass(graph, parts, standing_alone(tx, graph))
+    alone = standing_alone(tx, graph)
+    cost = tree.roll_up_cost(tree.flatten(graph), parts)
+    mass = tree.roll_up_mass(tree.flatten(graph, alone), parts, alone)
     flat = {row.line.child_part_number for row in tree.flatten(graph)}
     rows = list(tree.expand(graph, tree.MAX_DEPTH, 10**6))
     assert told.parts == len(flat)

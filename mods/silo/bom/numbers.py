@@ -193,6 +193,8 @@ def _plain_character(character: str) -> str:
 
 def as_decimal(value: float | int | Decimal) -> Decimal:
     """Return the number that ``value`` shows: 0.1 is one tenth. ValueError if it is not finite."""
+    if isinstance(value, Decimal):
+        return value
     if isinstance(value, float):
         if not isfinite(value):
             raise ValueError(f"wanted a finite number, got {value}")

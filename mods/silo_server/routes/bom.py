@@ -237,7 +237,7 @@ def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return flat BOM × ``standard_cost``, per currency; ``missing`` names what has no cost."""
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
-        cost = tree.roll_up_cost(graph, tree.parts_of(tx, graph))
+        cost = tree.roll_up_cost(tree.flatten(graph), tree.parts_of(tx, graph))
     only = next(iter(cost.totals.values())) if len(cost.totals) == 1 else None
     return {
         "part_number": graph.root.part_number,
@@ -245,7 +245,7 @@ def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
         "totals": [{"currency": c, "total_cost": t} for c, t in cost.totals.items()],
         "complete": not cost.missing,
         "missing": list(cost.missing),
-        "lines": [to_wire(row) for row in cost.rows],
+        "lines": [row._asdict() for row in cost.rows],
     }
 
 
@@ -254,15 +254,15 @@ def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return the mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names what has none."""
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
-        parts = tree.parts_of(tx, graph)
-        mass = tree.roll_up_mass(graph, parts, standing_alone(tx, graph))
+        alone = standing_alone(tx, graph)
+        mass = tree.roll_up_mass(tree.flatten(graph, alone), tree.parts_of(tx, graph), alone)
     return {
         "part_number": graph.root.part_number,
         "total_mass_kg": mass.total,
-        "stated_mass_kg": mass.stated,
+        "stated_mass_kg": tree.positive_number(graph.root.properties, "mass_kg"),
         "complete": not mass.missing,
         "missing": list(mass.missing),
-        "lines": [to_wire(row) for row in mass.rows],
+        "lines": [row._asdict() for row in mass.rows],
     }
 
 

@@ -18,15 +18,15 @@ from typing import NamedTuple
 from sqlalchemy import insert, or_, select, update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted, listed
-from silo.bom.numbers import as_decimal, counts_pieces, exact_product, exact_sum, plain
+from silo.bom.numbers import counts_pieces, exact_product, exact_sum, plain
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import document_items, documents, items, orders, revisions
 from silo_server.services import access
 from silo_server.services.bom.frozen import frozen_product
 from silo_server.services.bom.summary import Summary, own_worth, summary_of
 from silo_server.services.bom.transfer import Export, Row, View
-from silo_server.services.bom.tree import FlatRow, Graph, flatten, load_graph
-from silo_server.services.items import by_ids, get_item
+from silo_server.services.bom.tree import FlatRow, Graph, RolledItem, flatten, load_graph, parts_of
+from silo_server.services.items import get_item
 from silo_server.services.releases import Release, get_release, newest_release
 from silo_server.services.suppliers import (
     SupplierOffer,
@@ -98,7 +98,8 @@ class OrderRow(NamedTuple):
         ``bought``, ``made`` or ``unsaid``.
     """
 
-    item: Item
+    item_id: int
+    item: RolledItem
     unit: str | None
     total: Decimal
     needed: Decimal
@@ -184,56 +185,45 @@ def order_list(tx: Tx, part_number: str, asked: OrderRequest) -> OrderList:
     release = get_release(tx, product, asked.release) if asked.release else None
     if release:
         frozen = frozen_product(tx, product, release)
-        graph, items_by_id, summary = frozen.graph, frozen.items, None
-        ids = _ids_of(tx, items_by_id)
+        graph, parts, summary = frozen.graph, frozen.parts, None
+        ids = _ids_of(tx, frozen.items)
     else:
-        graph, summary = load_graph(tx, product), summary_of(tx, product)
-        items_by_id = by_ids(tx, graph.names())
-        ids = {item_id: item_id for item_id in items_by_id}
-    flat = flatten(
-        graph,
-        {item_id for item_id, item in items_by_id.items() if item.is_bought and item_id != graph.root.id},
-    )
+        graph, summary = load_graph(tx, product, bare=True), summary_of(tx, product)
+        parts = parts_of(tx, graph)
+        ids = {item_id: item_id for item_id in parts}
+    closed = {item_id for item_id, part in parts.items() if part.is_bought} - {graph.root.id}
     # A part that is used by the piece and by the metre is two rows.
-    done = _ordered(tx, product)
-    rates = rates_of(tx)
+    done, rates, none = _ordered(tx, product), rates_of(tx), Decimal(0)
     rows = [
         _row(
-            item_id,
-            items_by_id,
+            row,
+            parts[row.line.child_id],
             asked,
-            done.get((ids.get(item_id.line.child_id), item_id.unit), Decimal(0)),
+            done.get((ids.get(row.line.child_id), row.unit), none),
             rates,
         )
-        for item_id in flat
+        for row in flatten(graph, closed)
     ]
-    files = _files(
-        tx, {ids[row.item.id] for row in rows if row.kind != BOUGHT and row.item.id in ids}, release
-    )
-    if files:
-        rows = [row._replace(files=files.get(ids.get(row.item.id, 0), ())) for row in rows]
+    made = {ids[row.item_id] for row in rows if row.kind != BOUGHT and row.item_id in ids}
+    if files := _files(tx, made, release) if made else {}:
+        rows = [row._replace(files=files.get(ids.get(row.item_id, 0), ())) for row in rows]
     rows.sort(key=lambda row: row.item.part_number.casefold())
     return _summed(product, asked, rows, rates, *_state(tx, product, release, summary, graph))
 
 
 def _row(
-    flat_row: FlatRow,
-    items_by_id: Mapping[int, Item],
-    asked: OrderRequest,
-    done: Decimal,
-    rates: Mapping[str, Decimal],
+    flat_row: FlatRow, part: RolledItem, asked: OrderRequest, done: Decimal, rates: Mapping[str, Decimal]
 ) -> OrderRow:
-    item = items_by_id[flat_row.line.child_id]
-    made = item.texts.get("sourcing_type") == "manufactured"
-    kind = BOUGHT if item.is_bought else MADE if made else UNSAID
-    total = exact_product((as_decimal(flat_row.total), asked.pieces))
+    kind = BOUGHT if part.is_bought else MADE if part.sourcing_type == "manufactured" else UNSAID
+    total = exact_product((flat_row.total, asked.pieces))
     needed = exact_product((total, 1 + asked.spares / 100)) if asked.spares else total
     if asked.rest:
         needed = max(Decimal(0), exact_sum((needed, -done)))
     if counts_pieces(flat_row.unit):
         needed = needed.to_integral_value(ROUND_CEILING)
-    offer = choose(supplier_parts_of(item), needed, rates) if kind == BOUGHT else None
-    return OrderRow(item, flat_row.unit, total, needed, done, flat_row.doubts(asked.pieces), kind, offer)
+    offer = choose(supplier_parts_of(part), needed, rates) if kind == BOUGHT else None
+    doubts = flat_row.doubts(asked.pieces)
+    return OrderRow(flat_row.line.child_id, part, flat_row.unit, total, needed, done, doubts, kind, offer)
 
 
 def _state(
@@ -272,21 +262,20 @@ def _summed(
     warnings: Sequence[str],
 ) -> OrderList:
     wanted = [row for row in rows if row.kind == BOUGHT and row.needed]
-    costs: dict[str, Decimal] = {}
-    for row in wanted:
-        if row.offer and row.offer.cost is not None:
-            currency = row.offer.of.currency
-            costs[currency] = exact_sum((costs.get(currency, Decimal(0)), row.offer.cost))
-    prices = [row.offer.in_base for row in wanted if row.offer and row.offer.in_base is not None]
-    days = [row.offer.of.lead_time_days for row in wanted if row.offer]
-    stated = [day for day in days if day is not None]
+    offers = [row.offer for row in wanted if row.offer]
+    costs: dict[str, list[Decimal]] = {}
+    for offer in offers:
+        if offer.cost is not None:
+            costs.setdefault(offer.of.currency, []).append(offer.cost)
+    prices = [offer.in_base for offer in offers if offer.in_base is not None]
+    stated = [offer.of.lead_time_days for offer in offers if offer.of.lead_time_days is not None]
     return OrderList(
         product,
         asked,
         state,
         warnings,
         rows,
-        costs,
+        {currency: exact_sum(of_it) for currency, of_it in costs.items()},
         exact_sum(prices),
         next(iter(rates)),
         len(wanted) - len(prices),

@@ -73,9 +73,12 @@ def fits(asked: str) -> Callable[..., bool]:
     def test(*texts: str | None) -> bool:
         if not wanted:
             return True
-        text = " ".join(text for text in texts if text)
+        text = " ".join(filter(None, texts))
         written, joined = (_read if len(text) <= LONGEST_KEPT else _read.__wrapped__)(text)
-        return all(word in written or word in joined for word in wanted)
+        for word in wanted:  # noqa: SIM110 - in half the time of all()
+            if word not in written and word not in joined:
+                return False
+        return True
 
     return test
 

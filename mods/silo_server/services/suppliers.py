@@ -14,7 +14,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Decimal
 from fractions import Fraction
 from math import ceil
@@ -40,7 +40,7 @@ from silo_server.db.engine import Tx, get_state, one_of, put_state
 from silo_server.db.tables import items, supplier_changes
 from silo_server.services import access
 from silo_server.services.bom.imports import Layout, Record, Table
-from silo_server.services.bom.tree import DEFAULT_CURRENCY, currency_of, positive_number
+from silo_server.services.bom.tree import DEFAULT_CURRENCY, RolledItem, currency_of, positive_number
 from silo_server.services.items import get_by_numbers, get_item
 from silo_server.services.search import index_item
 from silo_server.values import Item, dumps, from_row
@@ -59,6 +59,7 @@ COLUMNS: Mapping[str, str] = {
 }
 EXAMPLES = {"prices": "1: 0.50; 100: 0.40", "link": "https://…"}
 _RATES = "currency_rates"
+_CODE = re.compile("[A-Z]{3}")
 _CELLS = {"supplier_part_number": "number"}  # the column of a file → ours
 MOST_PARTS, MOST_PRICES = 50, 30
 _LONGEST = {"supplier": 200, "number": 200, "link": 2000}
@@ -85,8 +86,7 @@ _ROLES = (
 TABLE = Table(_ROLES, (Heading.PART_NUMBER, Heading.SUPPLIER), {}, _ROLES)
 
 
-@dataclass(frozen=True, slots=True)
-class SupplierPart:
+class SupplierPart(NamedTuple):
     """An item as a supplier sells it.
 
     prices
@@ -120,7 +120,10 @@ class SupplierPart:
 
     def price_at(self, amount: Decimal) -> Decimal | None:
         """Return the price of one piece if so many are ordered; None below the first price."""
-        return next((price for least, price in reversed(self.prices) if least <= amount), None)
+        for least, price in reversed(self.prices):
+            if least <= amount:
+                return price
+        return None
 
 
 class SupplierOffer(NamedTuple):
@@ -147,11 +150,13 @@ def choose(
         what one of a currency is in the site's own. What cannot be compared comes behind what can.
     """
     offers = [_offer(part, needed, rates) for part in parts]
+    if len(offers) < 2:
+        return offers[0] if offers else None
     offers = [offer for offer in offers if offer.of.preferred] or offers
     compared = [(offer.in_base, place) for place, offer in enumerate(offers) if offer.in_base is not None]
     if compared:
         return offers[min(compared)[1]]
-    return next((offer for offer in offers if offer.cost is not None), offers[0] if offers else None)
+    return next((offer for offer in offers if offer.cost is not None), offers[0])
 
 
 def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) -> SupplierOffer:
@@ -171,7 +176,7 @@ def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) ->
     return SupplierOffer(part, amount, price, cost, in_base, best and (best[1], best[0]))
 
 
-def supplier_parts_of(item: Item) -> list[SupplierPart]:
+def supplier_parts_of(item: Item | RolledItem) -> list[SupplierPart]:
     """Return the supplier parts of an item; without a list what of its properties is usable."""
     if item.supplier_parts:
         return [from_json(part) for part in item.supplier_parts]
@@ -181,12 +186,13 @@ def supplier_parts_of(item: Item) -> list[SupplierPart]:
         return []
     number = str(said.get("supplier_part_number") or "")[:200].strip()
     cost, currency = positive_number(said, "standard_cost"), currency_of(said).strip().upper()
-    days = whole_number(str(said.get("lead_time_days")).strip(), 4)
+    lead_time = said.get("lead_time_days")
+    days = None if lead_time is None else whole_number(str(lead_time).strip(), 4)
     part = SupplierPart(
         supplier.strip()[:200],
-        "" if character_problem(number) else number,
+        "" if number and character_problem(number) else number,
         prices=() if cost is None or cost > LARGEST_PRICE else ((Decimal(1), as_decimal(cost)),),
-        currency=currency if re.fullmatch("[A-Z]{3}", currency) else DEFAULT_CURRENCY,
+        currency=currency if _CODE.fullmatch(currency) else DEFAULT_CURRENCY,
         lead_time_days=None if days is None or days > LONGEST_LEAD_TIME else days,
     )
     return [part]
@@ -285,7 +291,7 @@ class _Reader:
         if len(prices) > MOST_PRICES:
             problems.append(f"{COLUMNS['prices']}: wanted at most {MOST_PRICES} of them, got {len(prices)}")
         currency = said["currency"].upper() or self.currency
-        if not re.fullmatch("[A-Z]{3}", currency):
+        if not _CODE.fullmatch(currency):
             problems.append(f"Currency: wanted three letters such as EUR, got {currency[:40]!r}")
         days = whole_number(said["lead_time_days"], 4)
         if said["lead_time_days"] and (days is None or days > LONGEST_LEAD_TIME):
@@ -516,9 +522,9 @@ def _planned(rows: Sequence[Record], items_by_number: Mapping[str, Item], reader
         if kept and not wrong:
             old = there[key]
             names = [name for name in COLUMNS if name in given]
-            part = replace(old, **{name: getattr(part, name) for name in names})
+            part = old._replace(**{name: getattr(part, name) for name in names})
         if part.preferred:
-            there = {k: replace(supplier_part, preferred=False) for k, supplier_part in there.items()}
+            there = {k: supplier_part._replace(preferred=False) for k, supplier_part in there.items()}
         there[key] = part
     parts = list(there.values())
     problems += [f"row {rows[0][0]}: {problem}" for problem in list_problems(parts)] if not problems else []
@@ -569,7 +575,7 @@ def set_rates(tx: Tx, own: str, texts: Iterable[tuple[str, str]]) -> dict[str, D
             problems.append(f"{currency}: {reading.problem or f'wanted a rate above 0, got {text!r}'}")
         else:
             rates[currency] = reading.value
-    wrong = [other for other in rates if not re.fullmatch("[A-Z]{3}", other)]
+    wrong = [other for other in rates if not _CODE.fullmatch(other)]
     problems += [f"Currency: wanted three letters such as EUR, got {other[:20]!r}" for other in wrong]
     if problems:
         raise RejectedError("; ".join(problems), problems)

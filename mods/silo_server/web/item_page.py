@@ -134,13 +134,22 @@ class Branch:
 
 
 class StructureRow(NamedTuple):
-    """An open row of the tree before it is dressed: ``key`` names the branch, if it can be one."""
+    """An open row of the tree before it is dressed; ``above``: the key of what it is in, None if it can be
+    no branch.
+    """
 
     line: Line
     depth: int
     total: tree.Exact
-    key: str
-    is_open: bool
+    above: str | None = None
+    is_open: bool = False
+
+    @property
+    def key(self) -> str:
+        """Return what names the branch, "" if it can be none."""
+        if self.above is None:
+            return ""
+        return hashlib.blake2b(f"{self.above} {self.line.id}".encode(), digest_size=4).hexdigest()
 
 
 class ShownStructure:
@@ -173,6 +182,13 @@ class ShownStructure:
     def leaves(self) -> Sequence[tree.FlatRow]:
         """Return the flat list, unfiltered."""
         return tree.flatten(self.graph)
+
+    @cached_property
+    def found(self) -> Sequence[tree.FlatRow]:
+        """Return what the filter finds: in the flat list, or first on each way down the tree."""
+        if self.look.is_flat:
+            return [row for row in self.leaves if self.fitting(row.line)]
+        return tree.found_parts(self.graph, self.fitting)
 
     def lines_of(self, item_id: int, level: int) -> Sequence[Line]:
         """Return the lines of what a row of this level shows; below the open levels they are read when asked
@@ -250,11 +266,12 @@ def _walk(shown: ShownStructure) -> Iterator[StructureRow]:
     graph, look = shown.graph, shown.look
     filtered, flipped = look.is_filtered, set(look.flips)
     hit = tree.leading_to(graph, shown.fitting) if filtered else lambda _line: True
+    keys = _tree_keys(shown)
 
     @cache
     def lines_of(item_id: int, level: int) -> Sequence[Line]:
         below = shown.lines_of(item_id, level)
-        return arranged([line for line in below if hit(line)], look.sort, _tree_keys(shown))
+        return arranged([line for line in below if hit(line)], look.sort, keys) if below else ()
 
     exact: tree.Exact = look.pieces
     stack = [(1, exact, "", iter(lines_of(graph.root.id, 0)))]
@@ -262,17 +279,17 @@ def _walk(shown: ShownStructure) -> Iterator[StructureRow]:
         level, factor, above, lines = stack[-1]
         for line in lines:
             total = tree.multiplied(factor, line)
-            key = (
-                hashlib.blake2b(f"{above} {line.id}".encode(), digest_size=4).hexdigest()
-                if line.state.rel_type == "component" and level < tree.MAX_DEPTH
-                else ""
-            )
-            is_open = bool(key) and (filtered or (level < look.depth) != (key in flipped))
+            if line.state.rel_type != "component" or level >= tree.MAX_DEPTH:
+                yield StructureRow(line, level, total)
+                continue
+            row = StructureRow(line, level, total, above)
+            is_open = filtered or (level < look.depth) != (bool(flipped) and row.key in flipped)
             inner = lines_of(line.child_id, level) if is_open else ()
-            yield StructureRow(line, level, total, key, bool(inner))
             if inner:
-                stack.append((level + 1, total, key, iter(inner)))
+                yield row._replace(is_open=True)
+                stack.append((level + 1, total, row.key, iter(inner)))
                 break
+            yield row
         else:
             stack.pop()
 
@@ -301,13 +318,10 @@ def _cost_key(costs: Mapping[str, Decimal]) -> Decimal | None:
 def flat_page(shown: ShownStructure) -> Page[Branch]:
     """Return a page of the leaf parts, each with its total over the whole tree."""
     look = shown.look
-    rows = arranged([row for row in shown.leaves if shown.fitting(row.line)], look.sort, _flat_keys(shown))
+    rows = arranged(shown.found, look.sort, _flat_keys(shown))
     table = page_of(rows, len(shown.leaves), look.page, shown.page_rows)
     here = shown.dressed(
-        [
-            (StructureRow(row.line, 1, row.total * look.pieces, "", False), row.doubts(look.pieces))
-            for row in table.rows
-        ]
+        [(StructureRow(row.line, 1, row.total * look.pieces), row.doubts(look.pieces)) for row in table.rows]
     )
     return Page(here, table.total, table.found, table.number, table.size)
 
@@ -453,8 +467,7 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
             )
         shown = ShownStructure(tx, tree.load_graph(tx, item, None if whole else depth), look, size)
         if look.is_filtered:
-            narrow = tree.narrowed(shown.graph, shown.fitting, shown.leaves if look.is_flat else None)
-            values |= {"totals": Totals.narrow(tx, narrow, shown.parts)}
+            values |= {"totals": Totals.narrow(tx, shown.graph, shown.found, shown.parts)}
         if look.is_flat:
             flat = flat_page(shown)
             supplied = any(row.part.properties.get("supplier") for row in flat.rows)
@@ -484,10 +497,18 @@ class Totals:
         return cls(summary.worth.mass, summary.worth.costs, **same)
 
     @classmethod
-    def narrow(cls, tx: Tx, graph: tree.Graph, parts: Mapping[int, RolledItem]) -> Totals:
-        """Return those of what a filter has found."""
-        cost = tree.roll_up_cost(graph, parts)
-        weighed = tree.roll_up_mass(graph, parts, standing_alone(tx, graph))
+    def narrow(
+        cls,
+        tx: Tx,
+        graph: tree.Graph,
+        found: Sequence[tree.FlatRow],
+        parts: Mapping[int, RolledItem],
+    ) -> Totals:
+        """Return those of what a filter has found, with all that is in it."""
+        leaves = tree.leaves_in(graph, found)
+        alone = set() if leaves is found else standing_alone(tx, graph)
+        cost = tree.roll_up_cost(leaves, parts)
+        weighed = tree.roll_up_mass(tree.leaves_in(graph, found, alone) if alone else leaves, parts, alone)
         return cls(
             weighed.total or None,
             cost.totals,

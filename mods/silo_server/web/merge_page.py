@@ -299,9 +299,8 @@ def _do(
 
 def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> Response:
     with call.read() as tx:
-        item = get_item(tx, part_number)
-        review_of = service.review(tx, item.part_number)
-        lines = lines_of(tx, item)
+        review_of = service.review(tx, part_number)
+        item, lines = review_of.parent, review_of.lines
         last = last_sync(tx, item)
         merge = review_of.last_merge
         merged = history.get_change(tx, item, merge.id)[1] if merge else []
@@ -409,7 +408,7 @@ def table_of(lines: Sequence[Line], path: str, view: str) -> tuple[Page[Line], A
     return table, Address(path, asked | ({"page": str(table.number)} if table.number > 1 else {}))
 
 
-def _editing(lines: list[Line], asked: PageState, item: Any) -> Line | None:
+def _editing(lines: Sequence[Line], asked: PageState, item: Any) -> Line | None:
     if not asked.edit:
         return None
     for which in (LineId(asked.edit), asked.edit):

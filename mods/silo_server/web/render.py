@@ -23,6 +23,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from functools import lru_cache
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 from urllib.parse import quote, unquote, urlencode
@@ -524,10 +525,16 @@ def arranged(rows: Sequence[T], sort: str, keys: Mapping[str, Callable[[T], Any]
     key = keys.get(sort.removeprefix("-"))
     if key is None:
         return rows
-    pairs = [(key(row), row) for row in rows]
-    with_value = [pair for pair in pairs if pair[0] not in (None, "")]
-    with_value.sort(key=lambda pair: _natural(pair[0]), reverse=sort.startswith("-"))
-    return [row for _value, row in (*with_value, *(pair for pair in pairs if pair[0] in (None, "")))]
+    with_value, without = [], []
+    for row in rows:
+        value = key(row)
+        # A decimal looks twice into the tree of numbers before it says that it is no text.
+        if value is None or (isinstance(value, str) and not value):
+            without.append(row)
+        else:
+            with_value.append((_natural(value), row))
+    with_value.sort(key=itemgetter(0), reverse=sort.startswith("-"))
+    return [*(row for _key, row in with_value), *without]
 
 
 def _natural(value: Any) -> Any:

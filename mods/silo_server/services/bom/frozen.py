@@ -23,6 +23,7 @@ from silo.bom.numbers import plain
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import document_items, document_links, documents, revisions
 from silo_server.services.bom.history import (
+    NamedItem,
     PastChange,
     PastLine,
     compare,
@@ -202,9 +203,12 @@ def frozen_product(tx: Tx, item: Item, release: Release) -> ProductContent:
 
 def _part(made: Mapping[str, Any]) -> RolledItem:
     texts = (made["part_number"], made.get("name", ""), made.get("description", ""))
-    properties = with_supplier(made.get("properties", {}), made.get("supplier_parts", ()))
-    is_bought = bought(made.get("sourcing_type"), properties.get("supplier"))
-    return RolledItem(*texts, properties, made.get("thumbnail"), is_bought)
+    said, listed = made.get("sourcing_type"), made.get("supplier_parts", ())
+    properties = with_supplier(made.get("properties", {}), listed)
+    is_bought = bought(said, properties.get("supplier"))
+    return RolledItem(
+        *texts, properties, made.get("thumbnail"), is_bought, sourcing_type=said, supplier_parts=listed
+    )
 
 
 def _worth_of(made: Mapping[str, Any]) -> MassAndCost:
@@ -286,15 +290,13 @@ def _in_all(made: Mapping[str, Any]) -> dict[str, float]:
 
 def _past(made: Mapping[str, Any], side: Records) -> list[PastLine]:
     """Return the lines of a record, each under its part and relation, of which a BOM has one."""
-    return [
-        PastLine(
-            f"{line['item']} {line['state'].get('rel_type')}",
-            item_of(side[line["item"]] if line["child"] else line),
-            place,
-            stored_state(dumps(line["state"])),
-        )
-        for place, line in enumerate(made["lines"])
-    ]
+    lines = []
+    for place, line in enumerate(made["lines"]):
+        of = side[line["item"]] if line["child"] else line
+        child = NamedItem(0, of["part_number"], of.get("name", ""), None)
+        key = f"{line['item']} {line['state'].get('rel_type')}"
+        lines.append(PastLine(key, child, place, stored_state(dumps(line["state"]))))
+    return lines
 
 
 def _own_files(side: Records) -> dict[str, list[Mapping[str, Any]]]:

@@ -59,32 +59,39 @@ class Change:
     line_count: int
 
 
+class NamedItem(NamedTuple):
+    """What history says of the child of a line, as it is called now."""
+
+    id: int
+    part_number: str
+    name: str
+    archived_at: str | None
+
+
 @dataclass(frozen=True, slots=True)
 class ChangedLine:
     """What one change made of one line; ``before`` None = added, ``after`` None = removed."""
 
     line_id: str
-    child: Item
+    child: NamedItem
     position: int
     before: LineState | None
     after: LineState | None
 
 
-@dataclass(frozen=True, slots=True)
-class PastLine:
+class PastLine(NamedTuple):
     """A line as it was at some point."""
 
     line_id: str
-    child: Item
+    child: NamedItem
     position: int
     state: LineState
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
+class Difference(NamedTuple):
     """A line in two states; ``fields`` names what differs. ``status``: added removed changed unchanged."""
 
-    child: Item
+    child: NamedItem
     status: str
     before: LineState | None
     after: LineState | None
@@ -112,7 +119,7 @@ def lines_of_changes(
     )
     query = select(numbered).where(numbered.c.place <= most)
     rows = tx.conn.execute(query.order_by(numbered.c.change_id, numbered.c.place)).all()
-    children = by_ids(tx, {row.child_id for row in rows})
+    children = _named(tx, {row.child_id for row in rows})
     lines: dict[int, list[ChangedLine]] = {}
     for row in rows:
         lines.setdefault(row.change_id, []).append(_changed_line(row, children))
@@ -147,7 +154,7 @@ def stories(
     ).all()
     ids = {row.change_id for row in rows}
     changes = {change.id: change for change in _changes(tx, [one_of(tx, bom_changes.c.id, ids)], len(ids))}
-    children = by_ids(tx, {row.child_id for row in rows})
+    children = _named(tx, {row.child_id for row in rows})
     result: dict[str, list[tuple[Change, ChangedLine]]] = {}
     for row in rows:
         line = _changed_line(row, children)
@@ -194,7 +201,7 @@ def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
         .where(bom_change_lines.c.after.is_not(None))
         .order_by(bom_change_lines.c.position)
     ).all()
-    children = by_ids(tx, {row.child_id for row in rows})
+    children = _named(tx, {row.child_id for row in rows})
     return [
         PastLine(row.line_id, children[row.child_id], row.position, stored_state(row.after)) for row in rows
     ]
@@ -517,12 +524,20 @@ def _changes(
     ]
 
 
-def _changed_line(row: Any, children: Mapping[int, Item]) -> ChangedLine:
+def _named(tx: Tx, item_ids: Collection[int]) -> dict[int, NamedItem]:
+    row = items.c
+    query = select(row.id, row.part_number, row.name, row.archived_at)
+    return {
+        found[0]: NamedItem(*found) for found in tx.conn.execute(query.where(one_of(tx, row.id, item_ids)))
+    }
+
+
+def _changed_line(row: Any, children: Mapping[int, NamedItem]) -> ChangedLine:
     child = children[row.child_id]
     return ChangedLine(row.line_id, child, row.position, _state(row.before), _state(row.after))
 
 
-def _difference(child: Item, before: LineState | None, after: LineState | None) -> Difference:
+def _difference(child: NamedItem, before: LineState | None, after: LineState | None) -> Difference:
     if before is None:
         return Difference(child, "added", None, after, ())
     if after is None:

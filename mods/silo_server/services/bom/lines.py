@@ -19,7 +19,7 @@ from functools import lru_cache
 from itertools import count
 from typing import Any
 
-from sqlalchemy import Integer, Select, delete, func, insert, select, type_coerce, update
+from sqlalchemy import Integer, Select, delete, func, insert, literal_column, select, type_coerce, update
 
 from silo.bom.errors import ConflictError, CycleError, NotFoundError, VersionConflictError
 from silo.bom.numbers import plain
@@ -37,17 +37,18 @@ STATE_COLUMNS = [
 ]
 
 
-def select_lines() -> Select[*tuple[Any, ...]]:
-    """Return the query that :func:`to_line` understands."""
+def select_lines(*, bare: bool = False) -> Select[*tuple[Any, ...]]:
+    """Return the query that :func:`to_line` understands; ``bare``: without UUID, name and description of the
+    children, which take a third of its time.
+    """
+    texts = (items.c.uuid, items.c.name, items.c.description)
     return select(
         bom_lines.c.id,
         bom_lines.c.parent_id,
         bom_lines.c.child_id,
         bom_lines.c.position,
         items.c.part_number,
-        items.c.uuid,
-        items.c.name,
-        items.c.description,
+        *(literal_column("''").label(text.name) if bare else text for text in texts),
         items.c.item_type,
         items.c.current_revision,
         items.c.archived_at,

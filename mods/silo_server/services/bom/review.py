@@ -260,9 +260,10 @@ class Conflict:
 
 @dataclass(frozen=True, slots=True)
 class Review:
-    """What is open on a BOM."""
+    """What is open on a BOM, and all its lines."""
 
     parent: Item
+    lines: Sequence[Line]
     unreferenced: Sequence[Line]
     conflicts: Sequence[Conflict]
     last_merge: Change | None
@@ -274,6 +275,7 @@ def review(tx: Tx, part_number: str) -> Review:
     lines = lines_of(tx, parent)
     return Review(
         parent,
+        lines,
         [line for line in lines if line.state.unreferenced_since],
         open_conflicts(tx, parent, lines),
         last_merge(tx, parent),

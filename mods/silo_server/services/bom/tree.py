@@ -127,14 +127,14 @@ def load_graph(tx: Tx, root: Item, depth: int | None = None, *, bare: bool = Fal
     """Return all lines below ``root``, each once; of the first ``depth`` levels only, where that is given.
 
     bare
-        without UUID, name and description of the children, for who reads them with what is shown.
+        as in :func:`select_lines`, for who reads the parts as well.
     TooLargeError where there are more than ``max_expanded_rows``: they would fill the memory.
     """
-    query = select_lines().order_by(bom_lines.c.parent_id, bom_lines.c.position)
+    query = select_lines(bare=bare).order_by(bom_lines.c.parent_id, bom_lines.c.position)
     if depth == 1:
         query = query.where(bom_lines.c.parent_id == root.id)
     else:
-        query = query.where(among(tx, bom_lines.c.parent_id, _reach(root, depth)))
+        query = query.where(among(tx, bom_lines.c.parent_id, _reach(root, depth, leaves=False)))
     most = tx.settings.max_expanded_rows
     lines: dict[int, list[Line]] = {}
     # What many lines say of one child is kept once.
@@ -147,8 +147,7 @@ def load_graph(tx: Tx, root: Item, depth: int | None = None, *, bare: bool = Fal
                     "its sub-assemblies, or for less with depth="
                 )
             if (child := names.get(row[2])) is None:
-                child = child_of(row)
-                names[row[2]] = child = (child[0], "", "", "", *child[4:]) if bare else child
+                names[row[2]] = child = child_of(row)
             lines.setdefault(row[1], []).append(to_line(row, child))
     return Graph(root, lines, conflicts_in(tx, lines))
 
@@ -197,7 +196,8 @@ def sought(words: str, item_type: str, parts: Mapping[int, RolledItem]) -> Calla
         if item_type and child_type != item_type:
             return False
         part = parts[child_id]
-        return test(*(str(text) for text in (*part[:3], *map(part.properties.get, SOUGHT)) if text))
+        said = filter(None, map(part.properties.get, SOUGHT))
+        return test(part.part_number, part.name, part.description, *map(str, said))
 
     return lambda line: fitting(line.child_id, line.child_item_type)
 
@@ -231,25 +231,22 @@ def leading_to(graph: Graph, fitting: Callable[[Line], bool]) -> Callable[[Line]
     return hit
 
 
-def narrowed(graph: Graph, fitting: Callable[[Line], bool], leaves: Sequence[FlatRow] | None) -> Graph:
-    """Return the graph for the totals of what fits: each part once, with all that one root needs of it.
+def found_parts(graph: Graph, fitting: Callable[[Line], bool]) -> list[FlatRow]:
+    """Return what fits first on each way down, each part once, with all that one root needs of it."""
+    ids = {line.child_id for lines in graph.lines.values() for line in lines if fitting(line)}
+    return [row for row in flatten(graph, ids) if row.line.child_id in ids]
 
-    leaves
-        the flat list, if only its parts count; else what fits first on each way down, with all that is in it.
+
+def leaves_in(graph: Graph, rows: Sequence[FlatRow], closed: Collection[int] = ()) -> Sequence[FlatRow]:
+    """Return these rows of a flat list with the leaf parts of their assemblies; ``closed`` as in
+    :func:`flatten`.
     """
-    inside: Mapping[int, Sequence[Line]] = {}  # nothing is in a leaf
-    if leaves is None:
-        inside = graph.lines
-        below = (line for lines in inside.values() for line in lines)
-        leaves = flatten(graph, {line.child_id for line in below if fitting(line)})
-    rows = [row for row in leaves if fitting(row.line)]
-    lines = [
-        row.line
-        if row.total == row.line.state.quantity
-        else row.line._replace(state=replace(row.line.state, quantity=float(row.total)))
-        for row in rows
-    ]
-    return Graph(graph.root, {**inside, graph.root.id: lines})
+    if {item_id for item_id in graph.lines if graph.components(item_id)}.isdisjoint(
+        row.line.child_id for row in rows
+    ):
+        return rows
+    lines = [row.line._replace(state=replace(row.line.state, quantity=float(row.total))) for row in rows]
+    return flatten(Graph(graph.root, {**graph.lines, graph.root.id: lines}), closed)
 
 
 def ids_below(root: Item) -> Select[tuple[int]]:
@@ -257,8 +254,10 @@ def ids_below(root: Item) -> Select[tuple[int]]:
     return _reach(root, None)
 
 
-def _reach(root: Item, depth: int | None) -> Select[tuple[int]]:
-    """Return the ids of the items whose lines belong to the first ``depth`` levels, or to all."""
+def _reach(root: Item, depth: int | None, *, leaves: bool = True) -> Select[tuple[int]]:
+    """Return the ids of the items whose lines belong to the first ``depth`` levels, or to all; with the
+    ``leaves``, or only of what has lines.
+    """
     first = select(literal(root.id, items.c.id.type).label("item_id"), literal(1).label("level"))
     reach = first.cte("reach", recursive=True)
     # Without an end the level stays 1, so that every item is visited once, and a ring ends.
@@ -266,6 +265,9 @@ def _reach(root: Item, depth: int | None) -> Select[tuple[int]]:
     below = select(bom_lines.c.child_id, level).join(reach, bom_lines.c.parent_id == reach.c.item_id)
     if depth is not None:
         below = below.where(reach.c.level < depth)
+    if not leaves:
+        inner = bom_lines.alias()
+        below = below.where(select(inner.c.id).where(inner.c.parent_id == bom_lines.c.child_id).exists())
     return select(reach.union(below).c.item_id)
 
 
@@ -433,8 +435,7 @@ def order_of(graph: Graph) -> list[int]:
 DEFAULT_CURRENCY = "EUR"
 
 
-@dataclass(frozen=True, slots=True)
-class CostRow:
+class CostRow(NamedTuple):
     """A leaf part's share, as the API sends it. ``standard_cost`` None = not stated."""
 
     part_number: str
@@ -455,8 +456,7 @@ class CostRollup:
     missing: Sequence[str]
 
 
-@dataclass(frozen=True, slots=True)
-class MassLine:
+class MassLine(NamedTuple):
     """A part whose stated mass was taken [kg], as the API sends it.
 
     ``is_assembly`` where it stands for all below it.
@@ -472,16 +472,15 @@ class MassLine:
 
 @dataclass(frozen=True, slots=True)
 class MassRollup:
-    """The mass of one assembly [kg]; ``stated`` is what its own ``mass_kg`` says."""
+    """The mass of one assembly [kg]; ``missing`` the part numbers without a mass."""
 
     rows: Sequence[MassLine]
     total: float
     missing: Sequence[str]
-    stated: float | None
 
 
 class RolledItem(NamedTuple):
-    """What a roll-up reads of an item."""
+    """What totals, filters and order lists read of an item; ``properties`` with its supplier."""
 
     part_number: str
     name: str
@@ -490,6 +489,9 @@ class RolledItem(NamedTuple):
     thumbnail_key: str | None = None
     is_bought: bool = False
     has_bom: bool = False
+    sourcing_type: str | None = None
+    supplier_parts: Sequence[Mapping[str, Any]] = ()
+    archived_at: str | None = None
 
 
 def parts_of(tx: Tx, graph: Graph) -> dict[int, RolledItem]:
@@ -497,28 +499,38 @@ def parts_of(tx: Tx, graph: Graph) -> dict[int, RolledItem]:
     return some_parts(tx, graph.names())
 
 
+# What is stored is whole: without a look for spaces around it, in half the time.
+_read_json = json.JSONDecoder().raw_decode
+
+
 def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, RolledItem]:
     """Return these items, by internal id."""
-    rows = tx.conn.execute(
-        select(
-            items.c.id,
-            items.c.part_number,
-            items.c.name,
-            items.c.description,
-            items.c.properties,
-            items.c.thumbnail_key,
-            items.c.supplier_parts,
-            items.c.sourcing_type,
-            items.c.item_type,
-            items.c.bom_version,
-        ).where(one_of(tx, items.c.id, item_ids))
-    )
-    rolled_items = {}
-    for row in rows:
-        properties = with_supplier(json.loads(row[4]), json.loads(row[6]) if row[6] else ())
-        is_bought, has_bom = bought(row[7], properties.get("supplier")), row[8] == "assembly" or row[9] > 0
-        rolled_items[row[0]] = RolledItem(*row[1:4], properties, row[5], is_bought, has_bom)
-    return rolled_items
+    row = items.c
+    query = select(
+        row.id,
+        row.part_number,
+        row.name,
+        row.description,
+        row.properties,
+        row.thumbnail_key,
+        row.supplier_parts,
+        row.sourcing_type,
+        row.item_type,
+        row.bom_version,
+        row.archived_at,
+    ).where(one_of(tx, row.id, item_ids))
+    parts = {}
+    for part_id, number, name, about, text, key, offers, said, kind, version, archived in tx.conn.execute(
+        query
+    ):
+        properties, listed = _read_json(text)[0], json.loads(offers) if offers else ()
+        if listed:
+            properties = with_supplier(properties, listed)
+        is_bought, has_bom = bought(said, properties.get("supplier")), kind == "assembly" or version > 0
+        parts[part_id] = RolledItem(
+            number, name, about, properties, key, is_bought, has_bom, said, listed, archived
+        )
+    return parts
 
 
 def with_supplier(
@@ -537,28 +549,32 @@ def currency_of(properties: Mapping[str, Any]) -> str:
     return str(properties.get("currency") or DEFAULT_CURRENCY)
 
 
-def roll_up_cost(graph: Graph, parts: Mapping[int, RolledItem]) -> CostRollup:
+def roll_up_cost(flat: Iterable[FlatRow], parts: Mapping[int, RolledItem]) -> CostRollup:
     """Multiply the flat BOM with the standard cost."""
-    flat = flatten(graph)
-    rows, totals, missing = [], dict[str, Decimal](), []
+    rows, costs, missing = [], dict[str, list[Decimal]](), []
     for row in flat:
         item = parts[row.line.child_id]
-        cost = positive_number(item.properties, "standard_cost")
-        currency = currency_of(item.properties) if cost is not None else None
-        total = exact_product((cost, row.total)) if cost is not None else None
-        if total is None or currency is None:
+        cost, currency, total = positive_number(item.properties, "standard_cost"), None, None
+        if cost is None:
             missing.append(item.part_number)
         else:
-            totals[currency] = exact_sum((totals.get(currency, Decimal(0)), total))
-        shown = None if total is None else float(total)
-        rows.append(CostRow(item.part_number, item.name, plain(row.total), row.unit, cost, currency, shown))
-    return CostRollup(rows, {name: float(total) for name, total in totals.items()}, missing)
+            currency = currency_of(item.properties)
+            exact = exact_product((cost, row.total))
+            costs.setdefault(currency, []).append(exact)
+            total = float(exact)
+        rows.append(CostRow(item.part_number, item.name, plain(row.total), row.unit, cost, currency, total))
+    totals = {currency: float(exact_sum(of_it)) for currency, of_it in costs.items()}
+    return CostRollup(rows, totals, missing)
 
 
-def roll_up_mass(graph: Graph, parts: Mapping[int, RolledItem], assemblies: Collection[int]) -> MassRollup:
-    """Add up masses from the leaves; those ``assemblies`` stand for all that is in them with their own."""
+def roll_up_mass(
+    flat: Iterable[FlatRow], parts: Mapping[int, RolledItem], assemblies: Collection[int]
+) -> MassRollup:
+    """Add up masses from the leaves; those ``assemblies``, leaves of the flat BOM as well, stand for all that
+    is in them with their own.
+    """
     amounts: dict[int, Exact] = {}
-    for row in flatten(graph, assemblies):
+    for row in flat:
         item_id = row.line.child_id
         amounts[item_id] = _counted(amounts.get(item_id, 0) + row.total, row.line)
     rows = [_mass_row(parts[part_id], amount, part_id in assemblies) for part_id, amount in amounts.items()]
@@ -566,8 +582,10 @@ def roll_up_mass(graph: Graph, parts: Mapping[int, RolledItem], assemblies: Coll
         rows,
         float(exact_sum(row.total_mass_kg for row in rows if row.total_mass_kg is not None)),
         [row.part_number for row in rows if row.total_mass_kg is None],
-        positive_number(graph.root.properties, "mass_kg"),
     )
+
+
+_NUMBER = int | float | Decimal
 
 
 def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
@@ -575,7 +593,7 @@ def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
     value = properties.get(name)
     if isinstance(value, str):
         value = read_number(value, points_are_decimal=True).value
-    if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
+    if isinstance(value, bool) or not isinstance(value, _NUMBER):
         return None
     return float(value) if 0 <= value < 1e15 else None
 
