@@ -342,7 +342,7 @@ _NO_TEXT = re.compile(
             r"^</?\w+|</\w+>|=\"|\": |doctype|^:?\w+\{|:[\w-]+\(|[\w-]+:[\w#./-]+;|^(bold|dim) |\{task\.",
             # HTTP, logs
             r"Content-|^\w+/[\w+-]+;|Bearer|gzip|boundary|%s|-src '|=\(\)|^private, |max-age",
-            r"Also where the form|^The file$|^Still what If|^a GLB of more|disk is full\|",
+            r"Also if the form|^The file$|^Still what If|^a GLB of more|disk is full\|",
             r"^Method Not Allowed:|^Accept-|^GET, |^Value error",
             # patterns, names of classes, programs, types
             r"\(\?|\\(?! )|signal \(SIG|^(?=\w+[A-Z])[A-Z]\w+( [A-Z]\w+)*$|\w::\w|sys; print|\w \| \w",

@@ -99,7 +99,7 @@ MERGE_BODY = {
 
 @router.get("", response_model=list[LineOut], responses=READ_ERRORS)
 def get_bom(call: Viewer, part_number: str) -> Response:
-    """Return the lines of one level. ``ETag`` is the BOM's version, for ``If-Match``."""
+    """Return the BOM lines of an item, one level. ``ETag`` is the version of the BOM, for ``If-Match``."""
     with call.read() as tx:
         item = get_item(tx, part_number)
         rows = _lines_of(tx, [item])[item.id]
@@ -108,9 +108,10 @@ def get_bom(call: Viewer, part_number: str) -> Response:
 
 @several.post("/items/boms", response_model=BomsOut, responses=READ_ERRORS)
 def get_boms(call: Viewer, body: NumbersBody) -> Response:
-    """Return the lines of many items, one level each; items that are not known are absent. Reads only.
+    """Return the BOM lines of many items, one level each; unknown items are absent. Changes nothing.
 
-    413 if they have more than 10 000 lines in all; half of them may be asked for, or one however large.
+    413 if several items have more than 10 000 lines in all: ask for fewer items. One item alone may have any
+    number of lines.
     """
     with call.read() as tx:
         items = get_by_numbers(tx, body.part_numbers)
@@ -120,7 +121,7 @@ def get_boms(call: Viewer, body: NumbersBody) -> Response:
 
 
 def _lines_of(tx: Tx, parents: Sequence[Item]) -> dict[int, list[dict[str, Any]]]:
-    """Return the lines of these items as the API has them, by the item's internal id."""
+    """Return the BOM lines of these items as the API sends them, by the item's internal id."""
     ids = [parent.id for parent in parents]
     lines, quantities, last = lines_of_many(tx, ids), told_quantities(tx, ids), last_syncs(tx, ids)
     return {
@@ -151,16 +152,16 @@ def add_line(call: Editor, part_number: str, body: NewLineBody, expected: Expect
 def change_line(
     call: Editor, part_number: str, child: str, body: LineChangeBody, expected: ExpectedVersion
 ) -> Response:
-    """Change the one line of a child; 409 where it has several.
+    """Change the one line of a child; 409 if the child has several lines.
 
-    Another quantity on an assembly line makes it a manual override.
+    A different quantity on a line of the assembly makes it a manual override.
     """
     return _change(call, part_number, child, body, expected)
 
 
 @router.delete("/{child}", status_code=204, responses=WRITE_ERRORS)
 def remove_line(call: Editor, part_number: str, child: str, expected: ExpectedVersion) -> Response:
-    """Remove the one line of a child; 409 where it has several."""
+    """Remove the one line of a child; 409 if the child has several lines."""
     return _remove(call, part_number, child, expected)
 
 
@@ -180,10 +181,10 @@ def remove_line_by_id(call: Editor, part_number: str, line_id: str, expected: Ex
 
 @router.post("/merge", response_model=MergeResult, responses=WRITE_ERRORS, openapi_extra=MERGE_BODY)
 async def merge(call: Editor, part_number: str, expected: ExpectedVersion) -> Response:
-    """Merge an assembly's direct children (spec bom-sync §5).
+    """Merge the direct children of an assembly into its BOM (spec bom-sync §5).
 
-    ``sync_id`` makes a repeat give the same answer, ``dry_run`` gives the answer without the change,
-    ``If-Match`` refuses (412) where somebody was quicker.
+    A repeat with the same ``sync_id`` gets the same answer. ``dry_run`` gives the answer and changes nothing.
+    With ``If-Match`` the merge is refused (412) if somebody else changed the BOM first.
     """
     body = await json_body(call.request)
 
@@ -197,7 +198,7 @@ async def merge(call: Editor, part_number: str, expected: ExpectedVersion) -> Re
 
 @router.get("/expanded", response_model=list[LineOut], responses=READ_ERRORS)
 def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) -> Response:
-    """Return the tree as rows, parents before children; quantities per one parent, and in total."""
+    """Return the tree as rows, parents before their children, with the quantity per parent and in total."""
     with call.server.large_reads.enter():
         with call.read() as tx:
             item = get_item(tx, part_number)
@@ -207,14 +208,14 @@ def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) 
 
 @router.get("/flat", responses=READ_ERRORS)
 def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
-    """Return the leaf parts, quantities multiplied down the tree and summed; 409 where it never ends."""
+    """Return the leaf parts with their quantities, multiplied down the tree and added up; 409 for a cycle."""
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
-        still = summary_of(tx, graph.root).open.values()
+        open_boms = summary_of(tx, graph.root).open.values()
     return {
         "part_number": graph.root.part_number,
-        "incomplete": {bom.part_number: bom.incomplete for bom in still if bom.incomplete},
-        "open": {bom.part_number: bom.questions for bom in still if bom.questions},
+        "incomplete": {bom.part_number: bom.incomplete for bom in open_boms if bom.incomplete},
+        "open": {bom.part_number: bom.questions for bom in open_boms if bom.questions},
         "flat_bom": [
             {
                 "part_number": row.line.child_part_number,
@@ -234,7 +235,7 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
 
 @router.get("/cost", responses=READ_ERRORS)
 def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
-    """Return flat BOM × ``standard_cost``, per currency; ``missing`` names what has no cost."""
+    """Return the flat BOM × ``standard_cost``, per currency; ``missing`` names the parts without a cost."""
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
         cost = tree.roll_up_cost(tree.flatten(graph), tree.parts_of(tx, graph))
@@ -251,7 +252,7 @@ def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
 
 @router.get("/mass", responses=READ_ERRORS)
 def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
-    """Return the mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names what has none."""
+    """Return the mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names parts without one."""
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
         alone = standing_alone(tx, graph)
@@ -268,10 +269,10 @@ def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
 
 @router.get("/summary", responses=READ_ERRORS)
 def get_summary(call: Viewer, part_number: str) -> dict[str, Any]:
-    """Return the product over its whole graph: what is open, mass and cost, counts, the last change.
+    """Return the summary of a product over all levels: what is open, mass, cost, counts, the last change.
 
-    ``total_mass_kg`` and ``totals`` lack what ``mass_missing`` and ``cost_missing`` count; the first of them
-    are named.
+    ``total_mass_kg`` and ``totals`` do not include the parts that ``mass_missing`` and ``cost_missing``
+    count; the first of these are named.
     """
     with call.read() as tx:
         item = get_item(tx, part_number)
@@ -304,8 +305,9 @@ def get_where_used(
     limit: Annotated[int, Query(ge=1, le=1000)] = 1000,
     offset: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
 ) -> Response:
-    """Return the parents; with ``indirect`` theirs as well. ``X-Total-Count`` says how many there are in
-    all.
+    """Return the parents of an item; with ``indirect`` their parents as well.
+
+    ``X-Total-Count`` is the number of all of them.
     """
     with call.read() as tx:
         item = get_item(tx, part_number)
@@ -326,7 +328,7 @@ def get_where_used(
 
 
 def line_changes(body: LineChangeBody) -> dict[str, Any]:
-    """Return the changes that a body asks for: only what it names; null clears what may be empty."""
+    """Return the changes that a body asks for: only the fields that it names; null clears a field."""
     changes = body.model_dump(exclude_unset=True)
     if "reference_designators" in changes:
         changes["reference_designators"] = tuple(changes["reference_designators"] or ())
@@ -370,15 +372,15 @@ def _edited(edited: review.Edited, status: int) -> Response:
 
 
 def render_expanded(rows: Iterable[tree.Occurrence]) -> bytes:
-    """Return the rows as a JSON list, each a line with ``depth`` and ``total_quantity``.
+    """Write the rows as a JSON list, each a line with ``depth`` and ``total_quantity``.
 
-    Written from pieces that are made once per child and once per state: a tree of 100 000 occurrences has few
-    of either. The pieces are those of ``line_to_wire``.
+    The list is put together from pieces that are made once per child and once per state: a tree of 100 000
+    occurrences has few of them. The pieces are those of ``line_to_wire``.
     """
     children: dict[int, bytes] = {}
     parents: dict[str, bytes] = {}
     states: dict[int, bytes] = {}
-    keep: list[LineState] = []  # states are found by their identity, which must not be given out again
+    keep: list[LineState] = []  # keeps them alive: Python reuses the id() of a dead one
     parts: list[bytes] = []
     for line, parent, depth, total in rows:
         line_state = line.state
@@ -446,7 +448,7 @@ class UndoBody(RequestBody):
 
 @review_router.get("/review", responses=READ_ERRORS)
 def get_review(call: Viewer, part_number: str) -> Response:
-    """Return what is open: unreferenced lines, conflicts with both values, and the last merge."""
+    """Return the open questions of a BOM: unreferenced lines, conflicts (both values), and the last merge."""
     with call.read() as tx:
         open_lines = service.review(tx, part_number)
         open_below = summary_of(tx, open_lines.parent).told(open_lines.parent.id)
@@ -492,7 +494,7 @@ def resolve(call: Editor, part_number: str, body: ResolveBody, expected: Expecte
 def list_history(
     call: Viewer, part_number: str, limit: Annotated[int, Query(ge=1, le=500)] = 50, before: PageFrom = None
 ) -> list[dict[str, Any]]:
-    """Return the changes, newest first: who, when, why, from which file."""
+    """Return the changes of a BOM, newest first: who, when, why, from which file."""
     with call.read() as tx:
         changes = history.list_changes(tx, get_item(tx, part_number, include_archived=True), limit, before)
     return [change_to_wire(change) for change in changes]
@@ -519,7 +521,7 @@ def get_change(call: Viewer, part_number: str, change_id: ChangeId) -> dict[str,
 
 @review_router.get("/history/{change_id}/bom", responses=READ_ERRORS)
 def get_past_bom(call: Viewer, part_number: str, change_id: ChangeId) -> list[dict[str, Any]]:
-    """Return the BOM as this change left it (0 = before everything)."""
+    """Return the BOM as this change left it; 0 is the empty BOM before the first change."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         lines = history.state_at(tx, item, change_id)
@@ -544,7 +546,7 @@ def compare(
     from_point: Annotated[str, Query(alias="from", max_length=40), WithJsonSchema(context.POINT)] = "0",
     to: Point = "now",
 ) -> dict[str, Any]:
-    """Compare two points of time side by side; each a change id, a time, or ``now``."""
+    """Compare a BOM at two points of time side by side; each is a change id, a time, or ``now``."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         first, second = find_point(tx, item, from_point), find_point(tx, item, to)
@@ -569,7 +571,7 @@ def compare(
 
 @review_router.post("/restore", responses=WRITE_ERRORS)
 def restore(call: Editor, part_number: str, body: RestoreBody, expected: ExpectedVersion) -> Response:
-    """Bring an earlier state back, as a new change."""
+    """Restore an earlier state of a BOM, as a new change."""
     with call.write() as tx:
         change_id, version = history.restore(
             tx, part_number, body.change_id, body.reason, expected, with_archived=body.with_archived
@@ -579,14 +581,14 @@ def restore(call: Editor, part_number: str, body: RestoreBody, expected: Expecte
 
 @review_router.post("/undo", responses=WRITE_ERRORS)
 def undo(call: Editor, part_number: str, body: UndoBody, expected: ExpectedVersion) -> Response:
-    """Take one change back, as a new change; 409 where its lines changed again since."""
+    """Undo one change, as a new change; 409 if its lines have changed again since."""
     with call.write() as tx:
         change_id, version = history.undo(tx, part_number, body.change_id, expected)
         return _changed(change_id, version)
 
 
 def find_point(tx: Tx, item: Item, text: str) -> int:
-    """Return the change that a point of time means; RejectedError if it is none."""
+    """Find the id of the change that a point of time means; RejectedError if the text is no such point."""
     if (change_id := whole_number(text, 18)) is not None:
         return change_id
     if text == "now":
@@ -604,7 +606,7 @@ def find_point(tx: Tx, item: Item, text: str) -> int:
 
 
 def change_to_wire(change: history.Change) -> dict[str, Any]:
-    """Return a change, without its lines."""
+    """Return a change as the API sends it, without its lines."""
     context = {
         "file": change.document_file,
         "sha256": change.document_sha256,
@@ -618,7 +620,7 @@ def change_to_wire(change: history.Change) -> dict[str, Any]:
 
 
 def state_to_wire(state: LineState | None) -> dict[str, Any] | None:
-    """Return a line's state; only what is set."""
+    """Return a line's state as the API sends it, only with the fields that are set."""
     if state is None:
         return None
     state_json = line_state_to_wire(state)
@@ -637,7 +639,7 @@ XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
 
 
 def content_of(media_type: str) -> dict[int | str, dict[str, Any]]:
-    """Return the answers of a route that hands out a file."""
+    """Return the documented answers of a route that sends a file."""
     return {**READ_ERRORS, 200: {"content": {media_type: {}}, "description": "The file"}}
 
 
@@ -680,10 +682,10 @@ As = Annotated[ExportRequest, Depends()]
 
 @transfer_router.get("/export.csv", response_class=Response, responses=content_of("text/csv"))
 def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = False) -> Response:
-    """Return the BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text.
+    """Return the BOM as CSV (RFC 4180, UTF-8); a cell that would run as a formula becomes text.
 
-    ``pieces``: totals for so many of it; ``q``, ``type``: only what fits. ``semicolons``: for an Excel that
-    expects 1,5 instead of 1.5.
+    ``pieces``: totals for so many pieces; ``q``, ``type``: only the lines that match. ``semicolons``: for an
+    Excel that expects 1,5 instead of 1.5.
     """
     return _exported(
         call,
@@ -697,7 +699,7 @@ def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = Fa
 
 @transfer_router.get("/export.xlsx", response_class=Response, responses=content_of(XLSX))
 def export_xlsx(call: Viewer, part_number: str, wanted: As, pictures: bool = False) -> Response:
-    """Return the BOM as a workbook. ``pictures``: the first 2000 rows show their part."""
+    """Return the BOM as a workbook. ``pictures``: the first 2000 rows show a picture of their part."""
     shown = call.server.files.path_of if pictures else None
     return _exported(call, part_number, wanted, partial(transfer.to_xlsx, picture=shown), XLSX, "xlsx")
 
@@ -715,11 +717,10 @@ Since = Annotated[str, Query(alias="from", min_length=1, max_length=40), WithJso
 
 @transfer_router.get("/changes", responses=READ_ERRORS)
 def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -> dict[str, Any]:
-    """Return what changed in the product, over all levels: lines, quantities, data and files of its parts.
+    """Return the changes in a product over all levels: lines, quantities, data and files of its parts.
 
-    ``from`` and ``to`` are a date, a time, a revision of the item as ``r3``, or the label of a revision that
-    was frozen for release; without ``to`` until now. Two frozen revisions do not say who changed what, and
-    when.
+    ``from`` and ``to`` are a date, a time, a revision of the item (``r3``), or the label of a revision that
+    was frozen for release; without ``to``: now. Two frozen revisions do not show who made a change, or when.
     """
     with call.server.large_reads.enter(), call.read() as tx:
         item = get_item(tx, part_number)
@@ -734,14 +735,14 @@ def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -
 
 @transfer_router.get("/changes.csv", response_class=Response, responses=content_of("text/csv"))
 def changes_csv(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
-    """Return what changed, as CSV."""
+    """Return the changes in a product as CSV."""
     make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
     return file_of(call, make, transfer.to_csv, "text/csv; charset=utf-8; header=present", "changes.csv")
 
 
 @transfer_router.get("/changes.xlsx", response_class=Response, responses=content_of(XLSX))
 def changes_xlsx(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
-    """Return what changed, as a workbook."""
+    """Return the changes in a product as a workbook."""
     make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
     return file_of(call, make, transfer.to_xlsx, XLSX, "changes.xlsx")
 
@@ -757,9 +758,9 @@ async def import_csv(
 ) -> Response:
     """Import a CSV or a workbook: XLSX, ODS, XLS (as the body, or as the form part ``file``).
 
-    ``dry_run`` says row by row what would happen; without it everything is imported, or, where a row is
-    wrong, nothing (400 with all problems). ``make``: unknown parts are made in this category; ``add_up``:
-    rows of one part are added up. ``Idempotency-Key`` makes a repeat give the first answer.
+    ``dry_run`` says row by row what would happen. Without it everything is imported or, if a row is wrong,
+    nothing (400 with all problems). ``make``: unknown parts are made in this category; ``add_up``: rows of
+    one part are added up. A repeat with the same ``Idempotency-Key`` gets the first answer.
     """
     data, name = await uploaded(call.request)
     allowed = imports.Allowed(make, add_up)
@@ -792,7 +793,7 @@ async def import_csv(
 
 
 def plan_to_wire(plan: imports.ImportPlan, dry_run: bool) -> dict[str, Any]:
-    """Return what an import does, or would do."""
+    """Return the plan of an import as the API sends it."""
     return {
         "dry_run": dry_run,
         "counts": {status: plan.count(status) for status in ("add", "change", "same", "skip", "error")},
@@ -814,7 +815,7 @@ def plan_to_wire(plan: imports.ImportPlan, dry_run: bool) -> dict[str, Any]:
 
 
 async def uploaded(request: Request) -> tuple[bytes, str | None]:
-    """Return the table of an import, the body or the form part ``file``, and the name of its file."""
+    """Read the table of an import (the body, or the form part ``file``), and the name of its file."""
     if not request.headers.get("content-type", "").startswith(FORM_TYPES):
         return await request.body(), None
     async with request.form(max_files=1, max_fields=20) as form:
@@ -874,7 +875,7 @@ def file_of(
     media_type: str,
     name: str,
 ) -> Response:
-    """Make and hand out a file, whose name begins with the part number."""
+    """Make a file and send it; its name begins with the part number."""
     turn = call.server.large_reads
     spool = _Spool(max_size=SPOOL_BYTES)
     spool.check = turn.check

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What every route gets: the server's parts, who is calling, and how an answer is written.
 
-What the OpenAPI document says of values, so that it calls valid what the server takes and nothing else.
+The values in the OpenAPI document: it calls valid what the server takes, and nothing else.
 
 Some requests are refused although their form is right: a CSV without a header row, a merge that names an
 unknown part number. Such an operation says why under ``x-valid-but-refused``, and so does its 400.
@@ -75,12 +75,12 @@ class Server:
     hub: Hub
     files: FileStore
     probe: Probe
-    # Reads that may take seconds and much memory: one at a time, so that all others go on.
+    # Reads that may take seconds and much memory: one at a time, so that all others continue.
     large_reads: Turnstile = field(default_factory=lambda: Turnstile(1, 16, 60, "exports and large reads"))
 
 
 def server_of(request: Request) -> Server:
-    """Return the server that this request came to."""
+    """Return the server that received this request."""
     server: Server = request.app.state.server
     return server
 
@@ -101,11 +101,11 @@ class Call:
     actor: Actor
 
     def read(self) -> AbstractContextManager[Tx]:
-        """Return one consistent snapshot of the database, for this caller."""
+        """Open a read transaction for this caller: one consistent snapshot of the database."""
         return self.server.db.read(self.actor)
 
     def write(self, *, even_when_read_only: bool = False) -> AbstractContextManager[Tx]:
-        """Return a transaction in this caller's name."""
+        """Open a write transaction in the name of this caller."""
         return self.server.db.write(self.actor, even_when_read_only=even_when_read_only)
 
 
@@ -135,7 +135,7 @@ Admin = Annotated[Call, Depends(Guard(Role.ADMIN))]
 
 
 def find_actor(request: Request) -> Actor | None:
-    """Return who calls, None if nobody known does. A wrong token is not saved by a good cookie."""
+    """Find who sends the request; None if unknown. A wrong token is refused even with a good cookie."""
     server, address = server_of(request), client_address(request)
     header = request.headers.get("authorization")
     if header is not None:
@@ -148,7 +148,7 @@ def find_actor(request: Request) -> Actor | None:
 
 
 def client_address(request: Request) -> str:
-    """Return the caller's address, as given by the connection (or by a proxy that uvicorn trusts)."""
+    """Return the caller's network address: that of the connection, or what a trusted proxy says."""
     return request.client.host if request.client else ""
 
 
@@ -162,13 +162,15 @@ async def _check_csrf(request: Request, actor: Actor) -> None:
 
 
 async def form_of(request: Request) -> FormData:
-    """Return the request's form, which the first caller reads, and Starlette keeps."""
+    """Read the form of a request; Starlette keeps it for the next caller."""
     return await request.form(max_files=1, max_fields=MOST_FIELDS)
 
 
 def masked(secret: str) -> str:
-    """Return a secret as a page shows it: another text each time, so that the size of a compressed page that
-    also shows what somebody else made up says nothing about it (the BREACH attack).
+    """Mask a secret for a page: the text is different each time.
+
+    So the size of a compressed page that also shows an attacker's text reveals nothing about the secret (the
+    BREACH attack).
     """
     raw = secret.encode()
     mask = secrets.token_bytes(len(raw))
@@ -176,7 +178,7 @@ def masked(secret: str) -> str:
 
 
 def unmasked(sent: str) -> bytes:
-    """Return what :func:`masked` was given; a text that it did not make as it is."""
+    """Return the secret behind a text of :func:`masked`; any other text comes back as it is."""
     if not sent.startswith(_MASKED):
         return sent.encode()
     try:
@@ -191,7 +193,7 @@ _MASKED = "m."
 
 
 def json_answer(value: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
-    """Return ``value`` as JSON, by the quick writer that pydantic brings along.
+    """Answer with ``value`` as JSON, written by pydantic's fast writer.
 
     It writes all that :mod:`silo_server.values` lets in. Call it before the commit: an answer that
     cannot be written must not leave anything behind.
@@ -200,12 +202,12 @@ def json_answer(value: Any, status: int = 200, headers: Mapping[str, str] | None
 
 
 def raw_json(text: str | bytes, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
-    """Answer with JSON that is written already."""
+    """Answer with JSON that is already written."""
     return Response(text, status, headers, media_type="application/json")
 
 
 async def json_body(request: Request) -> Any:
-    """Return the request's JSON body; RejectedError if it is none. NaN and Infinity are no JSON."""
+    """Read the request's JSON body; RejectedError if it is no JSON. NaN and Infinity are no JSON."""
     body = await request.body()
 
     def parse() -> Any:
@@ -222,14 +224,12 @@ def _no_constant(name: str) -> Any:
 
 
 def etag_of(version: int) -> str:
-    """Return the ETag of a BOM's version."""
+    """Return the ETag of a version: of a BOM, an item or a list of suppliers."""
     return f'"v{version}"'
 
 
 def expected_version(request: Request) -> int | None:
-    """Return the version in ``If-Match``, None if there is none (or ``*``); -1 for one that cannot be
-    ours.
-    """
+    """Read the version in ``If-Match``: None without one (or ``*``), -1 if it cannot be one of ours."""
     header = request.headers.get("if-match", "").strip()
     if header in ("", "*"):
         return None
@@ -238,7 +238,7 @@ def expected_version(request: Request) -> int | None:
 
 
 def idempotency_key(request: Request) -> str | None:
-    """Return the ``Idempotency-Key``, under which a repeat of the request gets the first answer."""
+    """Read the ``Idempotency-Key``; a repeat of the request under the same key gets the first answer."""
     key = request.headers.get("idempotency-key")
     if key is not None and (not key or (problem := text_problem(key, 128))):
         raise RejectedError(f"Idempotency-Key: {problem if key else 'wanted 1 to 128 characters, got none'}")
@@ -258,17 +258,17 @@ REFUSED = "x-valid-but-refused"
 
 
 def text(longest: int, **more: Any) -> Schema:
-    """Return a text of allowed characters."""
+    """Make the schema of a text of allowed characters."""
     return {"type": "string", "maxLength": longest, "pattern": ALLOWED, **more}
 
 
 def or_null(schema: Schema) -> Schema:
-    """Return the schema, or null."""
+    """Make a schema that also allows null."""
     return {"anyOf": [schema, NOTHING]}
 
 
 def part_number(*, or_empty: bool = False) -> Schema:
-    """Return a part number to be given to an item; ``or_empty``: an empty text stands for none."""
+    """Make the schema of a new part number; ``or_empty``: an empty text means that there is none."""
     optional = "?" if or_empty else ""
     return {
         "type": "string",
@@ -280,7 +280,7 @@ def part_number(*, or_empty: bool = False) -> Schema:
 
 
 def _in_any_case(word: str) -> str:
-    """Return a pattern of the texts that are ``word`` when case does not count; ſ is an s."""
+    """Make a pattern that matches ``word`` in upper and lower case; ſ counts as an s."""
     same = {"s": "sSſ", "k": "kK\u212a"}
     return "".join(
         f"[{same.get(c, c + c.upper())}]" if c.isalpha() else "\\" + c if c == "." else c for c in word
@@ -288,7 +288,7 @@ def _in_any_case(word: str) -> str:
 
 
 def refused(reason: str) -> Schema:
-    """Return ``openapi_extra`` of an operation that refuses (400) what has the right form, and why."""
+    """Return ``openapi_extra`` that says why an operation refuses (400) requests of the right form."""
     return {REFUSED: reason}
 
 
@@ -359,7 +359,7 @@ _JSON_VALUE: Schema = {
     ],
 }
 _NOT_BLANK = rf"^[^{REFUSED_CHARACTERS}]*[^\s{REFUSED_CHARACTERS}][^{REFUSED_CHARACTERS}]*$"
-# What services.bom.merge_json asks of the wire model's fields.
+# What services.bom.merge asks of the wire model's fields.
 _MERGE: dict[str, dict[str, Schema]] = {
     "MergeRequest": {
         "source": {"description": "not read: the entries are an assembly's"},
@@ -393,18 +393,18 @@ _MERGE: dict[str, dict[str, Schema]] = {
 
 
 def complete(document: Schema) -> Schema:
-    """Complete FastAPI's document with what it does not know of this server."""
+    """Add to FastAPI's document what FastAPI does not know about this server."""
     for operations in document["paths"].values():
         for operation in operations.values():
-            # We answer 400 where FastAPI by itself would answer 422.
+            # We answer 400; FastAPI by itself would answer 422.
             answers = operation.get("responses", {})
             answers.pop("422", None)
             if REFUSED in operation:
-                answers["400"]["description"] += f". Also where the form is right: {operation[REFUSED]}"
+                answers["400"]["description"] += f". Also if the form is right: {operation[REFUSED]}"
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
-    # The merge reads its body by itself (services.bom.merge_json); its form is the wire model's.
+    # The merge reads its body by itself (services.bom.merge); its form is the wire model's.
     merge = MergeRequest.model_json_schema(ref_template="#/components/schemas/{model}")
     schemas.update(merge.pop("$defs"), MergeRequest=merge, JsonValue=_JSON_VALUE)
     for model, fields in _MERGE.items():

@@ -98,7 +98,10 @@ def list_items(
     limit: Limit = 100,
     offset: Offset = 0,
 ) -> Response:
-    """Return items by part number; ``X-Total-Count`` says how many match in all."""
+    """Return a page of the items that match, best first, then by part number.
+
+    ``X-Total-Count`` is the number of all items that match.
+    """
     query = service.ItemQuery(
         search=search or q,
         item_type=item_type,
@@ -116,7 +119,7 @@ def list_items(
 def search_items(
     call: Viewer, q: Word = "", item_type: Word | None = None, limit: Limit = 20, offset: Offset = 0
 ) -> Response:
-    """Search as you type: every word must be somewhere in number, name or description."""
+    """Search items as a person types: an item must have every word, in any of the searched texts."""
     return list_items(call, q, item_type=item_type, limit=limit, offset=offset)
 
 
@@ -124,9 +127,9 @@ def search_items(
     "/items", status_code=201, response_model=ItemOut, responses={**WRITE_ERRORS, 200: {"model": ItemOut}}
 )
 def create_item(call: Editor, body: NewItemBody) -> Response:
-    """Make an item. The same request with the same ``id`` (or ``Idempotency-Key``) gives the item again: 200.
+    """Make an item. A repeat with the same ``id`` (or ``Idempotency-Key``) returns the same item: 200.
 
-    409 for another request with an ``id`` that is known.
+    409 for a different request with a known ``id``.
     """
     new = service.NewItem(
         schema=body.schema_name,
@@ -142,7 +145,7 @@ def create_item(call: Editor, body: NewItemBody) -> Response:
 
 @router.get("/items/by-uuid/{uuid}", response_model=ItemOut, responses=READ_ERRORS)
 def get_item_by_uuid(call: Viewer, uuid: Uuid) -> Response:
-    """Return the item with this UUID; 404 when there is none or it is archived, 400 for no UUID."""
+    """Return the item with this UUID; 404 if there is none or it is archived, 400 for no UUID."""
     with call.read() as tx:
         item = service.get_by_uuid(tx, uuid)
         last = last_sync(tx, item)
@@ -151,7 +154,7 @@ def get_item_by_uuid(call: Viewer, uuid: Uuid) -> Response:
 
 @router.post("/items/by-uuid", response_model=ItemsOut, responses=READ_ERRORS)
 def get_items_by_uuid(call: Viewer, body: UuidsBody) -> Response:
-    """Return many UUIDs in one request; those that are not known are absent. Reads only, so a viewer may."""
+    """Return the items with these UUIDs; unknown ones are absent. Changes nothing, so a viewer may ask."""
     with call.read() as tx:
         items_found = service.get_by_uuids(tx, body.uuids)
         last = last_syncs(tx, [item.id for item in items_found])
@@ -160,7 +163,7 @@ def get_items_by_uuid(call: Viewer, body: UuidsBody) -> Response:
 
 @router.post("/items/look-alikes", response_model=LookAlikesOut, responses=READ_ERRORS)
 def find_look_alikes(call: Viewer, body: LookAlikesBody) -> Response:
-    """Return the items that have a component's name or its very file, for many components. Reads only."""
+    """Find the items with the name or the very file of a component, for many components. Changes nothing."""
     with call.read() as tx:
         matches = search.find_look_alikes(tx, [(query.name, query.sha256) for query in body.wanted])
     return json_answer({"look_alikes": [[asdict(like) for like in likes] for likes in matches]})
@@ -177,9 +180,9 @@ def get_item(call: Viewer, part_number: str) -> Response:
 
 @router.put("/items/{part_number}", response_model=ItemOut, responses=WRITE_ERRORS)
 def change_item(call: Editor, part_number: str, body: ItemChangeBody, expected: ExpectedVersion) -> Response:
-    """Change an item in place; ``properties`` make a new revision. The UUID stays whatever the number.
+    """Change an item in place; ``properties`` make a new revision. A new number does not change the UUID.
 
-    ``If-Match`` with the item's ``ETag``: 412 where somebody was quicker.
+    ``If-Match`` with the item's ``ETag``: 412 if somebody else changed the item first.
     """
     texts = body.model_dump(include=_TEXTS)
     change = service.ItemChange(texts=texts, **body.model_dump(exclude=_TEXTS))
@@ -202,7 +205,7 @@ async def patch_properties(
 ) -> Response:
     """Change some properties by a JSON merge patch (RFC 7386): null removes one, the rest stays.
 
-    ``source``: where mass and material come from; what ``cad`` says replaces only what it said before.
+    ``source``: where mass and material come from; ``cad`` replaces only values that came from ``cad``.
     """
     patch = await json_body(call.request)
     if not isinstance(patch, dict):
@@ -219,8 +222,8 @@ async def patch_properties(
 def archive_item(call: Editor, part_number: str, expected: ExpectedVersion) -> Response:
     """Archive an item; its number stays taken and its lines stay in their BOMs.
 
-    ``X-Total-Count`` says on how many BOM lines it is, ``X-Used-In`` the first of those BOMs (their part
-    numbers as in a path, with commas).
+    ``X-Total-Count`` is the number of BOM lines with this item; ``X-Used-In`` names the first of those BOMs
+    (part numbers, encoded as in a path, with commas between them).
     """
     with call.write() as tx:
         used, uses = where_used(tx, service.get_item(tx, part_number), limit=20)
@@ -238,7 +241,7 @@ def unarchive_item(call: Editor, part_number: str) -> Response:
 
 @router.post("/generate-part-number", response_model=NumberOut, responses=READ_ERRORS)
 def generate_part_number(call: Editor, body: NumberBody) -> Response:
-    """Return the number the next item of the category would get; a preview that consumes nothing."""
+    """Return the number that the next item of the category would get; the number stays free."""
     with call.read() as tx:
         number = preview_number(tx, body.schema_name, body.category)
     return json_answer({"part_number": number})
@@ -252,7 +255,7 @@ def list_schemas(call: Viewer) -> list[dict[str, Any]]:
 
 @router.get("/schemas/{name}", responses=READ_ERRORS)
 def get_schema(call: Viewer, name: str) -> dict[str, Any]:
-    """Return a schema: its segments with their values."""
+    """Return a part-number schema: its segments with their values."""
     return describe(find_schema(name))
 
 
@@ -263,7 +266,7 @@ def get_schema_form(call: Viewer, name: str) -> dict[str, Any]:
 
 
 def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any]:
-    """Return an item, under the contract's names; ``last_sync`` where it was looked up."""
+    """Return an item as the API sends it, with ``last_sync`` if that was looked up."""
     fields = {} if last_sync is None else {"last_sync": last_sync.to_wire()}
     empty = (name for name in ("supplier_parts", "origins") if not getattr(item, name))
     left_out = ("id", "uuid", "texts", *empty)
@@ -286,7 +289,7 @@ _TEXTS = set(ItemTexts.model_fields)
 _LINKS = TypeAdapter(Annotated[list[LinkedFile], Field(max_length=10_000)])
 _HELD = TypeAdapter(Annotated[list[HeldItem], Field(max_length=10_000)])
 Find = Callable[[Tx, bool], Item | Document]
-"""Gives what a file belongs to; with True it locks that, and makes a document that is new."""
+"""Finds the item or document that a file belongs to; with True it locks it, and makes a new document."""
 RevisionNumber = Annotated[int, Path(ge=1, le=1_000_000)]
 BINARY: dict[int | str, dict[str, Any]] = {
     200: {"content": {"application/octet-stream": {}}, "description": "The file"},
@@ -303,7 +306,7 @@ _FORM: context.Schema = {
         "type": "integer",
         "minimum": 0,
         "maximum": 1_000_000,
-        "description": "what the file was made from; 409 where a newer file is there",
+        "description": "what the file was made from; 409 if there is a newer file",
     },
     "path": context.text(1000, description="where the file is in its project, with /"),
     "links": {
@@ -338,9 +341,9 @@ def list_revisions(
     after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
     offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
 ) -> Response:
-    """Return revisions, newest first; those below the number ``before`` and above ``after``.
+    """Return revisions of an item, newest first: those above ``after`` and below ``before``.
 
-    ``X-Total-Count`` says how many there are above ``after``.
+    ``X-Total-Count`` is the number of those above ``after``.
     """
     with call.read() as tx:
         item = items.get_item(tx, part_number)
@@ -362,7 +365,7 @@ def get_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Resp
 
 @revisions_router.post("/revisions", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS)
 def add_revision(call: Editor, part_number: str, body: RevisionBody) -> Response:
-    """Return a revision without a file: a new property snapshot."""
+    """Add a revision without a file: a new snapshot of the properties."""
     with call.write() as tx:
         item = items.get_item(tx, part_number, lock=True)
         revision = revisions.add_revision(tx, item, comment=body.comment, properties=body.properties)
@@ -376,18 +379,18 @@ async def upload_file(call: Editor, part_number: str) -> Response:
     """Upload a file (form part ``file``, texts ``comment`` and ``properties``) as a new revision.
 
     ``Idempotency-Key`` makes a repeat give the revision that the first request made. With ``base_revision``
-    a file is refused (409 ``newer_revision``, with that revision) where somebody committed one since.
+    a file is refused (409 ``newer_revision``, with that revision) if somebody has committed one since.
     """
     return await receive(call, numbered(part_number))
 
 
 def numbered(part_number: str) -> Find:
-    """Give the item with this number."""
+    """Return a function that finds the item with this number."""
     return lambda tx, lock: items.get_item(tx, part_number, lock=lock)
 
 
 async def receive(call: Call, find: Find) -> Response:
-    """Take an upload as a new revision of an item or a document.
+    """Store an upload as a new revision of an item or a document.
 
     The form is read here and not by a parameter, so that nobody without a role fills the disk.
     """
@@ -424,7 +427,7 @@ async def receive(call: Call, find: Find) -> Response:
 
 @revisions_router.get("/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
 def download_newest(call: Viewer, part_number: str) -> Response:
-    """Return the newest file."""
+    """Send the newest file."""
     with call.read() as tx:
         revision = revisions.newest_file(tx, items.get_item(tx, part_number))
     return download(call, revision)
@@ -432,7 +435,7 @@ def download_newest(call: Viewer, part_number: str) -> Response:
 
 @revisions_router.get("/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
 def download_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Response:
-    """Return the file of one revision."""
+    """Send the file of one revision."""
     with call.read() as tx:
         revision = revisions.get_revision(tx, items.get_item(tx, part_number), number)
     return download(call, revision)
@@ -444,8 +447,9 @@ def download_revision(call: Viewer, part_number: str, number: RevisionNumber) ->
     responses={**READ_ERRORS, 200: {"content": {"image/png": {}}, "description": "The picture"}},
 )
 def thumbnail(call: Viewer, part_number: str, key: Annotated[str, Query(max_length=64)] = "") -> Response:
-    """Return the picture that came with the newest file that has one. One asked for by its ``key`` may be
-    kept.
+    """Send the picture of the newest file that has one.
+
+    A browser may keep a picture for a year if it asks with the ``key`` of the picture.
     """
     with call.read() as tx:
         item = items.get_item(tx, part_number)
@@ -465,7 +469,7 @@ _DRAWN = {
 
 @revisions_router.put("/thumbnail", status_code=204, responses=WRITE_ERRORS, openapi_extra=_DRAWN)
 async def put_thumbnail(call: Editor, part_number: str) -> Response:
-    """Keep a picture of an item that has none: what a browser drew of its model. A new file takes it away."""
+    """Store what a browser drew of a model as the picture of an item without one. A new file removes it."""
     picture = await call.request.body()
 
     def work() -> Response:
@@ -488,8 +492,9 @@ def store_file(
     sha256: str = "",
     origin: RevisionOrigin | None = None,
 ) -> Response:
-    """Return an uploaded file as a new revision, for the API and the pages; ``answer`` is made before the
-    commit.
+    """Store an uploaded file as a new revision, for the API and the pages.
+
+    ``answer`` is made before the commit.
     """
     origin = origin or RevisionOrigin()
     with call.read() as tx:
@@ -501,9 +506,9 @@ def store_file(
         )
     with call.write() as tx:
         of = find(tx, True)
-        said = (stored.name, stored.checksum, comment, properties, asdict(origin))
+        content = (stored.name, stored.checksum, comment, properties, asdict(origin))
         kind = "upload" if isinstance(of, Item) else "upload document"
-        request = KeyedRequest.of(f"{kind} {of.id}", key, said)
+        request = KeyedRequest.of(f"{kind} {of.id}", key, content)
         if earlier := earlier_answer(tx, request):
             return answer(tx, of, revisions.get_revision(tx, of, int(earlier.text)))
         if isinstance(of, Document) and properties:
@@ -542,11 +547,11 @@ def _list(name: str, kind: TypeAdapter[Any], raw: object) -> list[dict[str, str]
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"]))
         raise RejectedError(f"{name}: wanted a JSON list as text; {where}: {first['msg']}") from None
-    result: list[dict[str, str]] = [value.model_dump(exclude_defaults=True) for value in values]
-    for text in (text for value in result for text in value.values()):
+    entries: list[dict[str, str]] = [value.model_dump(exclude_defaults=True) for value in values]
+    for text in (text for value in entries for text in value.values()):
         if problem := text_problem(text, 1000):
             raise RejectedError(f"{name}: {problem}")
-    return result
+    return entries
 
 
 def _properties(raw: str | None) -> dict[str, Any] | None:
@@ -562,7 +567,7 @@ def _properties(raw: str | None) -> dict[str, Any] | None:
 
 
 def download(call: Call, revision: Revision) -> Response:
-    """Hand out the file of a revision. Raises NotFoundError."""
+    """Send the file of a revision. Raises NotFoundError."""
     if revision.file_checksum is None or revision.file_name is None:
         raise NotFoundError(f"revision {revision.revision_number} has no file")
     etag = f'"{revision.file_checksum}"'
@@ -582,9 +587,9 @@ by_uuid = APIRouter(prefix="/api", tags=["documents"])
 
 
 def document_at(uuid: str) -> Find:
-    """Give the document with this UUID, or the item whose document it is.
+    """Return a function that finds the document with this UUID, or the item that the document belongs to.
 
-    With a lock, a UUID that is not known becomes a new document: the sender of a file names it.
+    With a lock, an unknown UUID becomes a new document: the sender of a file chooses the UUID.
     """
 
     def find(tx: Tx, lock: bool) -> Item | Document:
@@ -604,9 +609,7 @@ def document_at(uuid: str) -> Find:
 
 @by_uuid.post("/documents/by-uuid", response_model=DocumentsOut, responses=READ_ERRORS)
 def get_documents(call: Viewer, body: UuidsBody) -> Response:
-    """Return many documents in one request; those that are not known are absent. Reads only, so a viewer
-    may.
-    """
+    """Return the documents with these UUIDs; unknown ones are absent. Changes nothing: a viewer may ask."""
     with call.read() as tx:
         documents = revisions.shown(tx, revisions.documents_by_uuid(tx, body.uuids))
     return json_answer({"documents": [to_wire(document) for document in documents]})
@@ -614,9 +617,7 @@ def get_documents(call: Viewer, body: UuidsBody) -> Response:
 
 @by_uuid.get("/items/{part_number}/documents", response_model=DocumentsOut, responses=READ_ERRORS)
 def documents_of(call: Viewer, part_number: str) -> Response:
-    """Return the documents that hold an item: its own, or the file of several parts in which it is an
-    object.
-    """
+    """Return the documents that hold an item: its own file, and files of several parts that contain it."""
     with call.read() as tx:
         documents = revisions.shown(tx, revisions.documents_holding(tx, items.get_item(tx, part_number)))
     return json_answer({"documents": [to_wire(document) for document in documents]})
@@ -624,14 +625,14 @@ def documents_of(call: Viewer, part_number: str) -> Response:
 
 @by_uuid.get("/documents/{uuid}", response_model=wire.Document, responses=READ_ERRORS)
 def get_document(call: Viewer, uuid: Uuid) -> Response:
-    """Return one document, with what it links to and what links to it."""
+    """Return one document, the documents that it links to, and those that link to it."""
     with call.read() as tx:
         document_json = told_of(tx, uuid)
     return json_answer(document_json)
 
 
 def told_of(tx: Tx, uuid: str) -> dict[str, Any]:
-    """Return all that is known of a document, for the API and the pages. Raises NotFoundError."""
+    """Describe a document and its links, for the API and the pages. Raises NotFoundError."""
     document = revisions.get_document(tx, items.normal_uuid(uuid))
     now = revisions.shown(tx, [document])
     if not now:
@@ -639,8 +640,8 @@ def told_of(tx: Tx, uuid: str) -> dict[str, Any]:
     newest = revisions.get_revision(tx, document, document.current_revision)
     near = {"linked": revisions.linked_from(tx, document), "used_by": revisions.linking_to(tx, document)}
     others = {
-        name: [to_wire(shown_document) for shown_document in revisions.shown(tx, some)]
-        for name, some in near.items()
+        name: [to_wire(shown_document) for shown_document in revisions.shown(tx, linked)]
+        for name, linked in near.items()
     }
     return {**to_wire(now[0]), "links": newest.links, **others}
 
@@ -654,7 +655,7 @@ def list_document_revisions(
     after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
     offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
 ) -> Response:
-    """Return revisions with a file, newest first, as those of an item."""
+    """Return the revisions of a document, newest first; the parameters are those of an item's revisions."""
     with call.read() as tx:
         of = revisions.get_document(tx, items.normal_uuid(uuid))
         found_revisions, total = revisions.list_revisions(
@@ -681,14 +682,16 @@ def get_document_revision(call: Viewer, uuid: Uuid, number: RevisionNumber) -> R
     openapi_extra=UPLOAD,
 )
 async def upload_document_file(call: Editor, uuid: Uuid) -> Response:
-    """Upload a file as a new revision of a document, which the first upload makes; the form is that of an
-    item's file."""
+    """Upload a file as a new revision of a document; the first upload makes the document.
+
+    The form is that of an item's file.
+    """
     return await receive(call, document_at(uuid))
 
 
 @by_uuid.get("/documents/{uuid}/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
 def download_newest_of_document(call: Viewer, uuid: Uuid) -> Response:
-    """Return the newest file."""
+    """Send the newest file."""
     with call.read() as tx:
         revision = revisions.newest_file(tx, revisions.get_document(tx, items.normal_uuid(uuid)))
     return download(call, revision)
@@ -696,7 +699,7 @@ def download_newest_of_document(call: Viewer, uuid: Uuid) -> Response:
 
 @by_uuid.get("/documents/{uuid}/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
 def download_revision_of_document(call: Viewer, uuid: Uuid, number: RevisionNumber) -> Response:
-    """Return the file of one revision."""
+    """Send the file of one revision."""
     with call.read() as tx:
         revision = revisions.get_revision(tx, revisions.get_document(tx, items.normal_uuid(uuid)), number)
     return download(call, revision)

@@ -41,7 +41,7 @@ Text = Annotated[
 Short = Annotated[
     str, StringConstraints(max_length=200), AfterValidator(_characters), WithJsonSchema(context.text(200))
 ]
-# The services check what these say; here the document learns it.
+# The services check these values; the schemas here are for the OpenAPI document.
 ItemUuid = Annotated[Short, WithJsonSchema(context.UUID)]
 ItemType = Annotated[Short, WithJsonSchema(context.ITEM_TYPE)]
 RelType = Annotated[Short, WithJsonSchema({"type": "string", "enum": list(REL_TYPES)})]
@@ -102,7 +102,7 @@ if TYPE_CHECKING:
 else:
 
     def _bounded(of: type[BaseModel]) -> type[RequestBody]:
-        """Return the texts that a wire model names, with the server's bounds and characters."""
+        """Make a body with the fields of a wire model, their lengths and characters checked."""
 
         def kind(hints: dict[str, Any]) -> Any:
             return Text if hints.get("long") else Brief if "maxLength" in hints else Short
@@ -213,7 +213,7 @@ class LookAlikesOut(BaseModel):
 
 
 class RevisionOut(wire.Revision):
-    """A revision: a property snapshot and, where one was uploaded, a file."""
+    """A revision: a property snapshot and, if one was uploaded, a file."""
 
     part_number: str
     thumbnail_key: str | None
@@ -264,7 +264,7 @@ class NewLineBody(_LineTexts):
 
 
 def _kept(unused: Any) -> Any:
-    # An absent key keeps what the line has; what stands here for it is never read, nor in the document.
+    # An absent key keeps the value of the line; this default is never read, and not in the document.
     return Field(unused, json_schema_extra=_without_default)
 
 

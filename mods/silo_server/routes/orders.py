@@ -105,7 +105,7 @@ class OrdersBody(RequestBody):
 
 
 class RatesBody(RequestBody):
-    """``PUT /api/rates``: the site's currency, and what one of each other currency is in it."""
+    """``PUT /api/rates``: the site's currency, and how much of it one unit of each other is worth."""
 
     currency: Code
     rates: dict[Code, Exact] = Field(
@@ -115,7 +115,7 @@ class RatesBody(RequestBody):
 
 @router.get("/items/{part_number}/suppliers", responses=READ_ERRORS)
 def get_suppliers(call: Viewer, part_number: str) -> Response:
-    """Return an item's supplier parts; ``ETag`` is the version of the list, for ``If-Match``."""
+    """Return the supplier parts of an item; ``ETag`` is the version of the list, for ``If-Match``."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         version = suppliers.list_version(tx, item)
@@ -130,7 +130,7 @@ def get_suppliers(call: Viewer, part_number: str) -> Response:
     ),
 )
 def put_suppliers(call: Editor, part_number: str, body: SuppliersBody, expected: ExpectedVersion) -> Response:
-    """Put a list of supplier parts in the place of the present one; 412 if somebody was quicker."""
+    """Replace an item's list of supplier parts; 412 if somebody else changed it first."""
     with call.write() as tx:
         parts = suppliers.read_parts(tx, [_texts(part) for part in body.supplier_parts], dot=True)
         item, _ = suppliers.set_supplier_parts(tx, part_number, parts, expected)
@@ -188,7 +188,7 @@ def asked_of(
     release: Annotated[str, Query(max_length=16)] = "",
     rest: bool = False,
 ) -> OrderRequest:
-    """Return what an order list is for; ``spares`` in percent, ``rest``: without what was ordered already."""
+    """Read what an order list is for; ``spares`` in percent, ``rest``: without what was already ordered."""
     reading = read_number(spares or "0")
     if reading.value is None or not 0 <= reading.value <= orders.MOST_SPARES:
         problem = reading.problem or f"wanted 0 to {orders.MOST_SPARES} percent, got {spares}"
@@ -203,8 +203,7 @@ Kind = Annotated[str, Query(pattern="^(bought|made|unsaid)$")]
 
 @router.get("/items/{part_number}/order", responses=READ_ERRORS)
 def get_order(call: Viewer, part_number: str, asked: AskedFor) -> dict[str, Any]:
-    """Return what to order for so many pieces: bought parts with prices, made parts, what nobody called
-    either.
+    """Return what to order for so many pieces: bought parts with prices, made parts, and undecided ones.
 
     Amounts and money are decimal numbers as text.
     """
@@ -229,7 +228,7 @@ def get_order(call: Viewer, part_number: str, asked: AskedFor) -> dict[str, Any]
 
 def _row_to_wire(row: OrderRow) -> dict[str, Any]:
     offer = row.offer
-    result = {
+    row_json = {
         "part_number": row.item.part_number,
         "name": row.item.name,
         "kind": row.kind,
@@ -243,9 +242,9 @@ def _row_to_wire(row: OrderRow) -> dict[str, Any]:
     }
     if offer is not None:
         money = {"price": offer.price, "cost": offer.cost}
-        result["quantity"] = decimal_text(offer.amount)
-        result |= {name: None if amount is None else decimal_text(amount) for name, amount in money.items()}
-    return result
+        row_json["quantity"] = decimal_text(offer.amount)
+        row_json |= {name: None if amount is None else decimal_text(amount) for name, amount in money.items()}
+    return row_json
 
 
 @router.get("/items/{part_number}/order.csv", response_class=Response, responses=content_of("text/csv"))
@@ -257,7 +256,7 @@ def order_csv(
     supplier: Supplier = None,
     semicolons: bool = False,
 ) -> Response:
-    """Return the list as CSV, or what is ordered from one supplier."""
+    """Return the parts of one kind as CSV; with ``supplier`` only those from this supplier."""
     write = partial(transfer.to_csv, semicolons=semicolons)
     return _exported(
         call, part_number, asked, kind, supplier, write, "text/csv; charset=utf-8; header=present"
@@ -268,7 +267,7 @@ def order_csv(
 def order_xlsx(
     call: Viewer, part_number: str, asked: AskedFor, kind: Kind = orders.BOUGHT, supplier: Supplier = None
 ) -> Response:
-    """Return the list as a workbook, or what is ordered from one supplier."""
+    """Return the parts of one kind as a workbook; with ``supplier`` only those from this supplier."""
     return _exported(call, part_number, asked, kind, supplier, transfer.to_xlsx, XLSX)
 
 
@@ -294,7 +293,7 @@ def get_orders(call: Viewer, part_number: str) -> dict[str, Any]:
 
 @router.post("/items/{part_number}/orders", status_code=201, responses=WRITE_ERRORS)
 def post_orders(call: Editor, part_number: str, body: OrdersBody) -> Response:
-    """Note what was ordered for a product."""
+    """Record what was ordered for a product."""
     with call.write() as tx:
         made = record_all(tx, part_number, body.parts, body.note)
         return json_answer({"orders": [_recorded_to_wire(*recorded) for recorded in made]}, 201)
@@ -303,13 +302,13 @@ def post_orders(call: Editor, part_number: str, body: OrdersBody) -> Response:
 def record_all(
     tx: Tx, part_number: str, parts: Sequence[OrderedBody], note: str
 ) -> list[tuple[Recorded, str]]:
-    """Note what was ordered; the body is what says whether it is usable."""
+    """Record what was ordered; the model of the body has checked each value."""
     return orders.record(tx, part_number, [NewOrder(**part.model_dump()) for part in parts], note)
 
 
 @router.post("/items/{part_number}/orders/{order_id}/take-back", responses=WRITE_ERRORS)
 def take_back(call: Editor, part_number: str, order_id: Annotated[int, Path(ge=1, le=2**53 - 1)]) -> Response:
-    """Say that something was not ordered after all."""
+    """Record that an order was not placed after all."""
     with call.write() as tx:
         done = orders.take_back(tx, part_number, order_id)
         return json_answer(_recorded_to_wire(done, orders.list_recorded(tx, [order_id])[0][1]))
@@ -321,14 +320,14 @@ def _recorded_to_wire(recorded: Recorded, part_number: str) -> dict[str, Any]:
 
 @router.get("/rates", responses=READ_ERRORS)
 def get_rates(call: Viewer) -> dict[str, Any]:
-    """Return the site's currency, and what one of each other currency is in it."""
+    """Return the site's currency, and how much of it one unit of each other currency is worth."""
     with call.read() as tx:
         return _rates(suppliers.rates_of(tx))
 
 
 @router.put("/rates", responses=WRITE_ERRORS)
 def put_rates(call: Admin, body: RatesBody) -> dict[str, Any]:
-    """Set the site's currency and the rates; those that are not named go."""
+    """Set the site's currency and the rates; rates that are not named are deleted."""
     with call.write() as tx:
         return _rates(
             suppliers.set_rates(tx, body.currency, [(code, f"{rate:f}") for code, rate in body.rates.items()])

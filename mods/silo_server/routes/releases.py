@@ -54,21 +54,21 @@ class ReleasesOut(wire.Answer):
 
 
 def release_to_wire(tx: Tx, release: Release, *, whole: bool = False) -> dict[str, Any]:
-    """Return a revision as it is sent; ``whole``: with the item's revision and all files of the product."""
-    result = {
+    """Return a revision as the API sends it; ``whole``: with the item's revision and the product's files."""
+    release_json = {
         **to_wire(release, "id"),
         "blocks": releases.blocks_of(tx, release) if release.status == "review" else release.blocks,
         "approvals": [to_wire(approval) for approval in releases.approvals_of(tx, release)],
     }
     if whole:
         record = releases.read_record(tx, release.record)
-        result |= {"revision": record["revision"], "files": record["files"]}
-    return result
+        release_json |= {"revision": record["revision"], "files": record["files"]}
+    return release_json
 
 
 @router.get("", response_model=ReleasesOut, responses=READ_ERRORS)
 def list_releases(call: Viewer, part_number: str) -> Response:
-    """Return the revisions of a product: in review, released, obsolete, and those that came to nothing."""
+    """Return all revisions of a product: in review, released, obsolete, rejected or withdrawn."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         releases_json = [release_to_wire(tx, release) for release in releases.list_releases(tx, item)]
@@ -86,7 +86,7 @@ def submit(call: Editor, part_number: str, body: SubmitBody) -> Response:
 
 
 def frozen_now(call: Call, part_number: str) -> releases.FrozenProduct:
-    """Return the product as one snapshot of the database has it."""
+    """Freeze a product as one snapshot of the database has it; nothing is stored."""
     with call.server.large_reads.enter(), call.read() as tx:
         return frozen.freeze(tx, get_item(tx, part_number))
 
@@ -102,7 +102,7 @@ def get_release(call: Viewer, part_number: str, label: str) -> Response:
 
 @router.post("/{label}/approval", response_model=wire.Release, responses=WRITE_ERRORS)
 def approve(call: Viewer, part_number: str, label: str, body: ApproveBody) -> Response:
-    """Approve what is in review; the last approval that the site asks for releases it.
+    """Approve a revision in review; the last approval that the site requires releases it.
 
     This needs the right to approve, not a role.
     """
@@ -113,7 +113,7 @@ def approve(call: Viewer, part_number: str, label: str, body: ApproveBody) -> Re
 
 @router.post("/{label}/end", response_model=wire.Release, responses=WRITE_ERRORS)
 def end(call: Viewer, part_number: str, label: str, body: EndBody) -> Response:
-    """Reject or withdraw what is in review, or call a released revision obsolete.
+    """Reject or withdraw a revision in review, or call a released one obsolete.
 
     An editor withdraws; rejecting and calling obsolete need the right to approve.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What is drawn of files over HTTP, and the scene of a product (decision 24)."""
+"""Geometry and structure of files over HTTP, and the scene of a product (decision 24)."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def missing(call: Viewer, body: ContentsBody) -> Response:
     openapi_extra=_sent("application/octet-stream", _BYTES),
 )
 async def put_geometry(call: Editor, sha256: Checksum) -> Response:
-    """Return what is drawn of a file: a GLB, packed with gzip (``Content-Encoding``) or not."""
+    """Store the geometry of a file: a GLB, packed with gzip (``Content-Encoding``) or not."""
     return await _keep(call, sha256, "geometry")
 
 
@@ -71,7 +71,7 @@ async def put_geometry(call: Editor, sha256: Checksum) -> Response:
     openapi_extra=_sent(JSON, {"type": "object"}),
 )
 async def put_structure(call: Editor, sha256: Checksum) -> Response:
-    """Return what a file shows, and where: JSON, packed with gzip (``Content-Encoding``) or not."""
+    """Store which parts a file shows, and where: JSON, packed with gzip (``Content-Encoding``) or not."""
     return await _keep(call, sha256, "structure")
 
 
@@ -94,13 +94,13 @@ async def _keep(call: Call, sha256: str, part: scene.Part) -> Response:
 
 @router.get("/models/{sha256}/geometry", response_class=Response, responses=_binary(GLB))
 def get_geometry(call: Viewer, sha256: Checksum, v: Annotated[str, Query(max_length=64)] = "") -> Response:
-    """Return what is drawn of a file. The address that a scene names may be kept forever."""
+    """Return the geometry of a file. With the ``v`` of a scene a browser may keep it for a year."""
     return _part(call, sha256, "geometry", GLB, v)
 
 
 @router.get("/models/{sha256}/structure", response_class=Response, responses=_binary(JSON))
 def get_structure(call: Viewer, sha256: Checksum, v: Annotated[str, Query(max_length=64)] = "") -> Response:
-    """Return what a file shows, and where."""
+    """Return which parts a file shows, and where. With ``v`` a browser may keep the answer for a year."""
     return _part(call, sha256, "structure", JSON, v)
 
 
@@ -118,9 +118,7 @@ def _part(call: Call, sha256: str, part: scene.Part, kind: str, version: str) ->
 def get_scene(
     call: Viewer, part_number: str, revision: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None
 ) -> Response:
-    """Return where each part of a product stands: in the newest files, or in those that a revision
-    recorded.
-    """
+    """Return the place of each part of a product: from the newest files, or as a revision recorded them."""
     with call.server.large_reads.enter(), call.read() as tx:
         item = items.get_item(tx, part_number, include_archived=True)
         return json_answer(scene.scene(tx, call.server.files, item, revision))

@@ -70,7 +70,7 @@ class ModeBody(BaseModel):
 
 @router.get("/health")
 async def health(server: ServerDep) -> dict[str, Any]:
-    """Return the process lives; says also in which mode. Waits for nothing that others wait for."""
+    """Answer that the process lives, and in which mode. Waits for nothing that others wait for."""
     state = await server.probe.look(HEALTH_SECONDS) or server.probe.last
     return {"status": "ok", "mode": state.mode}
 
@@ -78,14 +78,14 @@ async def health(server: ServerDep) -> dict[str, Any]:
 @router.api_route("/health", methods=["HEAD", "OPTIONS"], include_in_schema=False)
 @router.api_route("/ready", methods=["OPTIONS"], include_in_schema=False)
 async def looked_at() -> Response:
-    """Answer balancers and browsers that look before they ask."""
+    """Answer load balancers and browsers that test an address before they use it."""
     return Response(status_code=204, headers={"Allow": "GET, HEAD, OPTIONS"})
 
 
 @router.api_route("/ready", methods=["HEAD"], include_in_schema=False)
 @router.get("/ready", responses={503: {"description": "The database or the file store is not there"}})
 async def ready(server: ServerDep) -> Response:
-    """Say if the server can do its work: 200, or 503 while the database or the file store is away or full."""
+    """Say if the server can work: 200, or 503 while database or file store cannot be reached or are full."""
     state = await server.probe.look(READY_SECONDS) or ServerStanding(
         "degraded", "unreachable", server.probe.last.files
     )
@@ -108,7 +108,7 @@ async def ready(server: ServerDep) -> Response:
     responses={**READ_ERRORS, 200: {"content": {"text/plain": {}}, "description": "The numbers"}},
 )
 def metrics(call: Viewer) -> Response:
-    """Return metrics for Prometheus, with a viewer's token."""
+    """Return the metrics for Prometheus; the role viewer is enough."""
     rendered = call.request.app.state.metrics.render(call.server.db, call.server.hub, call.server.files)
     return Response(rendered, headers={"Content-Type": CONTENT_TYPE})
 
@@ -123,10 +123,10 @@ async def stream_events(
     item: Annotated[list[str] | None, Query(max_length=100)] = None,
     last_event_id: Annotated[str | None, Query(max_length=40)] = None,
 ) -> Response:
-    """Return events as they happen. ``Last-Event-ID`` (or ``last_event_id``) replays what came after it.
+    """Stream events: those since ``Last-Event-ID`` (or ``last_event_id``), then new ones as they happen.
 
-    ``item`` (part numbers or UUIDs, repeatable) lets only their events through. ``reset`` says: you were away
-    for longer than the log goes back, read everything again.
+    ``item`` (part numbers or UUIDs, repeatable): only events of these items. The event ``reset`` means: the
+    log does not go back that far, so read everything again.
     """
     last = _event_id(call.request.headers.get("last-event-id") or last_event_id)
 
@@ -134,14 +134,14 @@ async def stream_events(
         try:
             return find_actor(call.request) is not None
         except SQLAlchemyError:
-            return True  # the database being away is no reason to send everybody away
+            return True  # a lost database is no reason to end the streams
 
     return EventResponse(call.server.hub, last, item or (), still_allowed)
 
 
 @router.get("/api/modules", responses=READ_ERRORS)
 async def modules(call: Viewer) -> dict[str, Any]:
-    """Return what this server can do."""
+    """Return the modules of this server."""
     return {"modules": {name: {"enabled": True} for name in MODULES}}
 
 
@@ -154,18 +154,14 @@ def get_mode(call: Admin) -> dict[str, Any]:
 
 @router.get("/api/admin/system", responses=READ_ERRORS)
 def get_system(call: Admin) -> dict[str, Any]:
-    """Return version, database, disk, the last backup and housekeeping, queues, counts, warnings of the
-    start.
-    """
+    """Return version, database, disk, last backup and housekeeping, queues, counts, warnings of the start."""
     server = call.server
     return standing(server.db, server.hub, server.files, server.large_reads)
 
 
 @router.get("/api/admin/housekeeping", responses=READ_ERRORS)
 def get_housekeeping(call: Admin) -> dict[str, Any]:
-    """Return when old rows and files were last deleted, how many of what, and what went wrong; null before
-    that.
-    """
+    """Return when old rows and files were last deleted, how many, and what failed; null if never."""
     with call.read() as tx:
         run = last_run(tx)
     return {"last_run": asdict(run) if run else None}
@@ -173,7 +169,7 @@ def get_housekeeping(call: Admin) -> dict[str, Any]:
 
 @router.put("/api/admin/mode", responses=READ_ERRORS)
 def set_mode(call: Admin, body: ModeBody) -> dict[str, Any]:
-    """Take changes, or take none (503) until set otherwise; all processes follow at once."""
+    """Allow changes, or refuse them (503) until the mode is set again; all processes follow at once."""
     with call.write(even_when_read_only=True) as tx:
         return {"mode": events.set_mode(tx, body.mode)}
 
@@ -245,7 +241,7 @@ class UserChangeBody(RequestBody):
 
 
 class PasswordBody(RequestBody):
-    """``PUT /api/auth/password``: the new password, and the old one but after a login link."""
+    """``PUT /api/auth/password``: the new password, and the old one, except after a login link."""
 
     password: NewPassword
     current_password: Text | None = None
@@ -253,7 +249,7 @@ class PasswordBody(RequestBody):
 
 @auth_router.post("/auth/login", responses=LOGIN_ERRORS)
 def log_in(server: ServerDep, request: Request, body: LoginBody) -> Response:
-    """Begin a browser session: sets the cookie, answers with the CSRF secret for later requests."""
+    """Begin a browser session: set the cookie, and answer with the CSRF secret for later requests."""
     session = access.log_in(server.db, body.username, body.password, client_address(request))
     response = json_answer({"username": session.username, "csrf_token": session.csrf_token})
     set_session_cookie(response, request, session)
@@ -271,7 +267,7 @@ def log_out(call: Viewer) -> Response:
 
 @auth_router.get("/auth/me", responses=READ_ERRORS)
 def who_am_i(call: Viewer) -> dict[str, Any]:
-    """Return who this token or session is."""
+    """Return the user of this token or session."""
     return {
         "username": call.actor.username,
         "display_name": call.actor.display_name,
@@ -282,21 +278,21 @@ def who_am_i(call: Viewer) -> dict[str, Any]:
 
 @auth_router.put("/auth/password", status_code=204, responses={**LOGIN_ERRORS, **WRITE_ERRORS})
 def set_password(call: Viewer, body: PasswordBody) -> Response:
-    """Set the own password; ends all own sessions. Not with a token; asks for the old password."""
+    """Set the caller's password and end all their sessions. Not with a token; needs the old password."""
     access.set_own_password(call.server.db, call.actor, body.password, body.current_password)
     return Response(status_code=204)
 
 
 @auth_router.get("/auth/tokens", responses=READ_ERRORS)
 def list_tokens(call: Viewer) -> list[dict[str, Any]]:
-    """Return the own tokens; never their secrets."""
+    """Return the caller's tokens; never their secrets."""
     with call.read() as tx:
         return [_token(token) for token in access.list_tokens(tx, call.actor.own_id)]
 
 
 @auth_router.post("/auth/tokens", status_code=201, responses=WRITE_ERRORS)
 def create_token(call: Viewer, body: TokenBody) -> dict[str, Any]:
-    """Make a token. The secret is in this answer and never again."""
+    """Make a token. Only this answer shows its secret."""
     forever = "expires_in_days" in body.model_fields_set and body.expires_in_days is None
     scope = max(body.scopes, key=list(Scope).index) if body.scopes else None
     with call.write(even_when_read_only=True) as tx:
@@ -335,7 +331,7 @@ def create_user(call: Admin, body: NewUserBody) -> dict[str, Any]:
 
 @auth_router.put("/users/{username}", responses=WRITE_ERRORS)
 def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, Any]:
-    """Change a user's role, name, password, right to approve, or let nobody in under this name any more."""
+    """Change a user's role, name, password or right to approve, or block all access of the user."""
     with call.write(even_when_read_only=True) as tx:
         user = access.change_user(tx, username, **body.model_dump())
         return _user(user)
@@ -343,7 +339,7 @@ def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, A
 
 @auth_router.post("/users/{username}/login-link", status_code=201, responses=WRITE_ERRORS)
 def create_login_link(call: Admin, username: str) -> dict[str, Any]:
-    """Return a link that lets this user in once; for a new colleague or a forgotten password."""
+    """Make a link that lets this user in once; for a new colleague or a forgotten password."""
     with call.write(even_when_read_only=True) as tx:
         secret = access.create_login_link(tx, username)
         access.note(tx, "login_link.created", username)
@@ -356,16 +352,14 @@ def create_login_link(call: Admin, username: str) -> dict[str, Any]:
 def list_audit(
     call: Admin, limit: Annotated[int, Query(ge=1, le=1000)] = 100, before: PageFrom = None
 ) -> list[dict[str, Any]]:
-    """Return who did what, newest first."""
+    """Return the audit list, newest first: who did what."""
     with call.read() as tx:
         entries = access.list_entries(tx, limit, before)
     return [to_wire(entry) for entry in entries]
 
 
 def set_session_cookie(response: Response, request: Request, session: access.NewSession) -> None:
-    """Set the session's cookie: not for scripts, not for other sites, and only over TLS where there is
-    TLS.
-    """
+    """Set the session's cookie: not for scripts or other sites, and only over TLS if there is TLS."""
     settings = server_of(request).settings
     response.set_cookie(
         SESSION_COOKIE,
