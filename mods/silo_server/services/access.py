@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Users, their passwords, tokens and sessions, and the list of who did what.
 
-The audit list is append-only, and has never a secret in it. Passwords are kept as argon2id. API tokens
+The audit list is append-only, and never has a secret in it. Passwords are kept as argon2id. API tokens
 (``silo_…``) are shown once and stored as SHA-256; they have a name, an end, a last use, and can be revoked.
 Browser sessions begin with a password or with a link that is used once; each has a CSRF secret.
 """
@@ -51,7 +51,7 @@ class AuditEntry:
 
 
 def note(tx: Tx, action: str, target: str = "", detail: str = "") -> None:
-    """Write one line, together with what it records."""
+    """Write a line of the audit list, in the same transaction as what it records."""
     tx.conn.execute(
         insert(audit).values(
             at=tx.stamp,
@@ -67,7 +67,7 @@ def note(tx: Tx, action: str, target: str = "", detail: str = "") -> None:
 def list_entries(
     tx: Tx, limit: int = 100, before: int | None = None, after: int | None = None
 ) -> list[AuditEntry]:
-    """Return the newest entries first; ``before`` and ``after`` are ids to page on and back."""
+    """Read the audit list, newest first; ``before`` and ``after`` are ids to page from."""
     rows = newest_first(tx, select(audit), audit.c.id, limit, before, after)
     return [from_row(AuditEntry, row) for row in rows]
 
@@ -105,13 +105,13 @@ def _hasher() -> PasswordHasher:
 
 @cache
 def _decoy() -> str:
-    # Verified against when there is no such user, so that the answer's time gives nothing away.
+    # Verified if there is no such user, so that the time of the answer gives nothing away.
     with _HASHING.enter():
         return _hasher().hash("a password that nobody has")
 
 
 def to_user(row: Any) -> User:
-    """Return a frozen user from its row."""
+    """Make a user from its row."""
     has_password = row.password_hash is not None
     return from_row(
         User,
@@ -124,12 +124,12 @@ def to_user(row: Any) -> User:
 
 
 def list_users(tx: Tx) -> list[User]:
-    """Return all users by name."""
+    """Read all users, sorted by name."""
     return [to_user(row) for row in tx.conn.execute(select(users).order_by(users.c.username_key))]
 
 
 def get_user(tx: Tx, username: str) -> User:
-    """Return the user, in whatever case; NotFoundError if there is none."""
+    """Find a user by name, in upper or lower case; NotFoundError if there is none."""
     row = row_of(tx, username)
     if row is None:
         raise NotFoundError(f"there is no user {username!r}")
@@ -137,7 +137,7 @@ def get_user(tx: Tx, username: str) -> User:
 
 
 def row_of(tx: Tx, username: str) -> Any:
-    """Return the row of this user, None if there is none."""
+    """Find the row of a user by name, in upper or lower case; None if there is none."""
     return tx.conn.execute(select(users).where(users.c.username_key == username.casefold())).one_or_none()
 
 
@@ -179,13 +179,13 @@ def change_user(
     approver: bool | None = None,
     password: str | None = None,
 ) -> User:
-    """Change a user; the last active admin cannot be taken away.
+    """Change a user. ConflictError if no active admin would be left.
 
     A new password ends the user's sessions and login links, another role the login links. Deactivation ends
-    both, and revokes the tokens: who is let in again later makes new ones.
+    both, and revokes the tokens: a user who is let in again makes new ones.
     """
     if role is not None or active is not None:
-        # Two admins who demote each other at once must not both be the one but last.
+        # Two admins who demote each other at the same time must not leave the server without an admin.
         tx.lock(ADMIN_LOCK)
     user = get_user(tx, username)
     if password is not None and tx.actor.by_token and tx.actor.user_id == user.id:
@@ -238,7 +238,7 @@ def check_lasting(tx: Tx, what: str) -> None:
 
 
 def _what_changed(user: User, values: Mapping[str, object]) -> str:
-    """Return ``role viewer → editor``; never a password."""
+    """Describe a change for the audit list: ``role viewer → editor``; never shows a password."""
     before: dict[str, object] = {
         "role": user.role.value,
         "display_name": user.display_name,
@@ -254,7 +254,7 @@ def _what_changed(user: User, values: Mapping[str, object]) -> str:
 
 
 def make_admin(tx: Tx, username: str) -> User:
-    """Return the user as an active admin; made where there is none."""
+    """Make this user an active admin; make the user if there is none."""
     tx.lock(ADMIN_LOCK)
     if row_of(tx, username) is None:
         return create_user(tx, username, Role.ADMIN)
@@ -262,12 +262,12 @@ def make_admin(tx: Tx, username: str) -> User:
 
 
 def password_fits(claimed: Any, password: str) -> bool:
-    """Return True if the password is that of an active user; takes as long for an unknown name.
+    """Check if the password is that of an active user; takes as long for an unknown name.
 
     claimed
         the row of :func:`row_of` for the name that somebody gave.
 
-    Not to be called inside a transaction: a hash takes long, and 64 MiB. BusyError where too many wait.
+    Do not call it inside a transaction: a hash takes long, and 64 MiB. BusyError if too many wait.
     """
     stored = claimed.password_hash if claimed is not None else None
     checked = stored or _decoy()  # before a place is taken: the decoy takes one of its own
@@ -280,7 +280,7 @@ def password_fits(claimed: Any, password: str) -> bool:
 
 
 def hash_password(password: str) -> str:
-    """Return an argon2id hash; RejectedError for a password that is too short or absurdly long."""
+    """Hash a password with argon2id; RejectedError if it is too short or absurdly long."""
     if not MIN_PASSWORD <= len(password) <= MAX_PASSWORD:
         raise RejectedError(
             f"password: wanted {MIN_PASSWORD} to {MAX_PASSWORD} characters, got {len(password)}"
@@ -295,7 +295,7 @@ def _active_admins(tx: Tx) -> int:
 
 
 PREFIX = "silo_"
-# Tokens that the server makes by itself: of its environment, and where that has none.
+# Names of tokens that the server makes by itself: from its environment, and if that has none.
 CONFIGURED, START_TOKEN = "SILO_API_TOKEN", "given out at start"
 SHORTEST_SECRET = 20
 _PLACEHOLDER = re.compile(
@@ -325,14 +325,12 @@ class Token:
 
 
 def secret_hash(secret: str) -> str:
-    """Return what is stored of a secret. The secrets are 160 random bits, so that a plain SHA-256 is
-    enough.
-    """
+    """Hash a secret, to be stored. Secrets are long and random, so that a plain SHA-256 is enough."""
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def secret_of_form(actor: Actor, *sent: str) -> str | None:
-    """Return the secret of the token that a form asks for: the same one where the same form is sent again.
+    """Derive the secret of the token that a form asks for; the same form gives the same secret again.
 
     sent
         what the form holds, with a key that is new each time the form is shown. None for a caller without
@@ -354,15 +352,15 @@ def create_own_token(
     secret: str | None = None,
     hashed: str = "",
 ) -> tuple[Token, str]:
-    """Make a token of the caller's. A token makes none that lives longer or may more than itself.
+    """Make a token for the caller. A token cannot make one that lives longer or may do more than itself.
 
     days, forever
         its lifetime [days]; with neither it lives as long as the token that makes it.
     secret
         of :func:`secret_of_form`, whose token may have been made a moment ago.
     hashed
-        of a secret that only a program knows; the secret that is returned is then none.
-    Raises ForbiddenError, ConflictError where the form was sent long ago.
+        of a secret that only a program knows; the secret that is returned is then empty.
+    Raises ForbiddenError; ConflictError if the form was sent long ago.
     """
     actor = tx.actor
     check_may_change(actor)
@@ -386,7 +384,7 @@ def create_own_token(
 
 
 def let_program_in(tx: Tx, name: str, hashed: str) -> None:
-    """Make a token for a program that showed the SHA-256 of a secret of its own; one, however often asked."""
+    """Make a token for a program that sent the SHA-256 of its own secret; only one for each secret."""
     tx.lock(int(hashed[:15], 16))
     if tx.conn.scalar(select(api_tokens.c.id).where(api_tokens.c.token_hash == hashed)) is None:
         create_own_token(tx, name, days=PROGRAM_DAYS, forever=False, scope=Scope.WRITE, hashed=hashed)
@@ -421,7 +419,7 @@ def create_token(
     scope: Scope = Scope.ADMIN,
     hashed: str = "",
 ) -> tuple[Token, str]:
-    """Make a token of the user; returns it with its secret, which is never shown again."""
+    """Make a token for a user; return it with its secret, which is never shown again."""
     prefix = PREFIX if hashed else shown_prefix(secret) if secret else None
     secret = "" if hashed else secret or PREFIX + secrets.token_hex(20)
     token_id = tx.conn.execute(
@@ -447,9 +445,9 @@ def shown_prefix(secret: str) -> str:
 
 
 def take_configured_token(tx: Tx, user_id: int, secret: str) -> str:
-    """Make the secret of the server's environment a token of the user, and end its predecessors.
+    """Make the secret of the server's environment a token of the user, and revoke its predecessors.
 
-    Returns why it lets nobody in, "" where it does: one that was revoked stays so.
+    Returns why it lets nobody in, or "" if it works. A token that was revoked stays revoked.
     """
     query = select(api_tokens, users.c.active).join(users, users.c.id == api_tokens.c.user_id)
     row = tx.conn.execute(query.where(api_tokens.c.token_hash == secret_hash(secret))).one_or_none()
@@ -480,7 +478,7 @@ def check_configured_secret(secret: str) -> None:
 
 
 def list_tokens(tx: Tx, user_id: int | None = None) -> list[Token]:
-    """Return the tokens of a user, or of everybody, newest first."""
+    """Read the tokens of a user, or of everybody, newest first."""
     query = (
         select(api_tokens, users.c.username)
         .join(users, users.c.id == api_tokens.c.user_id)
@@ -492,7 +490,7 @@ def list_tokens(tx: Tx, user_id: int | None = None) -> list[Token]:
 
 
 def revoke_token(tx: Tx, token_id: int, user_id: int | None) -> None:
-    """Revoke a token at once; of the user, or anybody's where ``user_id`` is None."""
+    """Revoke a token at once: one of the user or, if ``user_id`` is None, anybody's."""
     query = select(api_tokens.c.name).where(api_tokens.c.id == token_id)
     if user_id is not None:
         query = query.where(api_tokens.c.user_id == user_id)
@@ -509,7 +507,7 @@ def revoke_token(tx: Tx, token_id: int, user_id: int | None) -> None:
 
 
 def actor_by_token(db: Database, secret: str, address: str) -> Actor | None:
-    """Return who holds this token; None if it is unknown, expired, revoked, or its user is not active."""
+    """Find the user of a token; None if it is unknown, expired or revoked, or its user is not active."""
     with db.read() as tx:
         row = tx.conn.execute(
             select(
@@ -578,7 +576,7 @@ class NewSession:
 
 
 def log_in(db: Database, username: str, password: str, address: str) -> NewSession:
-    """Begin a session; AuthError where name or password is wrong, TooManyAttemptsError after too many."""
+    """Begin a session; AuthError if name or password is wrong, TooManyAttemptsError after too many."""
     user = _proved(db, username, password, address)
     with db.write(Actor(username[:64], Role.VIEWER, address=address), even_when_read_only=True) as tx:
         note(tx, "login")
@@ -586,9 +584,9 @@ def log_in(db: Database, username: str, password: str, address: str) -> NewSessi
 
 
 def set_own_password(db: Database, actor: Actor, new: str, current: str | None) -> None:
-    """Set the caller's password, which ends all sessions of theirs.
+    """Set the caller's password and end all sessions of the caller.
 
-    Asks for the old one, but for a session that a login link began, which is there for a forgotten password.
+    Needs the old one, except in a session that a login link began: that is for a forgotten password.
     Raises ForbiddenError for a token, RejectedError, TooManyAttemptsError.
     """
     if actor.by_token:
@@ -603,15 +601,15 @@ def set_own_password(db: Database, actor: Actor, new: str, current: str | None) 
 
 
 def _proved(db: Database, username: str, password: str, address: str) -> User:
-    """Return the user whose password this is; AuthError, TooManyAttemptsError."""
+    """Check name and password; return the user. Raises AuthError, TooManyAttemptsError."""
     actor = Actor(username[:64], Role.VIEWER, address=address)
-    # Reserved before the password is looked at: what comes at the same time is counted as well.
+    # Reserved before the password is checked, so that attempts at the same time are counted as well.
     with db.write(actor, even_when_read_only=True) as tx:
         tx.lock(LOGIN_LOCK)
         _check_rate(tx, username, address)
         attempt = _reserve(tx, username, address)
         claimed = row_of(tx, username)
-    outcome = None  # as long as the password was not looked at, for which the server may be too busy
+    outcome = None  # if the password cannot be checked: the server may be too busy
     try:
         outcome = PROVED if password_fits(claimed, password) else FAILED
     finally:
@@ -625,9 +623,10 @@ def _proved(db: Database, username: str, password: str, address: str) -> User:
 
 
 def create_login_link(tx: Tx, username: str) -> str:
-    """Return a secret that lets this user in once, for a while, to set a password without the old one.
+    """Make a secret that lets this user in once, for a while, to set a password without the old one.
 
-    So nobody makes a link for the own account: who holds its session or token is not asked for the password.
+    ForbiddenError for the caller's own account: its session or token alone must not be enough to set a
+    password.
     """
     user = get_user(tx, username)
     check_lasting(tx, "make a login link")
@@ -646,7 +645,7 @@ def create_login_link(tx: Tx, username: str) -> str:
 
 
 def use_login_link(db: Database, secret: str, address: str) -> NewSession:
-    """Begin a session by a link; AuthError where it is unknown, used or too old."""
+    """Begin a session by a login link; AuthError if the link is unknown, used or too old."""
     with db.write(Actor("link", Role.VIEWER, address=address), even_when_read_only=True) as tx:
         row = tx.conn.execute(
             delete(login_links)
@@ -664,7 +663,7 @@ def use_login_link(db: Database, secret: str, address: str) -> NewSession:
 
 
 def actor_by_session(db: Database, secret: str, address: str) -> Actor | None:
-    """Return who this session cookie is; None if it is unknown or over."""
+    """Find the user of a session cookie; None if it is unknown or over."""
     with db.read() as tx:
         row = tx.conn.execute(
             select(
@@ -727,10 +726,10 @@ PENDING, FAILED, PROVED = "pending", "failed", "proved"
 
 
 def _check_rate(tx: Tx, username: str, address: str) -> None:
-    """Raise TooManyAttemptsError where the next try has to wait, longer after each failure.
+    """Raise TooManyAttemptsError if the next try has to wait, longer after each failure.
 
     One name from one address waits soon. All names from one address, and one name from all addresses, wait
-    only where this name has never logged in from this address: so a stranger keeps nobody out.
+    only if this name has never logged in from this address: so a stranger keeps nobody out.
     """
     window, allowed = tx.settings.login_window_seconds, tx.settings.login_failures
     name = login_attempts.c.username_key == username.casefold()[:64]
@@ -766,10 +765,10 @@ def _reserve(tx: Tx, username: str, address: str) -> int:
 
 
 def _settle(tx: Tx, attempt: int, outcome: str | None) -> None:
-    """Write down what an attempt came to. One that proved the password gives its failures back."""
+    """Write down the outcome of an attempt. A right password deletes the failed attempts before it."""
     own = tx.conn.execute(select(login_attempts).where(login_attempts.c.id == attempt)).one_or_none()
     if own is None:
-        return  # housekeeping, after a wait without end
+        return  # housekeeping deleted it, after a very long wait
     same = (login_attempts.c.username_key == own.username_key) & (login_attempts.c.address == own.address)
     if outcome is None:
         tx.conn.execute(delete(login_attempts).where(login_attempts.c.id == attempt))

@@ -49,7 +49,7 @@ _UNSEEN = re.compile(f"[{UNSEEN}]")
 
 
 def check_number(number: str) -> str:
-    """Return a part number as given, trimmed; RejectedError if it cannot stand in a path or a cell."""
+    """Check and trim a part number; RejectedError if it cannot stand in a path or a cell."""
     if problem := character_problem(number):
         raise RejectedError(f"part_number: {problem}")
     trimmed = number.strip()
@@ -67,7 +67,7 @@ def check_number(number: str) -> str:
 
 
 def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
-    """Return the number the next item of the category would get; consumes nothing."""
+    """Find the number that the next item of the category would get; the number stays free."""
     schema = find_schema(schema_name)
     category_found = schema.category(category)
     last = tx.conn.scalar(
@@ -79,7 +79,7 @@ def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
 
 
 def take_number(tx: Tx, schema: Schema, category: Category) -> str:
-    """Return the next free number of the category, taken."""
+    """Take the next free number of the category."""
     where = (number_counters.c.schema_name == schema.name, number_counters.c.category == category.code)
     _ensure_counter(tx, schema.name, category.code)
     last = tx.conn.scalar(select(number_counters.c.last_serial).where(*where).with_for_update()) or 0
@@ -98,7 +98,7 @@ def _ensure_counter(tx: Tx, schema: str, category: str) -> None:
 
 
 def _next_free(tx: Tx, schema: Schema, category: Category, last: int) -> tuple[str, int]:
-    # Explicit numbers may stand in the way; they are few, so that a page of candidates is looked at a time.
+    # Numbers that people chose may be in the way; they are few, so 64 candidates are checked at a time.
     serial = last
     while True:
         page = {schema.number(category.code, n): n for n in range(serial + 1, serial + 65)}
@@ -166,7 +166,7 @@ _OWN = tuple(name for name in names_of(Item) if name not in ("schema", "texts", 
 
 
 def _columns(names: Sequence[str]) -> Callable[[Any], tuple[Any, ...]]:
-    # By place, in a third of the time of an attribute for each: a page reads 10 000 items.
+    # By place: this takes a third of the time of reading attributes, and a page reads 10 000 items.
     return itemgetter(*map(items.c.keys().index, names))
 
 
@@ -174,7 +174,7 @@ _texts, _made, _own = map(_columns, (_TEXTS, _MADE, _OWN))
 
 
 def to_item(row: Any) -> Item:
-    """Return a frozen item from its row, of all columns in their order."""
+    """Make an item from its row, which has all columns in their order."""
     schema, properties, offers, origins = _made(row)
     return Item(
         **dict(zip(_OWN, _own(row), strict=True)),
@@ -187,7 +187,9 @@ def to_item(row: Any) -> Item:
 
 
 def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: bool = False) -> Item:
-    """Return the item with this number, in whatever case; NotFoundError if there is none (or it is archived).
+    """Find the item with this number, in upper or lower case.
+
+    NotFoundError if there is none, or if it is archived.
 
     ``lock`` makes other writers of this item, and of its BOM, wait until this transaction ends, whose time
     is then later than that of the item's last change.
@@ -206,7 +208,7 @@ def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: 
 
 
 def get_by_uuid(tx: Tx, uuid: str) -> Item:
-    """Return the item with this UUID; NotFoundError when there is none or it is archived."""
+    """Find the item with this UUID; NotFoundError if there is none or it is archived."""
     row = tx.conn.execute(select(items).where(items.c.uuid == normal_uuid(uuid))).one_or_none()
     if row is None or row.archived_at:
         raise NotFoundError(f"no item has the UUID {uuid}")
@@ -214,7 +216,7 @@ def get_by_uuid(tx: Tx, uuid: str) -> Item:
 
 
 def get_by_uuids(tx: Tx, wanted: Sequence[str], *, include_archived: bool = False) -> list[Item]:
-    """Return the items with these UUIDs, each once, in the order asked; those that are missing are absent."""
+    """Find the items with these UUIDs, each once, in the order asked; unknown ones are absent."""
     uuids_asked = [normal for uuid in wanted if (normal := as_uuid(uuid))]
     query = select(items).where(one_of(tx, items.c.uuid, uuids_asked))
     rows = tx.conn.execute(query if include_archived else query.where(items.c.archived_at.is_(None))).all()
@@ -223,7 +225,7 @@ def get_by_uuids(tx: Tx, wanted: Sequence[str], *, include_archived: bool = Fals
 
 
 def get_by_numbers(tx: Tx, wanted: Sequence[str]) -> dict[str, Item]:
-    """Return the items with these part numbers (in whatever case), by the number as it was asked for."""
+    """Find items by part number, in upper or lower case; the keys are the numbers as they were given."""
     keys = {number: number.casefold() for number in wanted}
     rows = tx.conn.execute(
         select(items).where(
@@ -235,13 +237,13 @@ def get_by_numbers(tx: Tx, wanted: Sequence[str]) -> dict[str, Item]:
 
 
 def by_ids(tx: Tx, ids: Collection[int]) -> dict[int, Item]:
-    """Return items by their internal id, archived ones too."""
+    """Read items by their internal ids, archived ones too."""
     rows = tx.conn.execute(select(items).where(one_of(tx, items.c.id, ids))).all()
     return {row.id: to_item(row) for row in rows}
 
 
 def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
-    """Return a page of the items that match, best first, then by part number; and how many match in all."""
+    """Find a page of the items that match, best first, then by part number; and count all that match."""
     conditions: list[ColumnElement[bool]] = []
     if query.archived:
         conditions.append(items.c.archived_at.is_not(None))
@@ -298,7 +300,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     if number is None and category is not None:
         number = take_number(tx, schema, category)
     assert number is not None  # given, or of the category
-    # Older programs send the content of its file among the properties.
+    # Older programs send the SHA-256 of the item's file among the properties.
     properties = {name: value for name, value in new.properties.items() if name != "file_sha256"}
     made_from = new.properties.get("file_sha256")
     name, description = new.name.strip(), new.description.strip()
@@ -350,9 +352,9 @@ class ItemChange:
 
 
 def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | None = None) -> Item:
-    """Change an item in place; a revision is made only where ``properties`` are given (and differ).
+    """Change an item in place; only new ``properties`` that differ make a revision.
 
-    Raises VersionConflictError unless the item has the ``expected`` version, where that is given.
+    Raises VersionConflictError unless the item has the ``expected`` version, if that is given.
     """
     item = get_item(tx, part_number, lock=True)
     check_item_version(item, expected)
@@ -391,7 +393,7 @@ def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | No
 
 
 def _kept_from_cad(item: Item) -> list[str]:
-    """Return the facts that a person typed, or read from a scale: CAD does not replace them."""
+    """List the facts that a person typed, or read from a scale: CAD does not replace them."""
     return [n for n in FACTS if n in item.properties and item.origins.get(n, {}).get("source") != "cad"]
 
 
@@ -399,8 +401,11 @@ _FACT_WORDS = {"mass_kg": "mass", "size_m": "size", "volume_m3": "volume", "com_
 
 
 def fill_in(tx: Tx, part_number: str, stated: Stated, checksum: str) -> None:
-    """Give an item what its file states. What a person typed or a scale said stays. What CAD said before goes
-    if the file does not state it any more; a mass stays with size and material."""
+    """Update an item with what its file states.
+
+    What a person typed or a scale measured stays. A value that came from CAD is removed if the file does not
+    state it any more, but not if size and material are still the same.
+    """
     item = get_item(tx, part_number, lock=True)
     mine = set(FACTS) - set(_kept_from_cad(item))
     before = {name: value for name, value in item.properties.items() if name in mine}
@@ -447,7 +452,7 @@ def patch_properties(
     expected: int | None = None,
     source: FactSource = "hand",
 ) -> Item:
-    """Change the properties that a JSON merge patch (RFC 7386) names; a new revision where one differs."""
+    """Change the properties that a JSON merge patch (RFC 7386) names; a new revision if one differs."""
     check_json("properties", patch)
     item = get_item(tx, part_number, lock=True)
     merged = merge_patch(dict(item.properties), dict(patch))
@@ -456,7 +461,7 @@ def patch_properties(
 
 
 def archive_item(tx: Tx, part_number: str, expected: int | None = None) -> None:
-    """Archive an item: it keeps its number, its history and its place in BOMs, and is found no more."""
+    """Archive an item: it keeps its number, history and places in BOMs, but lists do not show it any more."""
     item = get_item(tx, part_number, lock=True)
     check_item_version(item, expected)
     archived = {"archived_at": tx.stamp, "version": items.c.version + 1}
@@ -476,7 +481,7 @@ def unarchive_item(tx: Tx, part_number: str) -> Item:
 
 
 def normal_uuid(uuid: str, field: str = "uuid") -> str:
-    """Return the UUID in its one written form; RejectedError, naming the field, where it is none."""
+    """Write a UUID in its one form; RejectedError, naming the field, if it is none."""
     normal = as_uuid(uuid)
     if not normal:
         raise RejectedError(
@@ -486,7 +491,7 @@ def normal_uuid(uuid: str, field: str = "uuid") -> str:
 
 
 def _made_before(tx: Tx, uuid: str) -> Item:
-    """Return the item that the same request made before; it may have been changed since."""
+    """Find the item that the same request made before; it may have changed since."""
     (item,) = get_by_uuids(tx, [uuid], include_archived=True)
     if item.archived_at:
         raise ConflictError(
@@ -522,7 +527,7 @@ def _item_type(given: str | None, category: Category | None) -> str:
 
 
 def _new_number(item: Item, given: str | None) -> str | None:
-    # A number from before a rule of today may stay.
+    # A number that is older than a rule may stay.
     return given if given is None or given == item.part_number else check_number(given)
 
 

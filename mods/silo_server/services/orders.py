@@ -111,33 +111,33 @@ class OrderRow(NamedTuple):
 
     @property
     def supplier(self) -> str:
-        """Return who sells it; "" if nobody is known."""
+        """Return the name of the supplier; "" if nobody is known."""
         return self.offer.of.supplier if self.offer else ""
 
     @property
     def mass(self) -> Decimal | None:
-        """Return the mass of one piece [kg]."""
+        """Read the mass of one piece [kg]; None if the part states none."""
         return own_worth(self.item.properties).mass
 
     @property
     def remarks(self) -> list[str]:
-        """Return what a purchaser must know about it, in words."""
-        said = list(self.doubts)
+        """List what a purchaser must know about the part, in words."""
+        remarks = list(self.doubts)
         if self.item.archived_at:
-            said.append("archived")
+            remarks.append("archived")
         if self.kind == BOUGHT and self.offer is None:
-            said.append("no supplier")
+            remarks.append("no supplier")
         elif self.offer is not None and self.needed:
             of = self.offer.of
             if self.offer.price is None:
                 least = of.prices[0][0] if of.prices else None
-                said.append("no price" if least is None else f"no price below {decimal_text(least)}")
+                remarks.append("no price" if least is None else f"no price below {decimal_text(least)}")
             elif self.offer.in_base is None:
-                said.append(f"no rate for {of.currency}")
+                remarks.append(f"no rate for {of.currency}")
             if self.offer.cheaper is not None:
                 more, cost = self.offer.cheaper
-                said.append(f"{decimal_text(more)} would cost less: {decimal_text(cost)} {of.currency}")
-        return said
+                remarks.append(f"{decimal_text(more)} would cost less: {decimal_text(cost)} {of.currency}")
+        return remarks
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,12 +166,12 @@ class OrderList:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Return how many parts are bought, are made, and how many nobody called either."""
+        """Count the parts by kind: bought, made, and those that nobody called either."""
         return {BOUGHT: 0, MADE: 0, UNSAID: 0} | Counter(row.kind for row in self.rows)
 
     @property
     def by_supplier(self) -> list[OrderRow]:
-        """Return the rows as people read them: bought by supplier, the rest of them, made, the others."""
+        """Sort the rows for people: bought parts by supplier, those without one, made parts, the others."""
 
         def place(row: OrderRow) -> tuple[object, ...]:
             return (BOUGHT, MADE, UNSAID).index(row.kind), not row.supplier, row.supplier.casefold()
@@ -180,7 +180,7 @@ class OrderList:
 
 
 def order_list(tx: Tx, part_number: str, asked: OrderRequest) -> OrderList:
-    """Work the list out. Raises NotFoundError, CycleError, ConflictError, TooLargeError."""
+    """Make the order list. Raises NotFoundError, CycleError, ConflictError, TooLargeError."""
     product = get_item(tx, part_number, include_archived=bool(asked.release))
     release = get_release(tx, product, asked.release) if asked.release else None
     if release:
@@ -229,7 +229,7 @@ def _row(
 def _state(
     tx: Tx, product: Item, release: Release | None, summary: Summary | None, graph: Graph
 ) -> tuple[str, list[str]]:
-    """Return what the list is of, and what a reader must know first."""
+    """Describe what the list is of, and what a reader must know first."""
     if release is not None:
         state = f"Revision {release.label}, {release.status}, frozen at {wire(release.frozen_at)}"
         warnings = (
@@ -285,9 +285,7 @@ def _summed(
 
 
 def _ids_of(tx: Tx, items_by_id: Mapping[int, Item]) -> dict[int, int]:
-    """Return the internal ids of items that were frozen, by the number that they have in the frozen
-    product.
-    """
+    """Find the internal ids of frozen items, by their number in the frozen product."""
     query = select(items.c.uuid, items.c.id).where(
         one_of(tx, items.c.uuid, {part.uuid for part in items_by_id.values()})
     )
@@ -296,8 +294,7 @@ def _ids_of(tx: Tx, items_by_id: Mapping[int, Item]) -> dict[int, int]:
 
 
 def _files(tx: Tx, item_ids: Collection[int], release: Release | None) -> dict[int, list[PartFile]]:
-    """Return the files that each item is in, the newest of each kind: its drawing, its STEP, its FreeCAD
-    file.
+    """Find the files that each item is in, the newest of each kind: drawing, STEP, FreeCAD file.
 
     Revisions are never changed, so those until a product was frozen are those of its release.
     """
@@ -353,7 +350,7 @@ class NewOrder(NamedTuple):
 def record(
     tx: Tx, part_number: str, ordered: Sequence[NewOrder], note: str = ""
 ) -> list[tuple[Recorded, str]]:
-    """Note what was ordered for a product, as :func:`list_recorded` has it. RejectedError for nothing."""
+    """Record what was ordered for a product. Returns as :func:`list_recorded`; RejectedError for nothing."""
     if not ordered:
         raise RejectedError(
             "wanted at least one part with a quantity above 0, got none; nothing was recorded"
@@ -379,7 +376,7 @@ def record(
 
 
 def take_back(tx: Tx, part_number: str, order_id: int) -> Recorded:
-    """Say that something was not ordered after all; it stays in the list. NotFoundError, ConflictError."""
+    """Record that an order was not placed after all; it stays in the list. NotFoundError, ConflictError."""
     recorded = list_recorded(tx, [order_id], get_item(tx, part_number, include_archived=True))
     if not recorded:
         raise NotFoundError(f"there is no order {order_id} for {part_number}")
@@ -394,7 +391,7 @@ def take_back(tx: Tx, part_number: str, order_id: int) -> Recorded:
 def list_recorded(
     tx: Tx, ids: Collection[int] | None = None, product: Item | None = None, limit: int = 1000
 ) -> list[tuple[Recorded, str]]:
-    """Return what was ordered, newest first, each with its part number: these, or those for a product."""
+    """Read what was ordered, newest first, each with its part number: these, or those for a product."""
     query = select(orders, items.c.part_number).join(items, items.c.id == orders.c.item_id)
     if ids is not None:
         query = query.where(one_of(tx, orders.c.id, ids))
@@ -409,10 +406,10 @@ def _ordered(tx: Tx, product: Item) -> dict[tuple[int | None, str | None], Decim
     query = select(row.item_id, row.unit, row.quantity).where(
         row.product_id == product.id, row.ended_at.is_(None)
     )
-    result: dict[tuple[int | None, str | None], Decimal] = {}
+    amounts: dict[tuple[int | None, str | None], Decimal] = {}
     for item_id, unit, quantity in tx.conn.execute(query):
-        result[item_id, unit] = exact_sum((result.get((item_id, unit), Decimal(0)), Decimal(quantity)))
-    return result
+        amounts[item_id, unit] = exact_sum((amounts.get((item_id, unit), Decimal(0)), Decimal(quantity)))
+    return amounts
 
 
 # --- As a table ---
@@ -429,7 +426,7 @@ _MADE = (
 
 
 def export_orders(order: OrderList, kind: str, supplier: str | None = None) -> Export:
-    """Return the list, or what is ordered from one supplier, to be written as a table."""
+    """Export the parts of a kind as a table; with ``supplier`` only those from this supplier."""
     rows = [row for row in order.rows if row.kind == kind and supplier in (None, row.supplier)]
     asked = order.asked
     what = f"For {asked.pieces} of {order.product.part_number} {order.product.name}".strip()

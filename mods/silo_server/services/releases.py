@@ -94,9 +94,7 @@ class FrozenProduct(NamedTuple):
 
 
 def labels(scheme: str) -> Iterator[str]:
-    """Yield all labels of a scheme in their order: ``letters`` A, B, …, Z, AA, … or ``numbers`` 1.0,
-    2.0, …
-    """
+    """Yield the labels of a scheme in order: ``letters`` A, B, …, Z, AA, … or ``numbers`` 1.0, 2.0, …"""
     if scheme == "numbers":
         yield from (f"{number}.0" for number in count(1))
     for length in count(1):
@@ -104,7 +102,7 @@ def labels(scheme: str) -> Iterator[str]:
 
 
 def next_label(taken: Collection[str], scheme: str) -> str:
-    """Return the label after the last of the scheme that is taken."""
+    """Find the label that comes after the last taken one in the scheme."""
     # Beyond so many labels of the scheme none can be taken.
     first = list(islice(labels(scheme), len(taken) + 1000))
     last = max((place for place, label in enumerate(first) if label in taken), default=-1)
@@ -112,10 +110,10 @@ def next_label(taken: Collection[str], scheme: str) -> str:
 
 
 def list_releases(tx: Tx, item: Item) -> list[Release]:
-    """Return all that was ever submitted of an item, newest first."""
+    """Read all revisions of an item that were ever submitted, newest first."""
     row = releases.c
-    result = tx.conn.execute(select(releases).where(row.item_id == item.id).order_by(row.id.desc()))
-    return [_release(record) for record in result]
+    rows = tx.conn.execute(select(releases).where(row.item_id == item.id).order_by(row.id.desc()))
+    return [_release(record) for record in rows]
 
 
 def _release(row: Any) -> Release:
@@ -123,7 +121,7 @@ def _release(row: Any) -> Release:
 
 
 def find_release(tx: Tx, item: Item, label: str) -> Release | None:
-    """Return the revision with this label; None if there is none."""
+    """Find the revision with this label; None if there is none."""
     if character_problem(label):
         return None  # PostgreSQL refuses to look for some of these
     row = releases.c
@@ -134,7 +132,7 @@ def find_release(tx: Tx, item: Item, label: str) -> Release | None:
 
 
 def get_release(tx: Tx, item: Item, label: str) -> Release:
-    """Return the revision with this label. Raises NotFoundError."""
+    """Find the revision with this label. Raises NotFoundError."""
     release = find_release(tx, item, label)
     if release is None:
         there = ", ".join(other.label for other in list_releases(tx, item) if other.status in NUMBERED)
@@ -143,14 +141,14 @@ def get_release(tx: Tx, item: Item, label: str) -> Release:
 
 
 def approvals_of(tx: Tx, release: Release) -> list[Approval]:
-    """Return who approved, in order."""
+    """Read the approvals of a revision, in order."""
     row = release_approvals.c
     query = select(release_approvals).where(row.release_id == release.id).order_by(row.at)
     return [from_row(Approval, record) for record in tx.conn.execute(query)]
 
 
 def newest_release(tx: Tx, item: Item) -> Release | None:
-    """Return the revision that is released now; None if none is."""
+    """Find the revision that is released now; None if none is."""
     row = releases.c
     query = select(releases).where(row.item_id == item.id, row.status == "released")
     rows = tx.conn.execute(query.order_by(row.id.desc()).limit(1)).one_or_none()
@@ -158,19 +156,19 @@ def newest_release(tx: Tx, item: Item) -> Release | None:
 
 
 def coming_label(tx: Tx, item: Item) -> str:
-    """Return the label of the draft that the item is now."""
+    """Find the label that the present draft of an item will get."""
     taken = [release.label for release in list_releases(tx, item) if release.status in NUMBERED]
     return next_label(taken, tx.settings.release_labels)
 
 
 def draft_of(tx: Tx, item: Item) -> dict[str, str] | None:
-    """Return what a change of a released item says: the draft that it is part of, and what stays released."""
+    """Name the draft that a change of a released item is part of, and what stays released; or None."""
     released = newest_release(tx, item)
     return {"label": coming_label(tx, item), "released": released.label} if released else None
 
 
 def item_of(made: Mapping[str, Any], number: int = 0, at: str = "", by: str = "") -> Item:
-    """Return an item as it was frozen, from its record."""
+    """Make an item as it was frozen, from its record."""
     return Item(
         id=number,
         uuid=made["item"],
@@ -196,7 +194,7 @@ def item_of(made: Mapping[str, Any], number: int = 0, at: str = "", by: str = ""
 
 
 def unreleased_parts(tx: Tx, record: str) -> list[str]:
-    """Return the part numbers in a frozen product with a file or lines that are not released like that."""
+    """Find parts of our own in a frozen product, with a file or lines, that are not released like that."""
     records = read_records(tx, record)
     wanted = {
         uuid
@@ -210,7 +208,7 @@ def unreleased_parts(tx: Tx, record: str) -> list[str]:
 
 
 def blocks_of(tx: Tx, release: Release) -> list[str]:
-    """Return what keeps a submission from being released, in sentences."""
+    """List what keeps a submission from being released, in sentences."""
     parts = [] if release.with_parts else unreleased_parts(tx, release.record)
     return [*release.blocks, *(f"{part}: not released as it is in this product" for part in parts)]
 
@@ -270,7 +268,7 @@ def _keep(tx: Tx, records: Mapping[str, str]) -> None:
 
 
 def approve(tx: Tx, part_number: str, label: str, comment: str, override: str = "") -> Release:
-    """Approve what is in review; the last approval that the site asks for releases it.
+    """Approve a revision in review; the last approval that the site requires releases it.
 
     override
         why it is released in spite of what blocks.
@@ -329,7 +327,7 @@ def _release_parts(tx: Tx, release: Release, comment: str) -> None:
 
 
 def end(tx: Tx, part_number: str, label: str, status: str, note: str) -> Release:
-    """Reject or withdraw what is in review, or call a released revision obsolete, with a comment."""
+    """Reject or withdraw a revision in review, or call a released one obsolete, with a comment."""
     if status == "withdrawn" and not tx.actor.role.covers(Role.EDITOR):
         raise ForbiddenError(f"{tx.actor.username} is {tx.actor.role}, this needs editor")
     if status == "obsolete":
@@ -382,14 +380,14 @@ def _announce(tx: Tx, item: Item, release: Release, what: str) -> None:
 
 
 def read_record(tx: Tx, record: str) -> dict[str, Any]:
-    """Return one frozen item, by its hash."""
+    """Read one frozen item by its hash."""
     row = tx.conn.execute(select(frozen_items.c.record).where(frozen_items.c.hash == record)).one()
-    result: dict[str, Any] = json.loads(row.record)
-    return result
+    frozen: dict[str, Any] = json.loads(row.record)
+    return frozen
 
 
 def read_records(tx: Tx, record: str) -> dict[str, dict[str, Any]]:
-    """Return a frozen item and all that is in it, by their hashes, itself first. Raises TooLargeError."""
+    """Read a frozen item and all that is in it, by their hashes, itself first. Raises TooLargeError."""
     records: dict[str, dict[str, Any]] = {}
     level, lines = {record}, 0
     while level:

@@ -66,7 +66,7 @@ class ShownDocument:
 
 
 def find_document(tx: Tx, uuid: str, *, lock: bool = False) -> Document | None:
-    """Return the document with this UUID; None if there is none.
+    """Find the document with this UUID; None if there is none.
 
     ``lock`` makes other writers of it wait until this transaction ends.
     """
@@ -77,7 +77,7 @@ def find_document(tx: Tx, uuid: str, *, lock: bool = False) -> Document | None:
 
 
 def get_document(tx: Tx, uuid: str) -> Document:
-    """Return the document with this UUID. Raises NotFoundError."""
+    """Find the document with this UUID. Raises NotFoundError."""
     document = find_document(tx, uuid)
     if document is None:
         raise NotFoundError(f"no document has the UUID {uuid}")
@@ -85,7 +85,7 @@ def get_document(tx: Tx, uuid: str) -> Document:
 
 
 def document_of(tx: Tx, item: Item) -> Document:
-    """Return the document of an item; its first file makes it. The caller holds the item's lock."""
+    """Find the document of an item, or make it. The caller holds the item's lock."""
     row = tx.conn.execute(select(documents).where(documents.c.item_id == item.id)).one_or_none()
     if row is not None:
         return from_row(Document, row)
@@ -108,8 +108,11 @@ def note_revision(
     links: Iterable[Mapping[str, str]],
     held: Iterable[Mapping[str, str]],
 ) -> None:
-    """Note a new revision of a document: what it links to and which items are in it. Unknown items are left
-    out: the server may not have them yet."""
+    """Note what a new revision of a document links to, and which items are in it.
+
+    Unknown items are left out: the server may not have them yet. Pictures that a browser drew of the items in
+    an older file are removed.
+    """
     tx.conn.execute(update(documents).where(documents.c.id == document.id).values(current_revision=number))
     for table in (document_items, document_links):
         tx.conn.execute(delete(table).where(table.c.document_id == document.id))
@@ -134,7 +137,7 @@ def note_revision(
 
 
 def keep_picture(tx: Tx, store: FileStore, item: Item, picture: bytes) -> None:
-    """Give an item without a picture a PNG that a browser drew. Raises RejectedError, DuplicateError."""
+    """Store a PNG that a browser drew, for an item without a picture. RejectedError, DuplicateError."""
     size = png_size(picture)
     if len(picture) > MAX_DRAWN or not size:
         raise RejectedError(f"picture: wanted a whole PNG of at most {MAX_DRAWN // 1024} KiB, got another")
@@ -147,7 +150,7 @@ def keep_picture(tx: Tx, store: FileStore, item: Item, picture: bytes) -> None:
 
 
 def documents_holding(tx: Tx, item: Item) -> list[Document]:
-    """Return the documents whose newest revision holds an item, its own first."""
+    """Find the documents whose newest revision holds an item, its own first."""
     query = select(documents).where(
         documents.c.id.in_(select(document_items.c.document_id).where(document_items.c.item_id == item.id))
     )
@@ -156,27 +159,27 @@ def documents_holding(tx: Tx, item: Item) -> list[Document]:
 
 
 def linking_to(tx: Tx, document: Document) -> list[Document]:
-    """Return the documents whose newest revision links to this one."""
+    """Find the documents whose newest revision links to this one."""
     sources = select(document_links.c.document_id).where(document_links.c.target == document.uuid)
     query = select(documents).where(documents.c.id.in_(sources)).order_by(documents.c.id)
     return [from_row(Document, row) for row in tx.conn.execute(query)]
 
 
 def linked_from(tx: Tx, document: Document) -> list[Document]:
-    """Return the documents that the newest revision of this one links to."""
+    """Find the documents that the newest revision of this one links to."""
     targets = select(document_links.c.target).where(document_links.c.document_id == document.id)
     query = select(documents).where(documents.c.uuid.in_(targets)).order_by(documents.c.id)
     return [from_row(Document, row) for row in tx.conn.execute(query)]
 
 
 def documents_by_uuid(tx: Tx, wanted: Sequence[str]) -> list[Document]:
-    """Return the documents with these UUIDs; those that are missing are absent."""
+    """Find the documents with these UUIDs; unknown ones are absent."""
     query = select(documents).where(one_of(tx, documents.c.uuid, {uuid.lower() for uuid in wanted}))
     return [from_row(Document, row) for row in tx.conn.execute(query.order_by(documents.c.id))]
 
 
 def shown(tx: Tx, several: Sequence[Document]) -> list[ShownDocument]:
-    """Return documents as they are now, in the order given; one without a file yet is left out."""
+    """Read documents as they are now, in the order given; documents without a file are left out."""
     ids = [holder.id for holder in several]
     newest = (
         select(documents.c.id.label("of"), documents.c.uuid, items.c.part_number, revisions)
@@ -244,8 +247,9 @@ def add_revision(
     origin: RevisionOrigin = RevisionOrigin(),
     source: FactSource = "hand",
 ) -> Revision:
-    """Append a revision of an item, or of a document without one. Without ``properties`` it carries those of
-    the one before on.
+    """Append a revision to an item, or to a document without an item.
+
+    Without ``properties`` it has those of the revision before.
 
     source
         where mass, material and the like come from, if they differ.
@@ -299,7 +303,7 @@ def add_revision(
 def _keep(
     tx: Tx, item: Item, properties: Mapping[str, Any], source: FactSource, changed: Mapping[str, Any]
 ) -> None:
-    """Give an item its properties, with where they come from, and other values that changed."""
+    """Store the properties of an item, with where they come from, and other values that changed."""
     now = {**properties, **changed}
     new = {name for name in FACTS if properties.get(name) != item.properties.get(name)}
     new |= {"description"} & changed.keys()
@@ -314,7 +318,7 @@ def _keep(
 def complete(
     tx: Tx, item: Item, checksum: str, properties: Mapping[str, Any], changed: Mapping[str, Any]
 ) -> None:
-    """Give an item what its file states, in the revision of that file; after a later one in a new one."""
+    """Store what an item's file states: in the file's revision or, if there is a later one, in a new one."""
     last = get_revision(tx, item, item.current_revision) if item.current_revision else None
     if last is not None and last.file_checksum != checksum and properties != item.properties:
         add_revision(tx, item, comment="as its file states", properties=properties, source="cad")
@@ -337,8 +341,8 @@ def _check_base(tx: Tx, of: Item | Document, base: int | None, checksum: str | N
 
 
 def check_document(tx: Tx, item: Item, base: int | None, checksum: str | None) -> None:
-    """Raise :class:`NewerRevisionError` where a BOM is that of an older file and would undo the newest one's,
-    :class:`MissingRevisionError` where its file is not here (:func:`silo.bom.compare.base_of`)."""
+    """Raise :class:`NewerRevisionError` if a BOM is that of an older file and would undo the newest one's,
+    :class:`MissingRevisionError` if its file is not here (:func:`silo.bom.compare.base_of`)."""
     same = select(func.max(revisions.c.revision_number)).where(
         revisions.c.item_id == item.id, revisions.c.file_checksum == checksum
     )
@@ -354,10 +358,10 @@ def list_revisions(
     after: int = 0,
     skip: int = 0,
 ) -> tuple[list[Revision], int]:
-    """Return at most ``limit`` of the revisions below ``before`` and above ``after``, newest first, without
-    ``skip`` ones.
+    """Read revisions below ``before`` and above ``after``, newest first.
 
-    And how many revisions above ``after`` there are in all.
+    At most ``limit`` of them, without the first ``skip``. Also returns how many revisions above ``after``
+    there are in all.
     """
     wanted = _of(of) & (revisions.c.revision_number > after)
     total = tx.conn.scalar(select(func.count()).select_from(revisions).where(wanted)) or 0
@@ -370,7 +374,7 @@ def list_revisions(
 
 
 def get_revision(tx: Tx, of: Item | Document, number: int) -> Revision:
-    """Return one revision; NotFoundError if there is none."""
+    """Read one revision; NotFoundError if there is none."""
     row = tx.conn.execute(
         select(revisions).where(_of(of), revisions.c.revision_number == number)
     ).one_or_none()
@@ -380,11 +384,11 @@ def get_revision(tx: Tx, of: Item | Document, number: int) -> Revision:
 
 
 def with_file(tx: Tx, of: Item | Document) -> Item | Document:
-    """Return whose revisions have the file: the item, or the document that holds it. NotFoundError."""
+    """Find what has the file: the item or document itself, or the document that holds it. NotFoundError."""
     holders = documents_holding(tx, of) if isinstance(of, Item) else []
-    for one in (of, *holders):
-        if _newest_file(tx, one) is not None:
-            return one
+    for holder in (of, *holders):
+        if _newest_file(tx, holder) is not None:
+            return holder
     raise NotFoundError(f"{of.subject} has no file yet")
 
 
@@ -394,14 +398,14 @@ def has_file(tx: Tx, item: Item) -> bool:
 
 
 def newest_file(tx: Tx, of: Item | Document) -> Revision:
-    """Return the newest revision with a file. Raises NotFoundError."""
+    """Read the newest revision with a file. Raises NotFoundError."""
     newest = _newest_file(tx, with_file(tx, of))
     assert newest is not None
     return newest
 
 
 def files_until(tx: Tx, item: Item, until: str, limit: int = 1) -> list[int]:
-    """Return the numbers of the ``limit`` newest revisions with a file that were there at a time."""
+    """Find the numbers of the ``limit`` newest revisions with a file that were there at a time."""
     try:
         of = with_file(tx, item)
     except NotFoundError:
@@ -429,9 +433,7 @@ def _to_revision(row: Row[Any]) -> Revision:
 
 
 def revision_to_wire(of: Item | Document, revision: Revision, *, links: bool = False) -> dict[str, Any]:
-    """Return a revision, under the contract's names; its links only where they are wanted, there may be
-    many.
-    """
+    """Return a revision as the API sends it; its links only if wanted, as there may be many."""
     number = of.part_number if isinstance(of, Item) else ""
     return {"part_number": number, **to_wire(revision, *(() if links else ("links",)))}
 
@@ -458,7 +460,7 @@ class FileStore:
         self.root = root
 
     def path_of(self, checksum: str) -> Path:
-        """Return where the file with this hash lies; NotFoundError if it does not."""
+        """Return the path of the file with this hash; NotFoundError if it is not there."""
         path = self._place(checksum)
         if not path.is_file():
             raise NotFoundError(f"the file with SHA-256 {checksum} is not in this server's store")
@@ -480,9 +482,9 @@ class FileStore:
             return False
 
     def renew(self, checksum: str) -> bool:
-        """Return True if the file with this hash is here and undamaged; it counts as new then.
+        """Make the file with this hash count as new; return True if it is here and undamaged.
 
-        For those who are about to refer to it: nobody collects it meanwhile as one that is old and unused.
+        For callers that are about to refer to it: meanwhile nobody deletes it as old and unused.
         """
         try:
             os.utime(self._place(checksum))
@@ -491,7 +493,7 @@ class FileStore:
         return self.holds(checksum)
 
     def copy_from(self, other: FileStore, checksum: str) -> bool:
-        """Take a file over from another store; False where it does not have it, or has it damaged."""
+        """Copy a file from another store; False if it is missing or damaged there."""
         try:
             source = other._place(checksum).open("rb")
         except OSError:
@@ -500,7 +502,7 @@ class FileStore:
             return self._write(iter(lambda: source.read(CHUNK), b""), wanted=checksum)[0] == checksum
 
     def older_than(self, before: float) -> list[Path]:
-        """Return what came before this time (seconds since 1970), half-written uploads too."""
+        """Find all files that came before this time (seconds since 1970), half-written uploads too."""
         if not self.root.is_dir():
             return []
         paths = [path for path in self.root.glob("??/??/*") if _came_before(path, before)]
@@ -509,7 +511,7 @@ class FileStore:
         return paths
 
     def remove_old(self, path: Path, before: float) -> bool:
-        """Delete what :meth:`older_than` named; False where the same content was uploaded again meanwhile."""
+        """Delete a file of :meth:`older_than`; False if the same content was uploaded again meanwhile."""
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
             return True
@@ -530,7 +532,7 @@ class FileStore:
         return False
 
     def state(self, wanted: int) -> str:
-        """Return ``ok``; ``unwritable``; ``full`` where fewer than ``wanted`` bytes are free."""
+        """Check the store: ``ok``; ``unwritable``; ``full`` if fewer than ``wanted`` bytes are free."""
         try:
             self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
             free = shutil.disk_usage(self.root).free
@@ -541,7 +543,7 @@ class FileStore:
         return "ok" if free >= wanted else "full"
 
     def free(self) -> float:
-        """Free bytes on its disk; NaN where nobody can say."""
+        """Return the free bytes on the store's disk; NaN if that is unknown."""
         try:
             return float(shutil.disk_usage(self.root).free)
         except OSError:
@@ -551,7 +553,7 @@ class FileStore:
         return self.root / checksum[:2] / checksum[2:4] / checksum
 
     def _write(self, chunks: Iterable[bytes], wanted: str | None = None) -> tuple[str, int]:
-        """Return (hash, size); a content whose hash is not the one ``wanted`` is not kept."""
+        """Store a content; return (hash, size). If its hash is not the one ``wanted``, it is not kept."""
         self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
         digest, size = hashlib.sha256(), 0
         handle, name = tempfile.mkstemp(dir=self.root, prefix="upload-")
@@ -589,7 +591,7 @@ def _came_before(path: Path, before: float) -> bool:
 
 
 def clean_name(name: str) -> str:
-    """Return the last part of a file name without control characters; what a download is called."""
+    """Make the name of a download: the last part of a file name, without control characters."""
     last = name.replace("\\", "/").rpartition("/")[2]
     cleaned = "".join(c for c in last if c.isprintable()).strip(" .")
     # A person on Windows cannot save a download that is called CON.
@@ -597,7 +599,7 @@ def clean_name(name: str) -> str:
 
 
 def read_thumbnail(path: Path) -> bytes | None:
-    """Return the picture inside an untrusted FCStd file; None if it has none but FreeCAD's icon."""
+    """Read the picture in an untrusted FCStd file; None if there is none, or only FreeCAD's icon."""
     try:
         if _directory_size(path) > MAX_DIRECTORY:
             return None
@@ -618,7 +620,7 @@ def read_thumbnail(path: Path) -> bytes | None:
 
 
 def png_size(picture: bytes) -> tuple[int, int] | None:
-    """Return width and height of a PNG [pixels]; None if it is none, or its parts do not fill it."""
+    """Read width and height of a PNG [pixels]; None if it is no PNG, or its parts do not fill it."""
     if not picture.startswith(PNG + PNG_HEAD) or not picture.endswith(PNG_END):
         return None
     place = len(PNG)
@@ -629,9 +631,7 @@ def png_size(picture: bytes) -> tuple[int, int] | None:
 
 
 def _directory_size(path: Path) -> int:
-    """Return the bytes of a zip's directory by its end record; a huge number for ZIP64, 0 if this is no
-    zip.
-    """
+    """Read the size of a zip's directory [bytes]; a huge number for ZIP64, 0 if this is no zip."""
     with path.open("rb") as source:
         length = source.seek(0, os.SEEK_END)
         source.seek(max(0, length - END_SIZE - 0xFFFF))

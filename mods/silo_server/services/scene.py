@@ -42,7 +42,7 @@ MAX_VERTICES = 10_000_000
 
 
 def missing(tx: Tx, checksums: Collection[str]) -> list[str]:
-    """Return which of these contents are files of revisions and lack geometry or structure."""
+    """Find which of these contents are files of revisions and lack geometry or structure."""
     where = select(models.c.file_checksum).where(
         models.c.geometry.is_not(None), models.c.structure.is_not(None)
     )
@@ -51,7 +51,7 @@ def missing(tx: Tx, checksums: Collection[str]) -> list[str]:
 
 
 def unpacked(part: Part, body: bytes, packed: bool) -> bytes:
-    """Return a body that may be gzip. Raises TooLargeError, RejectedError."""
+    """Unpack a body that may be gzip. Raises TooLargeError, RejectedError."""
     most = UNPACKED[part]
     if packed:
         reader = zlib.decompressobj(wbits=31)
@@ -95,14 +95,14 @@ _held = (
 
 
 def with_model(tx: Tx, item_ids: Collection[int]) -> set[int]:
-    """Return which of these items have a model."""
+    """Find which of these items have a model."""
     of = _held.join(models, models.c.file_checksum == revisions.c.file_checksum)
     query = select(item_rows.c.id).select_from(of).where(models.c.structure.is_not(None))
     return set(tx.conn.scalars(query.where(one_of(tx, item_rows.c.id, item_ids))))
 
 
 def fill_in(tx: Tx, store: FileStore, checksum: str) -> None:
-    """Give the items of which this is the newest file what it states of them."""
+    """Update the items whose newest file this is with what the file states of them."""
     kept = tx.conn.scalar(select(models.c.structure).where(models.c.file_checksum == checksum))
     structure = _structure(store, kept) if kept is not None else None
     held = (
@@ -120,7 +120,7 @@ def fill_in(tx: Tx, store: FileStore, checksum: str) -> None:
 
 
 def _structure(store: FileStore, checksum: str) -> wire.Structure | None:
-    """Return a structure of the store; None if the store has lost it."""
+    """Read a structure from the store; None if the store has lost it."""
     try:
         body = gzip.decompress(store.path_of(checksum).read_bytes())
     except (OSError, NotFoundError):
@@ -129,7 +129,7 @@ def _structure(store: FileStore, checksum: str) -> wire.Structure | None:
 
 
 def stored(tx: Tx, checksum: str, part: Part) -> str:
-    """Return the hash of a part in the store. Raises NotFoundError."""
+    """Find the hash of a part in the store. Raises NotFoundError."""
     value = tx.conn.scalar(select(models.c[part]).where(models.c.file_checksum == checksum))
     if value is None:
         raise NotFoundError(f"the file with the SHA-256 {checksum} has no {part} yet")
@@ -137,7 +137,7 @@ def stored(tx: Tx, checksum: str, part: Part) -> str:
 
 
 def check_structure(body: bytes) -> wire.Structure:
-    """Return the structure of a file. Raises RejectedError."""
+    """Read and check the structure of a file. Raises RejectedError."""
     try:
         structure = wire.Structure.model_validate_json(body)
     except (ValidationError, ValueError) as error:
@@ -299,7 +299,7 @@ class File:
 
 
 def scene(tx: Tx, store: FileStore, item: Item, number: int | None) -> dict[str, Any]:
-    """Return where each part of an item stands, in the newest files; or as revision ``number`` recorded them.
+    """Find the place of each part of an item, in the newest files or as revision ``number`` recorded it.
 
     Raises NotFoundError if the item has no such file, TooLargeError.
     """
@@ -375,7 +375,7 @@ def _target(link: Mapping[str, str]) -> str:
 
 
 def _newest(tx: Tx, uuids: set[str]) -> dict[str, str]:
-    """Return document → the content of its newest file."""
+    """Find the content of the newest file of each document, by the document's UUID."""
     query = (
         select(documents.c.uuid, revisions.c.file_checksum)
         .join(revisions, revisions.c.document_id == documents.c.id)
@@ -408,7 +408,7 @@ class Joined:
         self._open: set[tuple[str, str]] = set()
 
     def lacks(self, uuid: str, label: str, why: str) -> None:
-        """Note what cannot be shown."""
+        """Note a part that cannot be shown, and why."""
         self.missing.append({"part_number": uuid, "label": label, "why": why})
 
     def below(
@@ -420,7 +420,7 @@ class Joined:
         lines: tuple[str, ...] = (),
         color: list[float] | None = None,
     ) -> None:
-        """Note each occurrence below a product, and its own shape."""
+        """Note the shape of a product itself, and each occurrence below it."""
         product = file.products[key]
         self._steps += 1
         if self._steps > MAX_OCCURRENCES:

@@ -60,13 +60,14 @@ _vectors = table("item_search", column("item_id", Integer), column("words", TSVE
 
 
 def words_of(written: str) -> list[str]:
-    """Return the words of a text as the index has them."""
+    """Split a text into words as the index has them."""
     return [word[:LONGEST_WORD] for word in _WORD.findall(folded(written))]
 
 
 def fits(asked: str) -> Callable[..., bool]:
-    """Return a test of texts: true where every word of ``asked`` is in one of them, without case and
-    accents.
+    """Make a test of texts: true if every word of ``asked`` is in one of them.
+
+    Case and accents do not count.
     """
     wanted = words_of(asked)
 
@@ -85,16 +86,15 @@ def fits(asked: str) -> Callable[..., bool]:
 
 @lru_cache(maxsize=16384)
 def _read(text: str) -> tuple[str, str]:
-    """Return the words of a text, with spaces between them and without; the caller filters again."""
+    """Join the words of a text, with spaces between them and without; cached, as filters come again."""
     words = words_of(text)
     return " ".join(words), "".join(words)
 
 
 def search_for(tx: Tx, written: str) -> tuple[ColumnElement[bool], ColumnElement[int]] | None:
-    """Return what finds the items with all words of ``written``: a condition on ``items``, and what to order
-    by.
+    """Make the query for all words of ``written``: a condition on ``items``, and what to sort by.
 
-    None where it says nothing to search for.
+    None if there is nothing to search for.
 
     A single letter or digit finds the numbers that begin with it. A SHA-256 finds the items that have, or
     had, the file with this content, or were registered from it. Best first: the very number, then the words
@@ -138,14 +138,14 @@ def index_item(tx: Tx, item_id: int) -> None:
 
 
 def ensure_index(tx: Tx) -> int:
-    """Make the whole index where there is none yet, or one by other rules; how many items were indexed."""
+    """Make the index if there is none, or one of older rules; return how many items were indexed."""
     if get_state(tx, STATE) == RULES:
         return 0
     return rebuild_index(tx)
 
 
 def rebuild_index(tx: Tx) -> int:
-    """Make the whole index again."""
+    """Make the whole index again; return how many items were indexed."""
     tx.conn.execute(text("DELETE FROM item_search"))
     count = last = 0
     while True:
@@ -227,8 +227,9 @@ def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
 
 
 def _matches(tx: Tx, words: Iterable[str], where: str) -> ColumnElement[bool]:
-    """Return the condition that an item has all ``words`` (their beginnings), ``where``: in these columns of
-    the index, or in any.
+    """Make the condition that an item has all ``words`` or words that begin so.
+
+    ``where`` names the columns of the index; "": in any.
     """
     if tx.postgres:
         weights = {"": "", "number": "A", "number name": "AB"}[where]
@@ -244,7 +245,7 @@ def _matches(tx: Tx, words: Iterable[str], where: str) -> ColumnElement[bool]:
 
 
 def _vector(*parts: tuple[set[str], str]) -> str:
-    # All of a weight stand at one place: the order of words is of no matter here.
+    # All words of a weight have one place: their order does not matter here.
     places: dict[str, list[str]] = {}
     for number, (words, weight) in enumerate(parts, start=1):
         for word in words:
@@ -257,11 +258,11 @@ def _joined(number: str) -> str:
 
 
 def _inner(words: Iterable[str]) -> set[str]:
-    """Return words and their ends, so that the beginning of an end, which is any part of a word, is found."""
-    result: set[str] = set()
+    """Collect words and their ends: a search for beginnings then finds any part of a word."""
+    ends: set[str] = set()
     for word in list(filter(None, words))[:MOST_WORDS]:  # a number of signs alone has no word
-        result |= _ends(word)
-    return result
+        ends |= _ends(word)
+    return ends
 
 
 @lru_cache(maxsize=4096)
@@ -287,13 +288,13 @@ def _limited(texts: Iterable[str], properties: str) -> set[str]:
 def _texts(value: Any) -> Iterator[str]:
     waiting = [value]
     while waiting:
-        one = waiting.pop()
-        if isinstance(one, Mapping):
-            waiting += one.values()
-        elif isinstance(one, list):
-            waiting += one
-        elif isinstance(one, str) and len(one) <= LONGEST_PROPERTY:
-            yield one
+        part = waiting.pop()
+        if isinstance(part, Mapping):
+            waiting += part.values()
+        elif isinstance(part, list):
+            waiting += part
+        elif isinstance(part, str) and len(part) <= LONGEST_PROPERTY:
+            yield part
 
 
 MOST_LOOK_ALIKES = 12

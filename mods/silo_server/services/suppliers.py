@@ -105,11 +105,11 @@ class SupplierPart(NamedTuple):
 
     @property
     def key(self) -> tuple[str, str]:
-        """Return what no two of an item may share."""
+        """Return what no two supplier parts of an item may share."""
         return self.supplier.casefold(), self.number.casefold()
 
     def amount(self, needed: Decimal) -> Decimal:
-        """Return how much is ordered if so much is needed: at least the minimum, in whole packs; 0 for 0."""
+        """Find the amount to order if ``needed`` is needed: at least the minimum, in whole packs; 0 for 0."""
         if not needed:
             return Decimal(0)
         wanted = max(needed, self.minimum)
@@ -119,7 +119,7 @@ class SupplierPart(NamedTuple):
         return exact_product((packs, self.pack_size))
 
     def price_at(self, amount: Decimal) -> Decimal | None:
-        """Return the price of one piece if so many are ordered; None below the first price."""
+        """Find the price of one piece if ``amount`` is ordered; None below the first price."""
         for least, price in reversed(self.prices):
             if least <= amount:
                 return price
@@ -144,7 +144,7 @@ class SupplierOffer(NamedTuple):
 def choose(
     parts: Sequence[SupplierPart], needed: Decimal, rates: Mapping[str, Decimal]
 ) -> SupplierOffer | None:
-    """Return the preferred supplier part, else the cheapest for what is needed; None without any.
+    """Choose the preferred supplier part, else the cheapest for what is needed; None if there is none.
 
     rates
         what one of a currency is in the site's own. What cannot be compared comes behind what can.
@@ -177,16 +177,16 @@ def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) ->
 
 
 def supplier_parts_of(item: Item | RolledItem) -> list[SupplierPart]:
-    """Return the supplier parts of an item; without a list what of its properties is usable."""
+    """Read the supplier parts of an item; if there is no list, the one that its properties state."""
     if item.supplier_parts:
         return [from_json(part) for part in item.supplier_parts]
-    said = item.properties
-    supplier = said.get("supplier")
+    facts = item.properties
+    supplier = facts.get("supplier")
     if not isinstance(supplier, str) or not supplier.strip():
         return []
-    number = str(said.get("supplier_part_number") or "")[:200].strip()
-    cost, currency = positive_number(said, "standard_cost"), currency_of(said).strip().upper()
-    lead_time = said.get("lead_time_days")
+    number = str(facts.get("supplier_part_number") or "")[:200].strip()
+    cost, currency = positive_number(facts, "standard_cost"), currency_of(facts).strip().upper()
+    lead_time = facts.get("lead_time_days")
     days = None if lead_time is None else whole_number(str(lead_time).strip(), 4)
     part = SupplierPart(
         supplier.strip()[:200],
@@ -199,7 +199,7 @@ def supplier_parts_of(item: Item | RolledItem) -> list[SupplierPart]:
 
 
 def to_json(part: SupplierPart) -> dict[str, Any]:
-    """Return a supplier part as it is stored and sent (:class:`silo.api.wire.SupplierPart`)."""
+    """Write a supplier part as it is stored and sent (:class:`silo.api.wire.SupplierPart`)."""
     return {
         "supplier": part.supplier,
         "number": part.number,
@@ -214,27 +214,27 @@ def to_json(part: SupplierPart) -> dict[str, Any]:
 
 
 def from_json(made: Mapping[str, Any]) -> SupplierPart:
-    """Return the supplier part that :func:`to_json` wrote."""
+    """Read a supplier part that :func:`to_json` wrote."""
     prices = tuple((Decimal(price["quantity"]), Decimal(price["price"])) for price in made["prices"])
     sizes = {name: Decimal(made[name]) for name in ("pack_size", "minimum")}
     return SupplierPart(**{**made, **sizes, "prices": prices})
 
 
 def decimal_text(value: Decimal) -> str:
-    """Return a decimal in its one written form: no exponent, no zeros at the end."""
+    """Write a decimal in its one form: no exponent, no zeros at the end."""
     text = f"{value:f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def typed_text(value: Decimal) -> str:
-    """Return a decimal as it is read in one way only: 1.2340, for 1.234 may be a thousand and more."""
+    """Write a decimal that is read in one way only: 1.2340, as 1.234 may be a thousand and more."""
     text = decimal_text(value)
     number = parse_number(text)
     return f"{text}0" if number is not None and number.other is not None else text
 
 
 def texts_of(part: SupplierPart) -> dict[str, str]:
-    """Return a supplier part as the cells of its row, which :func:`read_parts` reads."""
+    """Write a supplier part as the cells of its row, which :func:`read_parts` reads."""
     days = part.lead_time_days
     return {
         "supplier": part.supplier,
@@ -258,7 +258,7 @@ class _Reader:
     currency: str = "EUR"
 
     def read(self, cells: Mapping[str, str]) -> tuple[SupplierPart, list[str]]:
-        """Return the part, and what is wrong with it; with a problem the part means nothing."""
+        """Read a row: the part, and what is wrong with it. If something is wrong, ignore the part."""
         problems: list[str] = []
 
         def amount(name: str, text: str, least: Decimal, most: Decimal) -> Decimal:
@@ -269,20 +269,20 @@ class _Reader:
             problems.append(f"{COLUMNS[name]}: {reading.problem or wanted}")
             return Decimal(1)
 
-        said = {name: cells.get(name, "").strip() for name in COLUMNS}
+        row = {name: cells.get(name, "").strip() for name in COLUMNS}
         tiny = Decimal("0.000001")
-        if not said["supplier"]:
+        if not row["supplier"]:
             problems.append("Supplier: wanted a name, got nothing")
         for name, longest in _LONGEST.items():
-            problem = character_problem(said[name])
-            if not problem and len(said[name]) > longest:
-                problem = f"wanted at most {longest} characters, got {len(said[name])}"
+            problem = character_problem(row[name])
+            if not problem and len(row[name]) > longest:
+                problem = f"wanted at most {longest} characters, got {len(row[name])}"
             if problem:
                 problems.append(f"{COLUMNS[name]}: {problem}")
-        if said["link"] and not re.fullmatch(r"https?://[^\s/]+\S*", said["link"]):
-            problems.append(f"Link: wanted a web address (https://…), got {said['link'][:40]!r}")
+        if row["link"] and not re.fullmatch(r"https?://[^\s/]+\S*", row["link"]):
+            problems.append(f"Link: wanted a web address (https://…), got {row['link'][:40]!r}")
         prices: dict[Decimal, Decimal] = {}
-        for written in filter(None, map(str.strip, re.split("[;\n]", said["prices"]))):
+        for written in filter(None, map(str.strip, re.split("[;\n]", row["prices"]))):
             least, colon, price = written.rpartition(":")
             at = amount("prices", least, tiny, LARGEST_AMOUNT) if colon else Decimal(1)
             if at in prices:
@@ -290,25 +290,25 @@ class _Reader:
             prices[at] = amount("prices", price, Decimal(0), LARGEST_PRICE)
         if len(prices) > MOST_PRICES:
             problems.append(f"{COLUMNS['prices']}: wanted at most {MOST_PRICES} of them, got {len(prices)}")
-        currency = said["currency"].upper() or self.currency
+        currency = row["currency"].upper() or self.currency
         if not _CODE.fullmatch(currency):
             problems.append(f"Currency: wanted three letters such as EUR, got {currency[:40]!r}")
-        days = whole_number(said["lead_time_days"], 4)
-        if said["lead_time_days"] and (days is None or days > LONGEST_LEAD_TIME):
-            wrong = said["lead_time_days"][:40]
+        days = whole_number(row["lead_time_days"], 4)
+        if row["lead_time_days"] and (days is None or days > LONGEST_LEAD_TIME):
+            wrong = row["lead_time_days"][:40]
             problems.append(
                 f"Lead time [days]: wanted a whole number up to {LONGEST_LEAD_TIME}, got {wrong!r}"
             )
-        word = said["preferred"].casefold()
+        word = row["preferred"].casefold()
         preferred = word in ("x", "✓", "✔", "y") or (yes_or_no(word) if word else False)
         if preferred is None:
-            problems.append(f"Preferred: wanted yes or nothing, got {said['preferred'][:40]!r}")
+            problems.append(f"Preferred: wanted yes or nothing, got {row['preferred'][:40]!r}")
         part = SupplierPart(
-            said["supplier"],
-            said["number"],
-            said["link"],
-            amount("pack_size", said["pack_size"], tiny, LARGEST_AMOUNT) if said["pack_size"] else Decimal(1),
-            amount("minimum", said["minimum"], Decimal(0), LARGEST_AMOUNT) if said["minimum"] else Decimal(0),
+            row["supplier"],
+            row["number"],
+            row["link"],
+            amount("pack_size", row["pack_size"], tiny, LARGEST_AMOUNT) if row["pack_size"] else Decimal(1),
+            amount("minimum", row["minimum"], Decimal(0), LARGEST_AMOUNT) if row["minimum"] else Decimal(0),
             tuple(sorted(prices.items())),
             currency,
             days,
@@ -323,7 +323,7 @@ def _places(value: Decimal) -> int:
 
 
 def read_parts(tx: Tx, rows: Sequence[Mapping[str, str]], *, dot: bool = False) -> list[SupplierPart]:
-    """Read a table that a person filled in; empty rows say nothing. RejectedError with all that is wrong."""
+    """Read a table that a person filled in, without its empty rows. RejectedError lists all problems."""
     reader = _Reader(None, dot, next(iter(rates_of(tx))))
     read = [
         (number, *reader.read(cells))
@@ -339,7 +339,7 @@ def read_parts(tx: Tx, rows: Sequence[Mapping[str, str]], *, dot: bool = False) 
 
 
 def list_problems(parts: Sequence[SupplierPart]) -> list[str]:
-    """Return what is wrong with the list of an item as a whole."""
+    """List what is wrong with the supplier parts of an item as a whole."""
     if len(parts) > MOST_PARTS:
         return [f"wanted at most {MOST_PARTS} supplier parts of an item, got {len(parts)}"]
     counts = Counter(supplier_part.key for supplier_part in parts)
@@ -365,16 +365,16 @@ class SupplierChange:
 
     @property
     def words(self) -> list[str]:
-        """Return what it did, in words."""
+        """Describe the change in words."""
         old, new = (
             {part.key: part for part in map(from_json, json.loads(t))} for t in (self.before, self.after)
         )
-        said = []
+        lines = []
         for key in dict.fromkeys([*old, *new]):
             part = new.get(key) or old[key]
             who = f"{part.supplier} {part.number}".strip()
             if key not in old or key not in new:
-                said.append(f"{who} added" if key in new else f"{who} removed")
+                lines.append(f"{who} added" if key in new else f"{who} removed")
                 continue
             before, after = texts_of(old[key]), texts_of(new[key])
             changes = [
@@ -383,19 +383,19 @@ class SupplierChange:
                 if before[name] != after[name]
             ]
             words = ", ".join(changes)
-            said += [f"{who} changed: {words}"] if words else []
-        return said or ["the order of the list"]
+            lines += [f"{who} changed: {words}"] if words else []
+        return lines or ["the order of the list"]
 
 
 def supplier_changes_of(tx: Tx, item: Item, limit: int = 20) -> list[SupplierChange]:
-    """Return the newest changes of an item's list, newest first."""
+    """Read the newest changes of an item's list, newest first."""
     row = supplier_changes.c
     query = select(supplier_changes).where(row.item_id == item.id).order_by(row.id.desc()).limit(limit)
     return [from_row(SupplierChange, record) for record in tx.conn.execute(query)]
 
 
 def list_version(tx: Tx, item: Item) -> int:
-    """Return the number of the newest change of an item's list; 0 before the first."""
+    """Find the number of the newest change of an item's list; 0 before the first."""
     row = supplier_changes.c
     return tx.conn.scalar(select(func.max(row.id)).where(row.item_id == item.id)) or 0
 
@@ -403,9 +403,9 @@ def list_version(tx: Tx, item: Item) -> int:
 def set_supplier_parts(
     tx: Tx, part_number: str, parts: Sequence[SupplierPart], expected: int | None = None
 ) -> tuple[Item, int]:
-    """Put a list in the place of an item's; return the item and the number of the change (0: none).
+    """Replace an item's list; return the item and the number of the change (0: none).
 
-    Raises VersionConflictError unless the list has still the ``expected`` version.
+    Raises VersionConflictError unless the list still has the ``expected`` version.
     """
     item = get_item(tx, part_number, lock=True)
     now = list_version(tx, item)
@@ -420,7 +420,7 @@ def set_supplier_parts(
 
 
 def undo_supplier_change(tx: Tx, part_number: str, change: int) -> Item:
-    """Take the newest change of an item's list back. ConflictError if another one came since."""
+    """Undo the newest change of an item's list. ConflictError if another one came since."""
     item = get_item(tx, part_number, lock=True)
     newest = next(iter(supplier_changes_of(tx, item, 1)), None)
     if newest is None or newest.id != change:
@@ -462,10 +462,10 @@ class ImportedItem:
 
 
 def plan_suppliers(tx: Tx, records: Sequence[Record], layout: Layout) -> list[ImportedItem]:
-    """Say what an import of rows would do, item by item; changes nothing.
+    """Plan an import of rows, item by item; change nothing.
 
-    A supplier part of the file takes the place of the same one of the item (by supplier and number), or is a
-    new one; those that the file does not name stay. Rows of one with another "from quantity" are its prices.
+    A supplier part of the file replaces the same one of the item (by supplier and number), or is a new one;
+    those that the file does not name stay. Several rows of one, each with a "from quantity", are its prices.
     """
     records = [
         (row, {_CELLS.get(name, name): text for name, text in entry.items()}) for row, entry in records
@@ -500,10 +500,10 @@ def _planned(rows: Sequence[Record], items_by_number: Mapping[str, Item], reader
             prices = f"{record['from']}: {prices}"
         before = named.setdefault(key, {"row": str(row), "prices": ""})
         for name, text in record.items():
-            said = before.setdefault(name, text) if name in COLUMNS and name != "prices" and text else text
-            if said != text:
+            first = before.setdefault(name, text) if name in COLUMNS and name != "prices" and text else text
+            if first != text:
                 problems.append(
-                    f"row {row}: {COLUMNS[name]} says {text[:40]!r}, row {before['row']} says {said[:40]!r}"
+                    f"row {row}: {COLUMNS[name]} says {text[:40]!r}, row {before['row']} says {first[:40]!r}"
                 )
         before["prices"] = "; ".join(filter(None, (before["prices"], prices)))
     there = {} if item is None else {part.key: part for part in supplier_parts_of(item)}
@@ -516,7 +516,7 @@ def _planned(rows: Sequence[Record], items_by_number: Mapping[str, Item], reader
     for key, cells in named.items():
         kept = texts_of(there[key]) if key in there else {}
         given = {name: text for name, text in cells.items() if name in COLUMNS and text}
-        # What stands in the item was written by us, with points.
+        # The values of the item were written by us, with points.
         part, wrong = reader.read(given)
         problems += [f"row {cells['row']}: {problem}" for problem in wrong]
         if kept and not wrong:
@@ -530,7 +530,7 @@ def _planned(rows: Sequence[Record], items_by_number: Mapping[str, Item], reader
     problems += [f"row {rows[0][0]}: {problem}" for problem in list_problems(parts)] if not problems else []
     status = "error" if problems else "same" if parts == was else "change"
     change = SupplierChange(
-        0, "", "", *(dumps([to_json(supplier_part) for supplier_part in some]) for some in (was, parts))
+        0, "", "", *(dumps([to_json(supplier_part) for supplier_part in side]) for side in (was, parts))
     )
     words = change.words if status == "change" else ()
     return ImportedItem(
@@ -539,7 +539,7 @@ def _planned(rows: Sequence[Record], items_by_number: Mapping[str, Item], reader
 
 
 def apply_suppliers(tx: Tx, records: Sequence[Record], layout: Layout) -> list[ImportedItem]:
-    """Import rows, all or nothing. RejectedError lists every problem, and then nothing was changed."""
+    """Import rows, all or nothing. RejectedError lists every problem; then nothing was changed."""
     # Two imports of one item come one after the other, each on what the other wrote.
     keys = {record.get("part_number", "").casefold() for _, record in records}
     query = select(items.c.id).where(one_of(tx, items.c.part_number_key, keys)).order_by(items.c.id)
@@ -557,13 +557,13 @@ def apply_suppliers(tx: Tx, records: Sequence[Record], layout: Layout) -> list[I
 
 
 def rates_of(tx: Tx) -> dict[str, Decimal]:
-    """Return what one of each currency is in the site's own, which comes first; EUR if nobody said."""
+    """Read what one of each currency is worth in the site's own, which is first; EUR if nobody set one."""
     typed: dict[str, str] = json.loads(get_state(tx, _RATES) or '{"EUR":"1"}')
     return {currency: Decimal(rate) for currency, rate in typed.items()}
 
 
 def set_rates(tx: Tx, own: str, texts: Iterable[tuple[str, str]]) -> dict[str, Decimal]:
-    """Set the site's currency, and what one of each other is in it. RejectedError with all that is wrong."""
+    """Set the site's currency, and what one of each other is worth in it. RejectedError."""
     rates, problems = {own.strip().upper(): Decimal(1)}, []
     for currency, text in ((code.strip().upper(), text.strip()) for code, text in texts):
         if not currency and not text:

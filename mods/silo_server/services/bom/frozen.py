@@ -106,7 +106,7 @@ def _record(
         "category": item.category,
         **item.texts,
         "properties": dict(item.properties),
-        # Only where there are some: so records from before have the same hash.
+        # Only if there are any: so older records keep their hash.
         **({"supplier_parts": item.supplier_parts} if item.supplier_parts else {}),
         "revision": item.current_revision,
         "thumbnail": item.thumbnail_key,
@@ -120,7 +120,7 @@ def _record(
 
 
 def _files(tx: Tx, items: Mapping[int, Item]) -> dict[int, dict[str, dict[str, Any]]]:
-    """Return by item and document the newest files that the item is in, and all that these link to."""
+    """Find by item and document the newest files that the item is in, and all files that these link to."""
     row = document_items.c
     query = select(row.item_id, row.document_id).where(one_of(tx, row.item_id, items.keys()))
     holding: dict[int, set[int]] = {item_id: set() for item_id in items}
@@ -165,7 +165,7 @@ def _files(tx: Tx, items: Mapping[int, Item]) -> dict[int, dict[str, dict[str, A
 
 
 def frozen_product(tx: Tx, item: Item, release: Release) -> ProductContent:
-    """Return a revision as it was frozen, to be shown by whatever shows a product."""
+    """Read a product as it was frozen, to be shown or exported. Raises TooLargeError."""
     records = read_records(tx, release.record)
     ids = {record: number for number, record in enumerate(records, start=1)}
     who = (release.frozen_at, release.created_by)
@@ -177,7 +177,7 @@ def frozen_product(tx: Tx, item: Item, release: Release) -> ProductContent:
     for record, made in records.items():
         for place, written in enumerate(made["lines"]):
             child = ids.get(written["child"]) or next(others)
-            if child not in frozen:  # no component: nothing of it was frozen but its number
+            if child not in frozen:  # no component: only its number was frozen
                 named = {"part_number": written["part_number"], "item": written["item"]}
                 frozen[child] = item_of(named, child, *who)
                 parts[child], worths[child] = _part(named), MassAndCost(None, False, {}, False)
@@ -226,7 +226,7 @@ class Changes(NamedTuple):
 
 
 def changes_of(tx: Tx, item: Item, since: str, until: str = "") -> Changes:
-    """Return what changed in a product between two points, over all levels, from the older to the newer.
+    """Find what changed in a product between two points, over all levels, from the older to the newer.
 
     since, until
         a day, a time, a revision of the item (``r3``), or the label of a frozen revision; until "": now.
@@ -258,7 +258,7 @@ Records = Mapping[str, Mapping[str, Any]]
 
 
 def _differences(root: str, before: Records, after: Records) -> Iterator[PastChange]:
-    """Yield what differs between two products, as records by the UUID of their item."""
+    """Yield the differences of two products, each given as records by the UUID of their item."""
     sides = (before, after)
     owned = [_own_files(side) for side in sides]
     for uuid in before.keys() & after.keys():
@@ -289,7 +289,7 @@ def _in_all(made: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _past(made: Mapping[str, Any], side: Records) -> list[PastLine]:
-    """Return the lines of a record, each under its part and relation, of which a BOM has one."""
+    """Return the lines of a record; part and relation name a line, as a BOM has each pair once."""
     lines = []
     for place, line in enumerate(made["lines"]):
         of = side[line["item"]] if line["child"] else line
@@ -300,7 +300,7 @@ def _past(made: Mapping[str, Any], side: Records) -> list[PastLine]:
 
 
 def _own_files(side: Records) -> dict[str, list[Mapping[str, Any]]]:
-    """Return for each item the files that are not those of a part in it."""
+    """Find for each item the files that do not come from a part in it."""
     files = {}
     for uuid, made in side.items():
         below = {

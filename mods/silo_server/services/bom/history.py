@@ -101,14 +101,14 @@ class Difference(NamedTuple):
 def list_changes(
     tx: Tx, parent: Item, limit: int = 50, before: int | None = None, after: int | None = None
 ) -> list[Change]:
-    """Return the BOM's changes, newest first; ``before`` and ``after`` are change ids to page on and back."""
+    """Read the changes of a BOM, newest first; ``before`` and ``after`` are change ids to page from."""
     return _changes(tx, [bom_changes.c.parent_id == parent.id], limit, before, after)
 
 
 def lines_of_changes(
     tx: Tx, change_ids: Collection[int], most: int = 2**31 - 1
 ) -> dict[int, list[ChangedLine]]:
-    """Return the first ``most`` lines of each of these changes, in one question."""
+    """Read the first ``most`` lines of each of these changes, by the id of the change."""
     place = func.row_number().over(
         partition_by=bom_change_lines.c.change_id, order_by=bom_change_lines.c.position
     )
@@ -137,8 +137,9 @@ def get_change(tx: Tx, parent: Item, change_id: int) -> tuple[Change, list[Chang
 def stories(
     tx: Tx, parent: Item, line_ids: Collection[str], after: int = 0
 ) -> dict[str, list[tuple[Change, ChangedLine]]]:
-    """Return what happened to these lines after change ``after``, newest first; lines without a story are
-    absent.
+    """Read what happened to these lines after change ``after``, by line id, newest first.
+
+    Lines that did not change are absent.
     """
     if not line_ids:
         return {}
@@ -155,23 +156,21 @@ def stories(
     ids = {row.change_id for row in rows}
     changes = {change.id: change for change in _changes(tx, [one_of(tx, bom_changes.c.id, ids)], len(ids))}
     children = _named(tx, {row.child_id for row in rows})
-    result: dict[str, list[tuple[Change, ChangedLine]]] = {}
+    by_line: dict[str, list[tuple[Change, ChangedLine]]] = {}
     for row in rows:
         line = _changed_line(row, children)
-        result.setdefault(row.line_id, []).append((changes[row.change_id], line))
-    return result
+        by_line.setdefault(row.line_id, []).append((changes[row.change_id], line))
+    return by_line
 
 
 def last_merge(tx: Tx, parent: Item) -> Change | None:
-    """Return the newest merge, None if there was none."""
+    """Find the newest merge of a BOM; None if there was none."""
     conditions = [bom_changes.c.parent_id == parent.id, bom_changes.c.kind == ChangeKind.MERGE.value]
     return next(iter(_changes(tx, conditions, 1)), None)
 
 
 def change_at(tx: Tx, parent: Item, when: str) -> int:
-    """Return the change that made the BOM what it was at ``when`` (as stored: ISO 8601, UTC); 0 before the
-    first.
-    """
+    """Find the change that gave the BOM its state at ``when`` (ISO 8601, UTC, as stored); 0: before all."""
     value = tx.conn.scalar(
         select(func.max(bom_changes.c.id)).where(
             bom_changes.c.parent_id == parent.id, bom_changes.c.at <= when
@@ -181,7 +180,7 @@ def change_at(tx: Tx, parent: Item, when: str) -> int:
 
 
 def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
-    """Return the BOM as change ``change_id`` left it; NotFoundError if this BOM has no such change."""
+    """Return the BOM as change ``change_id`` left it; NotFoundError if the change is not one of this BOM."""
     if change_id != 0:
         get_own_change(tx, parent, change_id)
     newest = (
@@ -208,7 +207,7 @@ def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
 
 
 def get_own_change(tx: Tx, parent: Item, change_id: int) -> int:
-    """Return ``change_id`` where it is a change of this BOM; NotFoundError otherwise."""
+    """Return ``change_id`` if it is a change of this BOM; NotFoundError otherwise."""
     owner = tx.conn.scalar(select(bom_changes.c.parent_id).where(bom_changes.c.id == change_id))
     if owner != parent.id:
         raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
@@ -216,7 +215,7 @@ def get_own_change(tx: Tx, parent: Item, change_id: int) -> int:
 
 
 def compare(before: Sequence[PastLine], after: Sequence[PastLine]) -> list[Difference]:
-    """Compare two states side by side, in the order of the later one, what is gone last; pure."""
+    """Compare two states side by side; pure. The order is that of the later one; removed lines are last."""
     old = {line.line_id: line.state for line in before}
     new = {line.line_id for line in after}
     rows = [_difference(line.child, old.get(line.line_id), line.state) for line in after]
@@ -233,9 +232,9 @@ def restore(
     *,
     with_archived: bool = False,
 ) -> tuple[int, int]:
-    """Make the BOM again what change ``change_id`` left; a new change. Returns (change id, version).
+    """Restore the state that change ``change_id`` left, as a new change. Returns (change id, version).
 
-    Raises ArchivedPartsError if a part that comes back is archived, unless it may (``with_archived``).
+    Raises ArchivedPartsError if a part that comes back is archived, unless ``with_archived`` allows that.
     """
     parent = parent_to_change(tx, part_number, expected)
     target = {line.line_id: line for line in state_at(tx, parent, change_id)}
@@ -258,7 +257,7 @@ def restore(
 
 
 def item_changed_by(tx: Tx, change_id: int) -> str:
-    """Return the part number of the BOM that a change is of; NotFoundError if there is no such change."""
+    """Find the part number of the item whose BOM a change is of; NotFoundError for an unknown change."""
     of_it = select(items.c.part_number).join(bom_changes, bom_changes.c.parent_id == items.c.id)
     value = tx.conn.scalar(of_it.where(bom_changes.c.id == change_id))
     if value is None:
@@ -267,9 +266,9 @@ def item_changed_by(tx: Tx, change_id: int) -> str:
 
 
 def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tuple[int, int]:
-    """Take one change back, as a new change. Returns (change id, version).
+    """Undo one change, as a new change. Returns (change id, version).
 
-    Raises ConflictError, naming the lines, where one of them was changed again since.
+    Raises ConflictError, naming the lines, if one of them has changed again since.
     """
     parent = parent_to_change(tx, part_number, expected)
     change, lines = get_change(tx, parent, change_id)
@@ -323,9 +322,10 @@ class PastChange(NamedTuple):
 
 
 def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
-    """Return the time, as stored, that a person names: a date (its ``end``), a time, a revision as ``r3``.
+    """Read the time that a person names: a date (its ``end``), a time, or a revision such as ``r3``.
 
-    Raises RejectedError, NotFoundError for a revision that the item does not have, a frozen one too.
+    Returns it as stored. Raises RejectedError; NotFoundError for a revision, frozen or not, that the item
+    does not have.
     """
     if text.startswith("r") and (number := whole_number(text[1:], 9)) is not None:
         row = revisions.c
@@ -351,8 +351,9 @@ def moment(tx: Tx, item: Item, text: str, *, end: bool = False) -> str:
 
 
 def what_changed(tx: Tx, root: Item, since: str, until: str) -> list[PastChange]:
-    """Return what differs in a product between two times, by item; what was added or removed is not looked
-    into.
+    """Find what differs in a product between two times, by item.
+
+    Items that were added or removed are not compared themselves.
     """
     since, until = sorted((since, until))
     walked = _Walked(tx, since, until)
@@ -370,7 +371,7 @@ def what_changed(tx: Tx, root: Item, since: str, until: str) -> list[PastChange]
 
 
 def in_order(happenings: Iterable[PastChange]) -> list[PastChange]:
-    """Sort by BOM or item."""
+    """Sort changes by BOM or item."""
     return sorted(
         happenings, key=lambda change: (change.within or change.part_number, change.part_number, change.what)
     )
@@ -386,7 +387,7 @@ class _Walked:
         self.changed: dict[int, tuple[str, str]] = {}
 
     def reached(self, root: int, side: int) -> set[int]:
-        """Return all items that the product has at the one time (0) or the other (1)."""
+        """Find all items of the product at the first time (``side`` 0) or at the second (1)."""
         seen, level = {root}, {root}
         while level:
             self._load(level - self._children.keys())
@@ -470,13 +471,13 @@ def _items_happened(tx: Tx, ids: Collection[int], since: str, until: str) -> Ite
         older = [file for file in files if file.created_at <= since]
         if files and (not older or older[-1].file_checksum != files[-1].file_checksum):
             newest = files[-1]
-            before, after = (_file(some) for some in (older, files))
+            before, after = (_file(versions) for versions in (older, files))
             what = ("file", "", item.part_number, item.name, before, after)
             yield PastChange(*what, newest.created_at, newest.created_by)
 
 
 def data_differs(then: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, str] | None:
-    """Return the values that differ in words, before and after; None if none does."""
+    """Describe the values that differ, before and after; None if none does."""
     names = sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name))
     before, after = ("; ".join(f"{name}: {_text(side.get(name))}" for name in names) for side in (then, now))
     return (before, after) if names else None

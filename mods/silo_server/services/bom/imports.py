@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""BOM import from CSV: first what would happen, row by row; then, when nothing is wrong, all of it at once.
+"""BOM import from CSV: first what would happen, row by row; then, if nothing is wrong, all of it at once.
 
-The columns are known by their names (:mod:`silo.bom.headers`); where they are not, a person says which column
+The columns are known by their names (:mod:`silo.bom.headers`); if they are not, a person says which column
 is which (:class:`Layout`). Reading a file is pure: it needs no database.
 Rows add manual lines or change lines that are there (by the rules of a person's edit); lines that the file
 does not name stay as they are. Our own single-level export, imported again, changes nothing. A row without a
@@ -69,7 +69,7 @@ from silo_server.services.items import (
 from silo_server.settings import TooLargeError
 from silo_server.values import Item, Line, LineState
 
-# What a line says; and by what a part is known that has no number, and made.
+# What a line says; then what identifies a part without a number, or describes a new one.
 LINE_ROLES = (
     *(
         Heading.PART_NUMBER,
@@ -120,7 +120,7 @@ class Table(NamedTuple):
     single: Sequence[Heading]
 
     def lacking(self, there: Collection[Heading]) -> list[Heading]:
-        """Return the needed columns that are neither there nor stood for by another."""
+        """Return the needed columns that the file has neither itself nor through a substitute."""
         return [
             role for role in self.needed if role not in there and not {*self.instead.get(role, ())} & {*there}
         ]
@@ -158,10 +158,10 @@ class Layout:
 
 
 def read_csv(data: bytes, max_rows: int, layout: Layout | None = None, of: Table = BOM) -> list[Record]:
-    """Return the rows that say anything; RejectedError if it is no such table, TooLargeError beyond
-    ``max_rows``.
+    """Read the rows that are not empty. RejectedError if this is no such table.
 
-    Needs no database: to be called before a transaction begins, which others would wait for.
+    TooLargeError above ``max_rows``. Needs no database: call it before a transaction begins, which others
+    would wait for.
     """
     text = _decode(data)
     chosen, layout = layout is not None, layout or guess(text, of)
@@ -198,7 +198,7 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None, of: Table
 
 
 def _designated(cell: str) -> int:
-    """Return how many places reference designators name: three in ``R1, R3-R4``."""
+    """Count the places that reference designators name: three in ``R1, R3-R4``."""
     spans = [(designator, _RANGE.fullmatch(designator)) for designator in designators(cell)]
     return sum(
         max(1, int(span[4]) - int(span[2]) + 1) if span and span[3] in ("", span[1]) else 1
@@ -207,10 +207,10 @@ def _designated(cell: str) -> int:
 
 
 def as_csv(data: bytes, of: Table = BOM) -> bytes:
-    """Return a table as CSV: of a workbook (XLSX, ODS, XLS) the one sheet that holds it, else its first.
+    """Convert a table to CSV: of a workbook (XLSX, ODS, XLS) the one sheet that holds it, else its first.
 
-    RejectedError where several do, or where a person does not see in the workbook what would be read: lines
-    that are hidden or struck out.
+    RejectedError if several sheets hold such a table, or if lines are hidden or struck out: a person would
+    not expect them to be read.
     """
     if not data.startswith(workbook.STARTS):
         return data
@@ -248,9 +248,7 @@ def _sheet_text(grid: workbook.Grid) -> bytes:
 
 
 def first_lines(data: bytes, delimiter: str, count: int = 8) -> list[list[str]]:
-    """Return the first lines of a file as cells, as far as they can be read; for a person to say what each
-    is.
-    """
+    """Read the first lines of a file as cells, as far as possible, for a person to name the columns."""
     lines: list[list[str]] = []
     with suppress(csv.Error):
         lines.extend(row[:MAX_COLUMNS] for row in islice(_rows(_decode(data), delimiter), count))
@@ -258,15 +256,13 @@ def first_lines(data: bytes, delimiter: str, count: int = 8) -> list[list[str]]:
 
 
 def likely_delimiter(data: bytes) -> str:
-    """Return the separator that makes the most columns of the first lines."""
+    """Find the separator that makes the most columns of the first lines."""
     widths = {mark: max(map(len, first_lines(data, mark)), default=0) for mark in DELIMITERS}
     return max(widths, key=lambda mark: widths[mark])
 
 
 def guess(text: str, of: Table = BOM) -> Layout:
-    """Return header and columns by the delimiter with which there is a header; RejectedError if there is
-    none.
-    """
+    """Find the delimiter with which there is a header, the header and its columns; else RejectedError."""
     broken: csv.Error | None = None
     near = ""
     for delimiter in DELIMITERS:
@@ -338,7 +334,7 @@ def _cell(cells: Sequence[str], index: int | None) -> str:
 
 
 def _with_exact_quantities(records: list[Record], layout: Layout) -> list[Record]:
-    """Return quantities as plain numerals where they can be read; what is wrong with one stands beside it.
+    """Replace quantities by plain numerals; put the problem beside a quantity that cannot be read.
 
     The whole column decides what "1,234" means; in a file separated by commas, a point is a decimal point.
     """
@@ -420,22 +416,22 @@ class ImportPlan:
 
     @property
     def new(self) -> list[NewItem]:
-        """Return the parts that are made, each once."""
+        """Return the parts that the import makes, each once."""
         return [row.new for row in self.rows if row.new]
 
     def count(self, status: str) -> int:
-        """Return how many rows have this status."""
+        """Count the rows with this status."""
         return sum(row.status == status for row in self.rows)
 
     def could(self, what: str) -> int:
-        """Return how many rows a person could allow."""
+        """Count the rows whose problem a person may allow: ``make`` the part, or ``add_up``."""
         return sum(row.could == what for row in self.rows)
 
 
 def plan_import(
     tx: Tx, part_number: str, records: Sequence[Record], allowed: Allowed = NOTHING
 ) -> ImportPlan:
-    """Say what an import of the rows of :func:`read_csv` would do, row by row; changes nothing."""
+    """Plan an import of the rows of :func:`read_csv`, row by row; change nothing."""
     parent = get_item(tx, part_number)
     if allowed.category:
         find_schema(None).category(allowed.category)
@@ -472,21 +468,20 @@ def plan_import(
 
 
 def _key(record: Mapping[str, str]) -> str:
-    """Return what the rows of one part share."""
+    """Return what all rows of one part have in common."""
     return (record.get("part_number") or f"\n{record.get('unknown')}").casefold()
 
 
 def _name_of(record: Mapping[str, str]) -> str:
-    """Return what a row calls its part: the name; or the value with the footprint, without KiCad's
-    library.
-    """
+    """Find the name of a row's part: name, value with footprint (no KiCad library), or description."""
     value = " ".join(filter(None, (record.get("value"), record.get("footprint", "").rpartition(":")[2])))
     return record.get("name") or (value if record.get("value") else record.get("description", ""))
 
 
 def _identified(tx: Tx, records: Iterable[Record]) -> Iterator[Record]:
-    """Yield the rows with the numbers of the parts that they mean; ``unknown`` names a part that is not
-    here.
+    """Yield the rows with the number of the part that each one means.
+
+    ``unknown`` names a part that is not here, ``several`` says that a name has several parts.
     """
     nameless = [record for _, record in records if not record.get("part_number")]
     row, by_name, by_maker = items.c, dict[str, list[str]](), dict[str, list[str]]()
@@ -497,7 +492,7 @@ def _identified(tx: Tx, records: Iterable[Record]) -> Iterator[Record]:
         same_items, _ = list_items(tx, ItemQuery(search=maker, limit=100))
         numbers = ((item.part_number, item.properties.get("manufacturer_part_number")) for item in same_items)
         by_maker[maker] = [
-            part_number for part_number, said in numbers if str(said).casefold() == maker.casefold()
+            part_number for part_number, own in numbers if str(own).casefold() == maker.casefold()
         ]
     for number, record in records:
         maker, name = record.get("manufacturer_part_number", ""), _name_of(record)
@@ -520,7 +515,10 @@ _BESIDE = ("rel_type", "level", "unit", "child_revision", "not_fitted")
 
 
 def _added_up(records: Sequence[Record]) -> tuple[list[Record], dict[int, int]]:
-    """Return rows of one part as the first of them; and by number of each other row, that of the first."""
+    """Add the quantities of all rows of a part to its first row.
+
+    Returns all rows, and for the number of each other row the number of the first.
+    """
     first: dict[tuple[str, ...], tuple[int, dict[str, str]]] = {}
     made: list[Record] = []
     added: dict[int, int] = {}
@@ -638,9 +636,9 @@ def _plan_row(
 
 
 def _new_item(record: Mapping[str, str], category: str, problems: list[str]) -> NewItem:
-    """Return the part that a row speaks of; bought, if it says a maker, a supplier or a value."""
-    said = {role.value: record[role] for role in _BOUGHT if record.get(role)}
-    bought = said or record.get("value")
+    """Describe the new part of a row; it is bought if the row names a maker, a supplier or a value."""
+    facts = {role.value: record[role] for role in _BOUGHT if record.get(role)}
+    bought = facts or record.get("value")
     try:
         number = check_number(record["part_number"]) if record.get("part_number") else None
     except RejectedError as error:
@@ -652,12 +650,12 @@ def _new_item(record: Mapping[str, str], category: str, problems: list[str]) -> 
         name=_name_of(record) or record.get("unknown", ""),
         description=record.get("description", ""),
         texts={"sourcing_type": "purchased"} if bought else {},
-        properties=said,
+        properties=facts,
     )
 
 
 def _as_written(before: LineState, field: str, value: Any) -> bool:
-    """Return True if a file says what the line says; it drops spaces at the ends, and parts designators."""
+    """Compare a value of a file with the line's; a file drops spaces at the ends, and splits designators."""
     value_before = getattr(before, field)
     if field == "reference_designators":
         return bool(designators(" ".join(value_before)) == value)

@@ -38,8 +38,9 @@ STATE_COLUMNS = [
 
 
 def select_lines(*, bare: bool = False) -> Select[*tuple[Any, ...]]:
-    """Return the query that :func:`to_line` understands; ``bare``: without UUID, name and description of the
-    children, which take a third of its time.
+    """Select lines with their children, in the columns that :func:`to_line` reads.
+
+    ``bare``: without UUID, name and description of the children, which take a third of the time.
     """
     texts = (items.c.uuid, items.c.name, items.c.description)
     return select(
@@ -57,15 +58,15 @@ def select_lines(*, bare: bool = False) -> Select[*tuple[Any, ...]]:
 
 
 def to_line(row: Any, child: tuple[Any, ...] = ()) -> Line:
-    """Return a frozen line from a row of :func:`select_lines`; by position, which is what makes it quick.
+    """Make a line from a row of :func:`select_lines`; reading by position makes this fast.
 
-    ``child``: what another line says of the same child (:func:`child_of`).
+    ``child``: the same child as read from another row (:func:`child_of`).
     """
     return Line._make((*row[:4], *(child or child_of(row)), _state(*row[11:])))
 
 
 def child_of(row: Any) -> tuple[Any, ...]:
-    """Return what a row of :func:`select_lines` says of its child."""
+    """Return the values of a row of :func:`select_lines` that describe the child."""
     return (*row[4:10], row[10] is not None)
 
 
@@ -82,18 +83,19 @@ def _state(*columns: Any) -> LineState:
 
 
 def lines_of(tx: Tx, parent: Item) -> list[Line]:
-    """Return the parent's lines in their order."""
+    """Read the lines of a BOM, in their order."""
     query = select_lines().where(bom_lines.c.parent_id == parent.id).order_by(bom_lines.c.position)
     return [to_line(row) for row in tx.conn.execute(query)]
 
 
-# The BOMs of one answer have so many lines in all; one BOM alone is answered whatever its size.
+# The most lines of several BOMs in one answer; one BOM alone may have any number.
 MOST_LINES_AT_ONCE = 10_000
 
 
 def check_line_count(tx: Tx, parent_ids: Sequence[int]) -> None:
-    """Raise TooLargeError if several BOMs, each as often as it is named, have more lines than one answer
-    may.
+    """Raise TooLargeError if several BOMs together have more lines than one answer may have.
+
+    A BOM that is named twice counts twice.
     """
     row = bom_lines.c.parent_id
     query = select(row, func.count()).where(one_of(tx, row, set(parent_ids))).group_by(row)
@@ -105,7 +107,7 @@ def check_line_count(tx: Tx, parent_ids: Sequence[int]) -> None:
 
 
 def lines_of_many(tx: Tx, parent_ids: Collection[int]) -> dict[int, list[Line]]:
-    """Return the lines of all these parents, by parent, each in their order."""
+    """Read the lines of many BOMs, by parent, each in their order."""
     query = (
         select_lines()
         .where(one_of(tx, bom_lines.c.parent_id, parent_ids))
@@ -125,10 +127,10 @@ class LineId:
 
 
 def line_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
-    """Return the line with this id, or the one line of this child.
+    """Find the line with this id, or the only line of this child.
 
-    Raises NotFoundError where there is none, ConflictError where a child has several: somebody would reach
-    the wrong one.
+    Raises NotFoundError if there is none, ConflictError if the child has several lines: none is chosen by
+    chance.
     """
     if isinstance(which, LineId):
         line = next((line for line in lines if line.id == which.id), None)
@@ -149,7 +151,7 @@ def line_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
 
 
 def component_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
-    """Find a line as :func:`line_of`; of several lines of a child the component, which CAD means."""
+    """Find a line as :func:`line_of` does; of several lines of a child take the component, as CAD does."""
     lines = list(lines)
     if isinstance(which, str):
         key = which.casefold()
@@ -159,7 +161,7 @@ def component_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Li
 
 
 def state_to_json(state: LineState) -> dict[str, Any]:
-    """Return a line's state as history stores it; only what is set."""
+    """Write a line's state as the history stores it: only the fields that are set."""
     fields = ((name, getattr(state, name)) for name in names_of(LineState))
     return {
         name: value
@@ -169,10 +171,10 @@ def state_to_json(state: LineState) -> dict[str, Any]:
 
 
 def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
-    """Return what a person saw of a line, as a short mark: another state has another one.
+    """Make a short mark of what a person saw of a line; another state has another mark.
 
     cad_quantity
-        what a conflict says beside the line.
+        the quantity in CAD that a conflict shows beside the line.
     """
     seen = dumps([state_to_json(state), cad_quantity])
     return hashlib.sha256(seen.encode()).hexdigest()[:16]
@@ -180,7 +182,7 @@ def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
 
 @lru_cache(maxsize=16384)
 def stored_state(text: str) -> LineState:
-    """Return the state that :func:`state_to_json` gave and history stored."""
+    """Read a state that :func:`state_to_json` wrote."""
     values = dict(json.loads(text))
     if "reference_designators" in values:
         values["reference_designators"] = tuple(values["reference_designators"])
@@ -188,7 +190,7 @@ def stored_state(text: str) -> LineState:
 
 
 def state_columns(state: LineState) -> dict[str, Any]:
-    """Return a line's state as columns of the table."""
+    """Write a line's state as values for the columns of the table."""
     return {name: getattr(state, name) for name in names_of(LineState)} | {
         "quantity": float(state.quantity),
         "reference_designators": dumps(list(state.reference_designators)),
@@ -197,8 +199,9 @@ def state_columns(state: LineState) -> dict[str, Any]:
 
 
 def line_to_wire(line: Line, parent_part_number: str) -> dict[str, Any]:
-    """Return a line as ``GET …/bom`` sends it: the contract's keys, and ours for overrides and newer
-    revisions.
+    """Return a line as ``GET …/bom`` sends it.
+
+    It has the contract's keys, and ours for overrides and newer revisions.
     """
     return {
         "id": line.id,
@@ -210,7 +213,7 @@ def line_to_wire(line: Line, parent_part_number: str) -> dict[str, Any]:
 
 
 def child_to_wire(line: Line) -> dict[str, Any]:
-    """Return what a line says of its child."""
+    """Return the child of a line as the API sends it."""
     return {
         "child_part_number": line.child_part_number,
         "child_id": line.child_uuid,
@@ -222,12 +225,12 @@ def child_to_wire(line: Line) -> dict[str, Any]:
 
 
 def line_state_to_wire(state: LineState) -> dict[str, Any]:
-    """Return what a line says of itself."""
+    """Return a line's state as the API sends it, with all fields."""
     return to_wire(state) | {"quantity": plain(state.quantity), "cad_quantity": plain(state.cad_quantity)}
 
 
 def revisions_to_wire(line: Line) -> dict[str, Any]:
-    """Return which revision of the child is meant, and whether there is a newer one."""
+    """Return which revision of the child counts, and whether there is a newer one."""
     pinned, newest = line.state.child_revision, line.child_current_revision
     return {
         "effective_revision": pinned if pinned is not None else newest,
@@ -291,19 +294,19 @@ class ChangeNote:
 
 
 def new_line_id() -> str:
-    """Return a line's stable id."""
+    """Make the id of a new line; it never changes."""
     return str(uuids.uuid4())
 
 
 def parent_to_change(tx: Tx, part_number: str, expected: int | None) -> Item:
-    """Return the item whose BOM is to be changed, locked, and with the ``expected`` version of the BOM."""
+    """Lock the item whose BOM is to be changed, and check that the BOM has the ``expected`` version."""
     parent = locked_parent(tx, part_number)
     check_version(parent, expected)
     return parent
 
 
 def locked_parent(tx: Tx, part_number: str) -> Item:
-    """Return the item, locked. The transaction's time is later than that of each change of its BOM.
+    """Lock an item. The transaction's time is then later than that of each change of the item's BOM.
 
     So "as of" a time and the retention, which look at times, agree with the order of the changes.
     """
@@ -358,7 +361,7 @@ def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineRecord], note: Cha
 
 
 def check_no_cycle(tx: Tx, parent: Item, child_ids: Collection[int]) -> None:
-    """Raise CycleError where one of the children to be added contains the parent, or is it.
+    """Raise CycleError if one of the children to be added contains the parent, or is it.
 
     The caller's edges are added under the structure lock, so that two requests cannot close a ring together.
     """
@@ -370,10 +373,9 @@ def check_no_cycle(tx: Tx, parent: Item, child_ids: Collection[int]) -> None:
 
 
 def find_rings(tx: Tx, parent: Item, child_ids: Collection[int]) -> dict[int, list[str]]:
-    """Return those of the children that contain the parent, or are it, each with the part numbers of the
-    ring.
+    """Find the children that contain the parent, or are it, each with the part numbers of the ring.
 
-    Looks upwards from the parent: its ancestors are few where its children may be thousands.
+    The search goes up from the parent: it has few ancestors, but may have thousands of children.
     """
     wanted = set(child_ids)
     if not wanted:
@@ -445,7 +447,7 @@ def _write_lines(tx: Tx, parent: Item, changes: Sequence[LineRecord]) -> None:
 
 
 def history_row(change: LineRecord) -> dict[str, Any]:
-    """Return a changed line as the history stores it."""
+    """Write a changed line as a row of the history."""
     return {
         "line_id": change.line_id,
         "child_id": change.child_id,

@@ -97,7 +97,7 @@ class MergeOrder:
 
     @property
     def missing(self) -> list[tuple[str, str]]:
-        """Return the components that the assembly has lost."""
+        """List (file, object) of the components that the assembly has lost."""
         return [
             (part.get("file", ""), part.get("object", ""))
             for part in self.left_out
@@ -106,7 +106,7 @@ class MergeOrder:
 
 
 def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
-    """Return the order in a decoded JSON body; RejectedError if the body as a whole is unusable.
+    """Read the order from a decoded JSON body; RejectedError if the body as a whole is unusable.
 
     Unknown keys are ignored. Whatever ``source`` says, the entries are an assembly's.
     """
@@ -137,14 +137,14 @@ def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
 
 
 def text_problem(value: Any, longest: int) -> str | None:
-    """Return what is wrong with a text of at most so many characters; None if nothing is."""
+    """Say what is wrong with a text of at most ``longest`` characters; None if nothing is."""
     if not isinstance(value, str) or len(value) > longest:
         return f"wanted a text of at most {longest} characters, got {_shortened(value)}"
     return character_problem(value)
 
 
 def sha256_or_none(name: str, value: Any) -> str | None:
-    """Return a SHA-256 in small hex digits, or None; RejectedError, naming the field, for anything else."""
+    """Read a SHA-256 in lower-case hex digits, or None; RejectedError with the field for anything else."""
     if value is None:
         return None
     if isinstance(value, str) and re.fullmatch("[0-9A-Fa-f]{64}", value):
@@ -153,10 +153,10 @@ def sha256_or_none(name: str, value: Any) -> str | None:
 
 
 def quantity_problem(value: Any) -> str | None:
-    """Return what is wrong with a quantity, None if nothing is."""
+    """Say what is wrong with a quantity; None if nothing is."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"wanted a number, got {_shortened(value)}"
-    # A huge integer has no float; comparing it does no harm where converting it would.
+    # A huge integer has no float; comparing it is safe, converting it is not.
     if not 0 < value <= LARGEST_QUANTITY or not math.isfinite(value):
         return f"wanted a number above 0 and at most 1e9, got {_shortened(value)}"
     return None
@@ -257,7 +257,7 @@ def _shortened(value: Any) -> str:
 
 
 def event_of(tx: Tx, parent: Item, diff: BomDiff, answer: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the spec's event; ``warnings`` only where there is a conflict, which the diff does not say."""
+    """Make the spec's event; it has ``warnings`` only if there is a conflict, which the diff lacks."""
     diff_json = dict(answer["diff"])
     if len(diff_json["unchanged"]) > EVENT_UNCHANGED_LINES:
         diff_json["unchanged_count"] = len(diff_json["unchanged"])
@@ -287,7 +287,7 @@ class LastSync:
     left_out
         what the assembly holds and the BOM does not: the fields of :class:`silo.bom.report.LeftOut`.
     refused_at
-        when the server refused a later merge, None where it did not; ``refusal`` says why.
+        when the server refused a later merge, None if it did not; ``refusal`` says why.
     """
 
     at: str | None = None
@@ -301,7 +301,7 @@ class LastSync:
 
     @property
     def gaps(self) -> list[dict[str, Any]]:
-        """Return everything that is not in the BOM, a refused merge too."""
+        """List everything that is not in the BOM, including a refused merge."""
         gaps = [dict(part) for part in self.left_out]
         if self.refused_at:
             gaps.append({"reason": Reason.REFUSED.value, "message": self.refusal})
@@ -309,11 +309,11 @@ class LastSync:
 
     @property
     def words(self) -> str:
-        """Return ``2 missing, 1 unregistered``; "" if nothing was left out."""
+        """Count the gaps in words: ``2 missing, 1 unregistered``; "" if there are none."""
         return in_words(self.gaps)
 
     def to_wire(self) -> dict[str, Any]:
-        """Return it as the API sends it."""
+        """Return the last sync as the API sends it."""
         return {"at": wire(self.at), "left_out": self.gaps}
 
 
@@ -321,14 +321,12 @@ NEVER = LastSync()
 
 
 def last_sync(tx: Tx, parent: Item) -> LastSync:
-    """Return the last sync of one assembly."""
+    """Return the last sync of one assembly; :data:`NEVER` if there was none."""
     return last_syncs(tx, [parent.id]).get(parent.id, NEVER)
 
 
 def last_syncs(tx: Tx, parent_ids: Collection[int]) -> dict[int, LastSync]:
-    """Return the last syncs of all these assemblies; those that were never synced (nor refused) are
-    absent.
-    """
+    """Read the last syncs of these assemblies; those that were never synced (nor refused) are absent."""
     rows = tx.conn.execute(select(bom_last_syncs).where(one_of(tx, bom_last_syncs.c.parent_id, parent_ids)))
     return {row.parent_id: _read(row) for row in rows}
 
@@ -371,12 +369,12 @@ def remember(
 
 
 def remember_refusal(tx: Tx, parent: Item, message: str) -> None:
-    """Write down that a merge was refused; what the last good one said stays. Nothing announces it."""
+    """Write down that a merge was refused; the last good merge stays known. No event announces it."""
     written = {"refused_at": tx.stamp, "refusal": message}
-    result = tx.conn.execute(
+    updated = tx.conn.execute(
         update(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id).values(**written)
     )
-    if not result.rowcount:
+    if not updated.rowcount:
         _insert(tx, parent, {"left_out": "[]", "components": "{}", **written})
     tx.touched.add(parent.uuid)
 
@@ -387,7 +385,7 @@ def _insert(tx: Tx, parent: Item, row: Mapping[str, Any]) -> None:
 
 
 def in_sentences(gaps: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what was left out, each in a sentence."""
+    """Describe what was left out, each gap in a sentence."""
     return [_sentence(gap) for gap in gaps]
 
 
@@ -511,9 +509,7 @@ def _prepare(tx: Tx, parent: Item, order: MergeOrder) -> _Prepared:
 
 
 def _children(tx: Tx, order: MergeOrder, lines: Sequence[Line]) -> tuple[dict[str, int], dict[str, str]]:
-    """Return (part number → item id, key → part number) of every child; RejectedError lists all bad
-    entries.
-    """
+    """Find (part number → item id, key → part number) of each child; RejectedError lists all bad entries."""
     child_ids = {line.child_part_number: line.child_id for line in lines}
     names = {line.child_part_number.casefold(): line.child_part_number for line in lines}
     asked = {entry.key for entry in order.entries if entry.key not in names}
@@ -555,7 +551,7 @@ def _as_mapping(line: Line) -> dict[str, Any]:
 
 
 def _overrides_gone(lines: Sequence[Line], numbers: set[str]) -> list[QuantityChange]:
-    # A person changed a quantity of a CAD line; now the assembly has it no more. The line is theirs, so it
+    # A person changed a quantity of a CAD line; now the assembly no longer has it. The line is theirs, so it
     # stays, but silence would leave a part in the BOM that nobody needs.
     return [
         QuantityChange(line.child_part_number, 0.0, line.state.quantity, line.state.unit or "")
@@ -613,7 +609,7 @@ def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:
 def _without_unchanged(
     prepared: _Prepared, changes: Sequence[LineRecord], answer: Mapping[str, Any]
 ) -> str | None:
-    """Return the answer's JSON without its unchanged lines, which the history has; None if it has not.
+    """Write the answer without its unchanged lines, which the history has; None if the history lacks them.
 
     Most of an answer says what is as it was; stored in full, a vault's nightly syncs would be gigabytes.
     """

@@ -93,7 +93,7 @@ def add_line(
     *,
     why: str | None = None,
 ) -> Edited:
-    """Add a line. Raises DuplicateError where the child is there already, CycleError, RejectedError."""
+    """Add a line. Raises DuplicateError if the BOM has the child already, CycleError, RejectedError."""
     parent = parent_to_change(tx, part_number, expected)
     child = get_item(tx, child_part_number)
     check_state(state)
@@ -119,9 +119,9 @@ def change_line(
 ) -> Edited:
     """Change the fields (those of LineState that people own) of the line with this id, or of this child.
 
-    Another quantity or a unit that is no piece makes an assembly line a manual override, which remembers what
-    the assembly said; giving that quantity back, in pieces, ends the override. A ``source`` that is given
-    wins over this.
+    A different quantity, or a unit other than pieces, makes an assembly line a manual override, which
+    remembers the quantity of the assembly; that quantity, in pieces again, ends the override. A ``source``
+    among the changes wins over this.
     """
     parent = parent_to_change(tx, part_number, expected)
     line = line_of(lines_of(tx, parent), which, parent)
@@ -154,7 +154,7 @@ def remove_line(
     """Remove the line with this id, or of this child; only people do this.
 
     seen
-        the :func:`mark_of` the line as the person saw it; LinesChangedError where it is another one by now.
+        the :func:`mark_of` the line as the person saw it; LinesChangedError if the line has changed since.
     """
     parent = parent_to_change(tx, part_number, expected)
     line = line_of(lines_of(tx, parent), which, parent)
@@ -165,7 +165,7 @@ def remove_line(
 
 
 def edited_state(before: LineState, changes: Mapping[str, Any]) -> LineState:
-    """Return the state after a person's edit; pure, so that the import's preview says the same."""
+    """Apply a person's edit to a state; pure, so that the import's preview gives the same result."""
     after = replace(before, **changes)
     if "source" in changes:
         if after.source == "assembly":
@@ -251,7 +251,7 @@ class Decision:
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """CAD and a person's line differ. ``cad_quantity`` 0: the assembly has it no more."""
+    """CAD and a person's line differ. ``cad_quantity`` 0: the assembly no longer has it."""
 
     line: Line
     cad_quantity: float
@@ -270,7 +270,7 @@ class Review:
 
 
 def review(tx: Tx, part_number: str) -> Review:
-    """Return what is open on the BOM of this item."""
+    """Find the open questions of an item's BOM."""
     parent = get_item(tx, part_number)
     lines = lines_of(tx, parent)
     return Review(
@@ -283,15 +283,16 @@ def review(tx: Tx, part_number: str) -> Review:
 
 
 def open_conflicts(tx: Tx, parent: Item, lines: Sequence[Line]) -> list[Conflict]:
-    """Return the conflicts of one BOM, in the order of its lines."""
+    """Find the open conflicts of one BOM, in the order of its lines."""
     graph = Graph(parent, {parent.id: lines}, conflicts_in(tx, [parent.id]))
     conflict = graph.conflicts.get(parent.id, {})
     return [Conflict(line, *conflict[line.child_id]) for line in lines if graph.told(line) is not None]
 
 
 def told_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[int, float]]:
-    """Return what the last merge said of people's lines: parent → child → quantity (internal ids); 0: not in
-    the assembly.
+    """Read the quantities that the last merge gave for people's lines; 0: not in the assembly.
+
+    Parent → child → quantity, by internal ids.
     """
     rows = tx.conn.execute(
         select(bom_conflicts.c.parent_id, bom_conflicts.c.child_id, bom_conflicts.c.cad_quantity).where(
@@ -307,9 +308,9 @@ def told_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[int, 
 def resolve(
     tx: Tx, part_number: str, decisions: Sequence[Decision], expected: int | None = None
 ) -> tuple[int, int]:
-    """Carry all ``decisions`` out as one change. Returns (change id, version).
+    """Carry out all ``decisions`` as one change. Returns (change id, version).
 
-    Raises LinesChangedError where lines are not as they were seen, RejectedError with everything that does
+    Raises LinesChangedError if lines are not as they were seen, RejectedError with everything that does
     not fit; then nothing was changed.
     """
     parent = parent_to_change(tx, part_number, expected)
@@ -353,7 +354,7 @@ def resolve(
 
 
 def marks_of(lines: Sequence[Line], conflicts: Mapping[str, Conflict]) -> dict[str, str]:
-    """Return line id → mark of what a page shows of it: its state, and what CAD says where they differ."""
+    """Make the mark of each line as a page shows it: its state, and CAD's quantity if they differ."""
     quantities = {line_id: conflict.cad_quantity for line_id, conflict in conflicts.items()}
     return {line.id: mark_of(line.state, quantities.get(line.id)) for line in lines}
 
@@ -423,10 +424,10 @@ def _write(
 
 
 class Waiting(NamedTuple):
-    """A BOM that waits, and for what. ``left_out`` counts what was left out, but the unregistered.
+    """A BOM that waits, and for what. ``left_out`` counts what was left out, without unregistered parts.
 
     told
-        what CAD says of its conflicts, by the child's internal id.
+        CAD's quantities in its conflicts, by the child's internal id.
     """
 
     item_id: int
@@ -444,17 +445,17 @@ class Waiting(NamedTuple):
 
     @property
     def conflicts(self) -> int:
-        """Return how many lines CAD has another quantity for."""
+        """Count the lines for which CAD has another quantity."""
         return len(self.told)
 
     @property
     def mark(self) -> str:
-        """Return what a decision is about: the BOM's version, and what CAD says of its conflicts."""
+        """Make the mark of what is decided about: the BOM's version, and CAD's quantities in conflict."""
         return _mark(self.version, self.told)
 
 
 def waiting(tx: Tx) -> list[Waiting]:
-    """Return all BOMs that wait, by part number; archived assemblies wait for nobody.
+    """Find all BOMs that wait for a person, by part number; archived assemblies never wait.
 
     Reads only what a list of them is filtered and sorted by: there may be thousands.
     """
@@ -484,17 +485,17 @@ def waiting(tx: Tx) -> list[Waiting]:
 
 
 def waiting_count(tx: Tx) -> int:
-    """Return how many BOMs wait."""
+    """Count the BOMs that wait."""
     return _count(tx, lambda _: true())
 
 
 def open_among(tx: Tx, item_ids: Collection[int]) -> int:
-    """Return how many of these BOMs wait."""
+    """Count how many of these BOMs wait."""
     return _count(tx, lambda element: one_of(tx, element, item_ids))
 
 
 def waiting_in(tx: Tx, folder: str) -> int:
-    """Return how many BOMs wait in a project folder and those in it."""
+    """Count the BOMs that wait in a project folder and in the folders below it."""
     last = bom_last_syncs.c
     inside = or_(last.folder == folder, last.folder.startswith(f"{folder}/", autoescape=True))
     return _count(tx, lambda element: element.in_(select(last.parent_id).where(inside)))
@@ -514,15 +515,15 @@ def _count(tx: Tx, which: Callable[[ColumnElement[int]], ColumnElement[bool]]) -
 
 def _mark(version: int, conflicts: Told) -> str:
     # A sync that only brings other conflicts changes no line, and so not the version.
-    digest = repr(sorted((child, said[0]) for child, said in conflicts.items()))
+    digest = repr(sorted((child, conflict[0]) for child, conflict in conflicts.items()))
     return f"{version}-{hashlib.sha256(digest.encode()).hexdigest()[:16]}"
 
 
 def lines_for(tx: Tx, part_number: str, action: ReviewAction, seen: str) -> tuple[list[Line], list[Line]]:
-    """Return the open lines of a BOM that ``action`` is about, and those of them that it would remove.
+    """Find the open lines of a BOM that ``action`` is about, and those of them that it would remove.
 
     seen
-        the mark of what the person saw; VersionConflictError if the BOM is another one by now.
+        the mark of what the person saw; VersionConflictError if the BOM has changed since.
     """
     open_lines = review(tx, part_number)
     if action in (ReviewAction.TAKE_CAD, ReviewAction.KEEP_SILO):
@@ -546,7 +547,7 @@ def lines_for(tx: Tx, part_number: str, action: ReviewAction, seen: str) -> tupl
 def decide_all(
     tx: Tx, part_number: str, action: ReviewAction, reason: str | None, seen: str
 ) -> tuple[int, int | None]:
-    """Decide the same about all :func:`lines_for` an action; return how many, and the change, if any."""
+    """Decide the same about all lines of :func:`lines_for`; return how many, and the change, if any."""
     lines, _ = lines_for(tx, get_item(tx, part_number, lock=True).part_number, action, seen)
     decisions = [Decision(line.child_part_number, action, reason, line.id) for line in lines]
     return len(decisions), resolve(tx, part_number, decisions)[0] if decisions else None
@@ -558,7 +559,7 @@ def _unreferenced(tx: Tx) -> Counter[int]:
 
 
 def _gaps(tx: Tx) -> dict[int, tuple[int, int]]:
-    """Count by BOM how much its last sync left out: what is registered or cannot be, and what is not yet."""
+    """Count by BOM what its last sync left out: all but the unregistered parts, and these."""
     row = bom_last_syncs.c
     query = select(row.parent_id, row.left_out, row.refused_at).where(text(f"({INCOMPLETE})"))
     gaps: dict[int, tuple[int, int]] = {}
@@ -596,7 +597,7 @@ class Followed(NamedTuple):
 
 
 def follow(tx: Tx, target: str, *, on: bool) -> None:
-    """Begin or end to follow ``item:UUID`` or ``folder:PATH``."""
+    """Begin or stop following ``item:UUID`` or ``folder:PATH``."""
     kind, _, name = target.partition(":")
     folder = name.strip("/")
     if kind == "item" and get_by_uuids(tx, [name], include_archived=True):
@@ -618,20 +619,20 @@ def follow(tx: Tx, target: str, *, on: bool) -> None:
 
 
 def is_followed(tx: Tx, user_id: int, item: Item) -> bool:
-    """Return whether this person follows the item."""
+    """Return True if this user follows the item."""
     row = follows.c
     query = select(row.seen).where(row.user_id == user_id, row.target == ITEM + item.uuid)
     return tx.conn.scalar(query) is not None
 
 
 def have_seen(tx: Tx) -> None:
-    """Note that the person has seen all news."""
+    """Mark all news of the person as seen."""
     seen = {"seen": tx.stamp, "event": events.bounds(tx)[1]}
     tx.conn.execute(follows.update().where(follows.c.user_id == tx.actor.own_id).values(seen))
 
 
 def followed(tx: Tx, actor: Actor, *, whole: bool = True) -> list[Followed]:
-    """Return what a person follows, news first; not ``whole``: without how many BOMs wait in folders."""
+    """Read what a person follows, news first. Not ``whole``: does not count the BOMs that wait in folders."""
     rows = tx.conn.execute(select(follows).where(follows.c.user_id == actor.own_id)).all()
     if not rows:
         return []
@@ -661,7 +662,7 @@ def followed(tx: Tx, actor: Actor, *, whole: bool = True) -> list[Followed]:
 
 
 def _newest_in(tx: Tx, folder: str, after: int, but: str) -> LastChange | None:
-    """Return the newest event of somebody else in the BOMs of a folder."""
+    """Find the newest event in the BOMs of a folder, after event ``after``, that is not by user ``but``."""
     event, last = event_log.c, bom_last_syncs.c
     query = (
         select(event.at, event.username, items.c.part_number)
@@ -687,20 +688,18 @@ def assign(tx: Tx, part_number: str, username: str) -> None:
 
 
 def assignee_of(tx: Tx, item: Item) -> str:
-    """Return the name of the person who settles what is open in a BOM; "" if it is nobody in particular."""
+    """Return the name of the person who settles what is open in a BOM; "" if nobody in particular does."""
     query = select(users.c.username).join(assignees, assignees.c.user_id == users.c.id)
     return tx.conn.scalar(query.where(assignees.c.item_id == item.id)) or ""
 
 
 def editors(tx: Tx) -> list[str]:
-    """Return the names of all who may settle what is open."""
+    """List the names of all users who may settle what is open."""
     return [user.username for user in access.list_users(tx) if user.active and user.role.covers(Role.EDITOR)]
 
 
 def badge(tx: Tx, actor: Actor) -> int:
-    """Return how much waits for one person: the open BOMs that are theirs, and the news of what they
-    follow.
-    """
+    """Count what waits for a person: the open BOMs that are theirs, and the news of what they follow."""
     theirs = select(assignees.c.item_id).where(assignees.c.user_id == actor.own_id)
     ids = list(tx.conn.scalars(theirs))
     mine = open_among(tx, ids) if ids else 0
@@ -708,7 +707,7 @@ def badge(tx: Tx, actor: Actor) -> int:
 
 
 def last_look(tx: Tx, user_id: int, item: Item) -> str | None:
-    """Return when this person last looked at the product; looks within one hour count as one."""
+    """Find when this person last looked at the product before now; looks within one hour count as one."""
     row = tx.conn.execute(select(product_looks).where(_look_of([(user_id, item.id)]))).one_or_none()
     if row is None:
         return None
@@ -716,7 +715,7 @@ def last_look(tx: Tx, user_id: int, item: Item) -> str | None:
 
 
 def keep_looks(db: Database) -> None:
-    """Note who looked at what; no page waits for this."""
+    """Write down who looked at what, and when; no page waits for this."""
     looks = dict(db.looks)
     if not looks:
         return

@@ -62,7 +62,7 @@ LONGEST_CHANGE = 300
 
 
 class OpenBom(NamedTuple):
-    """What is open in one BOM: lines that CAD has no more, conflicts, and what its last sync left out."""
+    """What is open in one BOM: lines that CAD no longer has, conflicts, and what its last sync left out."""
 
     part_number: str
     unreferenced: int = 0
@@ -71,13 +71,13 @@ class OpenBom(NamedTuple):
 
     @property
     def questions(self) -> str:
-        """Return what a person has to decide there, in words."""
+        """Count what a person has to decide there, in words."""
         counts = ((self.unreferenced, "unreferenced line"), (self.conflicts, "conflict"))
         return ", ".join(counted(count, word) for count, word in counts if count)
 
     @property
     def words(self) -> str:
-        """Return all of it, in words."""
+        """Describe all that is open, with what the last sync left out."""
         return ", ".join(filter(None, (self.questions, self.incomplete)))
 
 
@@ -108,7 +108,7 @@ class Summary:
     open
         a BOM's internal id → what is open there; of the product's own BOM and of all below it.
     worth, as_part
-        what is in it is worth; and what it counts for in another product.
+        mass and cost of what is in it; and those that it counts with in another product.
     levels
         how many rows each level of its tree has, at most ``MAX_DEPTH`` levels.
     parts, assemblies, lines
@@ -136,11 +136,15 @@ class Summary:
     cost_missing: Sequence[str] = ()
 
     def told(self, but: int | None = None) -> list[tuple[str, str]]:
-        """Return (part number, what is open there) of each BOM, ``but`` one, by part number."""
+        """List (part number, what is open there) of each BOM except ``but``, by part number."""
         return sorted((bom.part_number, bom.words) for item_id, bom in self.open.items() if item_id != but)
 
     def inside(self, own: int, *, is_open: bool) -> list[str]:
-        """Return what its row in a tree says; ``own`` is its internal id, an open row shows its lines."""
+        """Describe what is open in an item, for its row in a tree.
+
+        ``own`` is the item's internal id. An open row shows its lines, so that only what is incomplete is
+        named.
+        """
         here = self.open.get(own, OpenBom(""))
         below = len(self.open) - (own in self.open)
         words = [here.incomplete]
@@ -150,17 +154,17 @@ class Summary:
 
     @property
     def stands_alone(self) -> bool:
-        """Return True if it states its mass for parts that state none."""
+        """Return True if the assembly states its mass in place of parts that state none."""
         return self.as_part.mass_whole and not self.worth.mass_whole
 
     @property
     def questions(self) -> int:
-        """Return how many lines wait for a person."""
+        """Count the lines that wait for a person."""
         return sum(bom.unreferenced + bom.conflicts for bom in self.open.values())
 
     @property
     def incomplete(self) -> int:
-        """Return how many BOMs do not hold all that they should."""
+        """Count the BOMs that lack something."""
         return sum(bool(bom.incomplete) for bom in self.open.values())
 
 
@@ -195,14 +199,12 @@ class Unmade(NamedTuple):
 
 
 def summary_of(tx: Tx, item: Item) -> Summary:
-    """Return the summary of one product. Raises CycleError, BusyError (it is too large, and made
-    meanwhile).
-    """
+    """Return the summary of one product. Raises CycleError; BusyError while a large one is summed up."""
     return summaries(tx, [item.id])[item.id]
 
 
 def summaries(tx: Tx, item_ids: Collection[int]) -> dict[int, Summary]:
-    """Return the summaries of these items, by internal id: what is kept, and what is made for it."""
+    """Return the summaries of these items by internal id; those that are not kept are made."""
     wanted = set(item_ids)
     by_item = dict(_stored(tx, wanted))
     made = _make(tx, wanted - by_item.keys(), tx.settings.max_expanded_rows)
@@ -210,23 +212,23 @@ def summaries(tx: Tx, item_ids: Collection[int]) -> dict[int, Summary]:
 
 
 def marks_of(tx: Tx, listed: Iterable[Item]) -> dict[int, list[str]]:
-    """Say what is open in each of these products, for a list of them."""
+    """Describe what is open in each of these products, for a list of them."""
     wanted = {item.id for item in listed if item.item_type == "assembly" or item.bom_version}
     by_item = at_once(tx, wanted)
     return {item_id: summary.inside(item_id, is_open=False) for item_id, summary in by_item.items()}
 
 
 def at_once(tx: Tx, wanted: Set[int]) -> dict[int, Summary]:
-    """Return the summaries of these items; those of large products once the server has summed them up."""
-    result = dict(_stored(tx, wanted))
+    """Return the summaries of these items; a large product is absent until the server has summed it up."""
+    by_item = dict(_stored(tx, wanted))
     with suppress(BusyError, CycleError):
-        made = _make(tx, wanted - result.keys(), MOST_FOR_A_LIST)
-        result |= {item_id: node.summary for item_id, node in made.items()}
-    return result
+        made = _make(tx, wanted - by_item.keys(), MOST_FOR_A_LIST)
+        by_item |= {item_id: node.summary for item_id, node in made.items()}
+    return by_item
 
 
 def standing_alone(tx: Tx, graph: Graph) -> set[int]:
-    """Return the assemblies in a graph that state a mass for parts without a mass, by internal id."""
+    """Find the assemblies of a graph that state a mass in place of parts without one, by internal id."""
     by_item = summaries(tx, graph.lines.keys() - {graph.root.id})
     return {item_id for item_id, summary in by_item.items() if summary.stands_alone}
 
@@ -239,7 +241,7 @@ def _stored(tx: Tx, item_ids: Collection[int]) -> Iterator[tuple[int, Summary]]:
 
 
 def _make(tx: Tx, wanted: Collection[int], most: int | None = None) -> dict[int, _Node]:
-    """Make the nodes of these items, from the lines of what is not kept below them, at most so many."""
+    """Make the nodes of these items from the lines below them that are not kept, at most so many."""
     if not wanted:
         return {}
     lines, nodes = _lines_below(tx, wanted, most)
@@ -271,7 +273,7 @@ def _followed(line: Line) -> bool:
 def _lines_below(
     tx: Tx, wanted: Collection[int], most: int | None
 ) -> tuple[dict[int, list[Line]], dict[int, _Node]]:
-    """Return the lines of these items and of all below them, down to what is kept; and the latter."""
+    """Read the lines of these items and of all below them, down to kept nodes; return both."""
     lines: dict[int, list[Line]] = {}
     nodes: dict[int, _Node] = {}
     level, seen, count = set(wanted), set(wanted), 0
@@ -331,14 +333,14 @@ def _own(tx: Tx, item_ids: Collection[int]) -> dict[int, _Own]:
 
 
 def own_worth(properties: Mapping[str, Any]) -> MassAndCost:
-    """Return what an item states of itself."""
+    """Read the mass [kg] and the cost that an item states itself."""
     mass, cost = positive_number(properties, "mass_kg"), positive_number(properties, "standard_cost")
     costs = {currency_of(properties): as_decimal(cost)} if cost is not None else {}
     return MassAndCost(None if mass is None else as_decimal(mass), mass is not None, costs, bool(costs))
 
 
 def _open(tx: Tx, lines: Mapping[int, Sequence[Line]], own: Mapping[int, _Own]) -> dict[int, OpenBom]:
-    """Return what is open in each of these BOMs itself."""
+    """Find what is open in each of these BOMs themselves; a BOM without open questions is absent."""
     ids = {item_id for item_id in own if item_id in lines or own[item_id].is_assembly}
     syncs, conflicts = last_syncs(tx, ids), conflicts_in(tx, lines)
     boms: dict[int, OpenBom] = {}
@@ -355,7 +357,7 @@ def _open(tx: Tx, lines: Mapping[int, Sequence[Line]], own: Mapping[int, _Own]) 
 
 
 def _bom_changes(tx: Tx, parent_ids: Collection[int]) -> dict[int, tuple[str, str]]:
-    """Return when each of these BOMs last changed, and by whom."""
+    """Find when each of these BOMs last changed, and who changed it."""
     row = bom_changes.c
     query = select(row.parent_id, row.at, row.username).join(
         items, (items.c.id == row.parent_id) & (items.c.bom_version == row.version)
@@ -367,9 +369,7 @@ def _bom_changes(tx: Tx, parent_ids: Collection[int]) -> dict[int, tuple[str, st
 def _children_first(
     below: Mapping[int, Sequence[int]], wanted: Iterable[int], names: Mapping[int, str]
 ) -> Iterator[int]:
-    """Yield the wanted items, and what is below them and has something below, children first; else
-    CycleError.
-    """
+    """Yield the wanted items and the assemblies below them, children first. Raises CycleError."""
     done: set[int] = set()
     for first in wanted:
         way: dict[int, Iterator[int]] = {} if first in done else {first: iter(below.get(first, ()))}
@@ -398,7 +398,7 @@ class _Maker:
     bom_changes: Mapping[int, tuple[str, str]]
 
     def node(self, item_id: int) -> _Node:
-        """Return the node of an item whose sub-assemblies have theirs."""
+        """Return the node of an item; make it, from the nodes of its sub-assemblies, if there is none."""
         if item_id not in self.nodes:
             self.nodes[item_id] = self._made(item_id)
         return self.nodes[item_id]
@@ -494,7 +494,7 @@ def _node(row: Any) -> _Node:
 
 
 def keep_summaries(db: Database, ended: Callable[[], bool] = lambda: False) -> None:
-    """Keep what reads have made, but for what an event since then concerns; nobody waits for it.
+    """Store the summaries that reads have made, unless an event since then concerns them.
 
     ended
         says whether to stop before a product that no read could make is made whole.
@@ -542,9 +542,9 @@ def _keep_below(
     report: Callable[[str], None] = lambda _: None,
     ended: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Make and keep what is not kept of these products, a part after the other; return how many.
+    """Make and keep the summaries that these products lack, part by part; return how many.
 
-    However large a product is, so a read has only to read what is kept.
+    So a read of a product of any size finds all that it needs kept.
     """
     below: dict[int, list[int]] = {}
     counts: Counter[int] = Counter()
@@ -581,7 +581,7 @@ def _keep_below(
 
 
 def _parts(order: Iterable[int], counts: Mapping[int, int]) -> Iterator[list[int]]:
-    """Yield the assemblies, as many at a time as have :data:`BATCH_LINES` lines in all."""
+    """Yield the assemblies in groups of up to :data:`BATCH_LINES` lines; one alone may have more."""
     part: list[int] = []
     lines = 0
     for item_id in order:

@@ -129,10 +129,10 @@ def export(
     item_type: str = "",
     release: str = "",
 ) -> Export:
-    """Return the BOM of an item, with the totals for so many ``pieces`` of it.
+    """Export the BOM of an item, with the totals for so many ``pieces`` of it.
 
     words, item_type
-        the filter: only parts that it finds, and in the other views than the flat one what leads to them.
+        the filter: only parts that match and, except in the flat view, what leads to them.
     release
         the label of a revision: the product as it was frozen.
     """
@@ -142,13 +142,13 @@ def export(
     filtered = bool(words or item_type)
     levels = 1 if view is View.SINGLE and not filtered else None  # a filter shows what leads to its parts
     graph = frozen.graph if frozen else load_graph(tx, root, levels, bare=True)
-    root, still = graph.root, frozen.open if frozen else summary_of(tx, root).open
+    root, open_boms = graph.root, frozen.open if frozen else summary_of(tx, root).open
     summed: Mapping[int, Summary] = {}
     if not frozen:
         below = [line.child_id for line in graph.lines.get(root.id, ())] if levels else graph.lines
         summed = summaries(tx, {*below} - {root.id})
     # What a sync left out has no number, supplier or type: a filter finds none of it.
-    gaps = [] if filtered or of else _gap_rows(tx, root, still, view)
+    gaps = [] if filtered or of else _gap_rows(tx, root, open_boms, view)
     fitting: Callable[[Line], bool] = lambda _line: True  # noqa: E731 - as what a filter gives
     if filtered and frozen:
         fitting = sought(words, item_type, frozen.parts)
@@ -159,22 +159,22 @@ def export(
     if filtered:
         asked = f"“{words}”" if words else ""
         notes.append(f"Only what fits {asked}{' of the type ' + item_type if item_type else ''}")
-    for head, told_of in (("Incomplete", "incomplete"), ("Open", "questions")):
-        open_ones = [(bom.part_number, getattr(bom, told_of)) for bom in still.values()]
-        said = sorted(f"{number} {open_lines}" for number, open_lines in open_ones if open_lines)
-        if said:
-            more = f"; and {len(said) - MOST_TOLD} more" if len(said) > MOST_TOLD else ""
-            notes.append(f"{head}: {'; '.join(said[:MOST_TOLD])}{more}")
+    for head, field in (("Incomplete", "incomplete"), ("Open", "questions")):
+        open_ones = [(bom.part_number, getattr(bom, field)) for bom in open_boms.values()]
+        sentences = sorted(f"{number} {open_lines}" for number, open_lines in open_ones if open_lines)
+        if sentences:
+            more = f"; and {len(sentences) - MOST_TOLD} more" if len(sentences) > MOST_TOLD else ""
+            notes.append(f"{head}: {'; '.join(sentences[:MOST_TOLD])}{more}")
 
     def dressed(bare: Iterable[_BareColumns]) -> Iterator[Row]:
-        for some in portions(bare):
-            parts = frozen.parts if frozen else some_parts(tx, {cells.line.child_id for cells in some})
-            for cells in some:
+        for portion in portions(bare):
+            parts = frozen.parts if frozen else some_parts(tx, {cells.line.child_id for cells in portion})
+            for cells in portion:
                 child, amount = cells.line.child_id, cells.total * pieces
-                part, summary, said = parts[child], summed.get(child), still.get(child)
+                part, summary, bom = parts[child], summed.get(child), open_boms.get(child)
                 worth = summary.as_part if summary else own_worth(part.properties)
                 worth = frozen.worths[child] if frozen else worth
-                fields = {"Incomplete": said.incomplete or None if said else None}
+                fields = {"Incomplete": bom.incomplete or None if bom else None}
                 fields["Open"] = ", ".join(cells.doubts) or None
                 fields[PICTURE] = part.thumbnail_key
                 yield (
@@ -224,7 +224,7 @@ _CHANGES |= {"before": "Before", "after": "After", "at": "At", "username": "By"}
 
 
 def export_changes(tx: Tx, part_number: str, since: str, until: str) -> Export:
-    """Return what changed in a product between two moments, to be written as a table."""
+    """Export what changed in a product between two moments, as a table."""
     root = get_item(tx, part_number)
     first, last, happenings = changes_of(tx, root, since, until)
     rows = ({title: getattr(change, name) for name, title in _CHANGES.items()} for change in happenings)
@@ -233,7 +233,7 @@ def export_changes(tx: Tx, part_number: str, since: str, until: str) -> Export:
 
 
 def _values(worth: MassAndCost, amount: Exact) -> Row:
-    """Return mass and cost, of one and of all, where nothing of them is unknown and there is one currency."""
+    """Return mass and cost, of one and of all, if nothing of them is unknown and there is one currency."""
     row: Row = {}
     count = as_decimal(amount)
     if worth.mass is not None and worth.mass_whole:
@@ -245,11 +245,9 @@ def _values(worth: MassAndCost, amount: Exact) -> Row:
 
 
 def _gap_rows(tx: Tx, root: Item, open_ones: Mapping[int, OpenBom], view: View) -> list[Row]:
-    """Return what the last syncs left out: rows without a part number, after all others; missing is a line
-    too.
-    """
+    """Return a row for each gap of the last syncs; it has no part number, and is written after all others."""
     shown = {root.id} if view is View.SINGLE else open_ones.keys()
-    ids = [item_id for item_id, said in open_ones.items() if said.incomplete and item_id in shown]
+    ids = [item_id for item_id, bom in open_ones.items() if bom.incomplete and item_id in shown]
     return [
         {
             "Name": gap.get("name") or gap.get("object"),
@@ -262,7 +260,7 @@ def _gap_rows(tx: Tx, root: Item, open_ones: Mapping[int, OpenBom], view: View) 
 
 
 def to_csv(made: Export, out: IO[bytes], *, semicolons: bool = False) -> None:
-    """Write RFC 4180: CRLF, quotes doubled; UTF-8 with the mark by which Excel knows it.
+    """Write CSV (RFC 4180): CRLF, quotes doubled; UTF-8 with the mark by which Excel recognises it.
 
     With ``semicolons``, and commas in numbers, it opens right in an Excel of a country that writes 1,5.
     """
@@ -286,10 +284,11 @@ def _csv_cell(value: Any, semicolons: bool) -> Any:
 def to_xlsx(made: Export, out: IO[bytes], picture: Callable[[str], Path] | None = None) -> Callable[[], None]:
     """Write a workbook with one sheet; texts are texts, whatever they begin with.
 
-    Returns what packs it once all rows are read: that takes seconds, in which no transaction should wait.
+    Returns a function that packs it once all rows are read: that takes seconds, in which no transaction
+    should wait.
 
     picture
-        the file of a picture; with it the first rows show their part.
+        finds the file of a picture; if given, the first rows show their part.
     """
     from xlsxwriter import Workbook
 
@@ -371,9 +370,7 @@ def to_json(made: Export, out: IO[bytes]) -> None:
 
 
 def _row(bare: _BareColumns, part: RolledItem, amount: Exact, *, of_a_line: bool) -> Row:
-    """Return a row's cells; ``of_a_line`` False: not those of a line, as a part may be in the tree on
-    several.
-    """
+    """Return the cells of a row. Not ``of_a_line``: without cells of a line, as a part may have several."""
     line, state, properties = bare.line, bare.line.state, part.properties
     row: Row = {
         "Item": bare.item,

@@ -56,26 +56,26 @@ class Graph:
     conflicts: Mapping[int, Told] = field(default_factory=dict)
 
     def told(self, line: Line) -> float | None:
-        """Return what CAD says of a line in conflict (0: not in CAD); None if there is no conflict."""
+        """Return CAD's quantity for a line in conflict (0: not in CAD); None if there is no conflict."""
         if line.state.rel_type != "component" or line.child_id not in self.conflicts.get(line.parent_id, ()):
             return None
         return self.conflicts[line.parent_id][line.child_id][0]
 
     def doubts(self, line: Line) -> list[str]:
-        """Return what a person still has to decide about a line, in words."""
+        """List what a person still has to decide about a line, in words."""
         quantity = self.told(line)
-        result = ["unreferenced"] if line.state.unreferenced_since else []
+        doubts = ["unreferenced"] if line.state.unreferenced_since else []
         if quantity is not None:
-            result.append(f"CAD says {plain(quantity)}" if quantity else "CAD no longer has it")
-        return result
+            doubts.append(f"CAD says {plain(quantity)}" if quantity else "CAD no longer has it")
+        return doubts
 
     def names(self) -> dict[int, str]:
-        """Return internal id → part number, of the root and of all below it."""
+        """Return internal id → part number of the root and of all items below it."""
         below = {line.child_id: line.child_part_number for lines in self.lines.values() for line in lines}
         return below | {self.root.id: self.root.part_number}
 
     def components(self, item_id: int) -> list[Line]:
-        """Return the lines that are followed."""
+        """Return the component lines of an item; only these are followed."""
         return [line for line in self.lines.get(item_id, ()) if line.state.rel_type == "component"]
 
 
@@ -92,7 +92,7 @@ class FlatRow(NamedTuple):
     """A leaf part: how much of it one root needs in all.
 
     gone
-        so much of it because of lines, on any level, that CAD has no more.
+        how much of it comes from lines, on any level, that CAD no longer has.
     disputed
         true if a quantity on the way to it is in conflict.
     """
@@ -104,7 +104,7 @@ class FlatRow(NamedTuple):
     disputed: bool = False
 
     def doubts(self, pieces: int = 1) -> list[str]:
-        """Return what a person still has to decide about it, in words."""
+        """List what a person still has to decide about the part, in words."""
         doubt_texts = ["unreferenced"] if self.gone else []
         if 0 < self.gone < self.total:
             doubt_texts = [f"{plain(self.gone * pieces)} of {plain(self.total * pieces)} unreferenced"]
@@ -124,11 +124,11 @@ class Usage:
 
 
 def load_graph(tx: Tx, root: Item, depth: int | None = None, *, bare: bool = False) -> Graph:
-    """Return all lines below ``root``, each once; of the first ``depth`` levels only, where that is given.
+    """Read all lines below ``root``, each once; with ``depth`` only those of the first levels.
 
     bare
-        as in :func:`select_lines`, for who reads the parts as well.
-    TooLargeError where there are more than ``max_expanded_rows``: they would fill the memory.
+        as in :func:`select_lines`, for callers that read the parts as well.
+    TooLargeError if there are more than ``max_expanded_rows``: they would fill the memory.
     """
     query = select_lines(bare=bare).order_by(bom_lines.c.parent_id, bom_lines.c.position)
     if depth == 1:
@@ -157,7 +157,7 @@ _says_the_same = lru_cache(maxsize=4096)(says_the_same)
 
 
 def conflicts_in(tx: Tx, parent_ids: Collection[int] | None = None) -> dict[int, Told]:
-    """Return the conflicts of the last merges that neither a decision nor an edit has settled since.
+    """Find the conflicts of the last merges that neither a decision nor an edit has settled since.
 
     parent_ids
         of these BOMs only; None: of all.
@@ -185,9 +185,10 @@ def conflicts_in(tx: Tx, parent_ids: Collection[int] | None = None) -> dict[int,
 
 
 def sought(words: str, item_type: str, parts: Mapping[int, RolledItem]) -> Callable[[Line], bool]:
-    """Return the test that a filter is, for tree, flat list, totals, print and exports.
+    """Make a test of lines from a filter, for tree, flat list, totals, print and exports.
 
-    All words are in a part's number, name, description, supplier or manufacturer, and it has the type.
+    A line passes if its part has the type, and all words in its number, name, description, supplier or
+    manufacturer.
     """
     test = fits(words)
 
@@ -203,24 +204,24 @@ def sought(words: str, item_type: str, parts: Mapping[int, RolledItem]) -> Calla
 
 
 def found_below(tx: Tx, graph: Graph, words: str, item_type: str) -> Callable[[Line], bool]:
-    """Search as :func:`sought` in all of a graph, whose parts are read some at a time and not kept."""
+    """Make the test of :func:`sought` for a whole graph; parts are read in portions and not kept."""
     lines = {line.child_id: line for below in graph.lines.values() for line in below}
     found: set[int] = set()
-    for some in portions(lines.values()):
-        test = sought(words, item_type, some_parts(tx, [line.child_id for line in some]))
-        found.update(line.child_id for line in some if test(line))
+    for portion in portions(lines.values()):
+        test = sought(words, item_type, some_parts(tx, [line.child_id for line in portion]))
+        found.update(line.child_id for line in portion if test(line))
     return lambda line: line.child_id in found
 
 
 def portions(rows: Iterable[R]) -> Iterator[list[R]]:
-    """Yield the rows, :data:`PORTION` at a time."""
-    left = iter(rows)
-    while some := list(islice(left, PORTION)):
-        yield some
+    """Yield the rows in lists of up to :data:`PORTION` rows."""
+    rest = iter(rows)
+    while portion := list(islice(rest, PORTION)):
+        yield portion
 
 
 def leading_to(graph: Graph, fitting: Callable[[Line], bool]) -> Callable[[Line], bool]:
-    """Return a test of lines: true if the line fits, or something below it does."""
+    """Make a test of lines: true if the line fits, or if something below it does."""
     below: dict[int, bool] = {}
 
     def hit(line: Line) -> bool:
@@ -232,7 +233,7 @@ def leading_to(graph: Graph, fitting: Callable[[Line], bool]) -> Callable[[Line]
 
 
 def found_parts(graph: Graph, fitting: Callable[[Line], bool]) -> list[FlatRow]:
-    """Return what fits first on each way down, each part once, with all that one root needs of it."""
+    """Find what fits first on each way down: each part once, with all that one root needs of it."""
     ids = {line.child_id for lines in graph.lines.values() for line in lines if fitting(line)}
     return [row for row in flatten(graph, ids) if row.line.child_id in ids]
 
@@ -255,8 +256,9 @@ def ids_below(root: Item) -> Select[tuple[int]]:
 
 
 def _reach(root: Item, depth: int | None, *, leaves: bool = True) -> Select[tuple[int]]:
-    """Return the ids of the items whose lines belong to the first ``depth`` levels, or to all; with the
-    ``leaves``, or only of what has lines.
+    """Select the ids of the items whose lines belong to the first ``depth`` levels, or to all (None).
+
+    Without ``leaves``: only of items that have lines.
     """
     first = select(literal(root.id, items.c.id.type).label("item_id"), literal(1).label("level"))
     reach = first.cte("reach", recursive=True)
@@ -272,7 +274,7 @@ def _reach(root: Item, depth: int | None, *, leaves: bool = True) -> Select[tupl
 
 
 def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
-    """Yield the tree as rows, parents before their children. CycleError if it never ends, TooLargeError."""
+    """Yield the tree as rows, parents before their children. Raises CycleError, TooLargeError."""
     order_of(graph)  # finds a cycle before it is walked
     count = 0
     graph_lines = graph.lines
@@ -299,13 +301,13 @@ def expand(graph: Graph, depth: int, limit: int) -> Iterator[Occurrence]:
 
 
 def flatten(graph: Graph, closed: Collection[int] = ()) -> list[FlatRow]:
-    """Return the leaf parts with their total quantities, in the order the tree shows them first.
+    """Add up the quantities of the leaf parts; their order is that in which the tree first shows them.
 
     closed
         assemblies (internal ids) that count as parts.
     """
     nothing: tuple[Exact, Exact, bool] = (0, 0, False)
-    # How much of each assembly, how much of it CAD has no more, and whether a quantity above is in conflict.
+    # How much of each assembly, how much of it CAD no longer has, whether a quantity above is in conflict.
     needs: dict[int, tuple[Exact, Exact, bool]] = {graph.root.id: (1, 0, False)}
     totals: dict[tuple[int, str | None], tuple[Exact, Exact, bool]] = {}
     shown: dict[tuple[int, str | None], Line] = {}
@@ -340,9 +342,7 @@ def _exact(quantity: float) -> Exact:
 
 
 def multiplied(factor: Exact, line: Line) -> Exact:
-    """Return how much of the line's child is in ``factor`` of its parent; ConflictError above
-    :data:`MAX_TOTAL`.
-    """
+    """Multiply ``factor`` by the quantity of a line; ConflictError above :data:`MAX_TOTAL`."""
     return _counted(factor * _exact(line.state.quantity), line)
 
 
@@ -358,7 +358,7 @@ def _counted(amount: Exact, line: Line) -> Exact:
 def where_used(
     tx: Tx, item: Item, *, indirect: bool = False, limit: int = 1000, offset: int = 0
 ) -> tuple[list[Usage], int]:
-    """Return a page of an item's parents, and how many there are in all.
+    """Find a page of an item's parents, and how many there are in all.
 
     With ``indirect`` also their parents, the nearest first, each line once; by part number in each level.
     """
@@ -409,7 +409,7 @@ def _uses(tx: Tx, of_level: ColumnElement[bool], depth: int, limit: int, offset:
 
 
 def order_of(graph: Graph) -> list[int]:
-    """Return the assemblies (internal ids), parents before their children; CycleError if there is a ring."""
+    """Sort the assemblies (internal ids), parents before their children; CycleError if there is a ring."""
     done: list[int] = []
     state: dict[int, bool] = {graph.root.id: False}  # False = being walked, True = done
     stack = [(graph.root.id, iter(graph.components(graph.root.id)))]
@@ -459,7 +459,7 @@ class CostRollup:
 class MassLine(NamedTuple):
     """A part whose stated mass was taken [kg], as the API sends it.
 
-    ``is_assembly`` where it stands for all below it.
+    ``is_assembly`` if it stands for all below it.
     """
 
     part_number: str
@@ -495,7 +495,7 @@ class RolledItem(NamedTuple):
 
 
 def parts_of(tx: Tx, graph: Graph) -> dict[int, RolledItem]:
-    """Return everything in the graph, by internal id, read once for both roll-ups."""
+    """Read what roll-ups need of all items in the graph, by internal id."""
     return some_parts(tx, graph.names())
 
 
@@ -504,7 +504,7 @@ _read_json = json.JSONDecoder().raw_decode
 
 
 def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, RolledItem]:
-    """Return these items, by internal id."""
+    """Read what roll-ups need of these items, by internal id."""
     row = items.c
     query = select(
         row.id,
@@ -536,7 +536,7 @@ def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, RolledItem]:
 def with_supplier(
     properties: Mapping[str, Any], listed: Sequence[Mapping[str, Any]] | None
 ) -> Mapping[str, Any]:
-    """Return properties with the supplier that a list shows: the preferred one, else the first."""
+    """Add to properties the supplier that a list shows: the preferred one, else the first."""
     if not listed:
         return properties
     shown = next((line for line in listed if line["preferred"]), listed[0])
@@ -545,12 +545,12 @@ def with_supplier(
 
 
 def currency_of(properties: Mapping[str, Any]) -> str:
-    """Return the currency of an item's cost."""
+    """Return the currency of an item's cost; :data:`DEFAULT_CURRENCY` if it states none."""
     return str(properties.get("currency") or DEFAULT_CURRENCY)
 
 
 def roll_up_cost(flat: Iterable[FlatRow], parts: Mapping[int, RolledItem]) -> CostRollup:
-    """Multiply the flat BOM with the standard cost."""
+    """Add up the cost of the flat BOM from the parts' ``standard_cost``, per currency."""
     rows, costs, missing = [], dict[str, list[Decimal]](), []
     for row in flat:
         item = parts[row.line.child_id]
@@ -570,8 +570,9 @@ def roll_up_cost(flat: Iterable[FlatRow], parts: Mapping[int, RolledItem]) -> Co
 def roll_up_mass(
     flat: Iterable[FlatRow], parts: Mapping[int, RolledItem], assemblies: Collection[int]
 ) -> MassRollup:
-    """Add up masses from the leaves; those ``assemblies``, leaves of the flat BOM as well, stand for all that
-    is in them with their own.
+    """Add up masses [kg] from the leaves; each of ``assemblies`` counts with the mass that it states.
+
+    These assemblies are leaves of the flat BOM as well.
     """
     amounts: dict[int, Exact] = {}
     for row in flat:
@@ -589,7 +590,7 @@ _NUMBER = int | float | Decimal
 
 
 def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
-    """Return a property as a number of at least 0, None if it is absent or no such number."""
+    """Read a property as a number of at least 0; None if it is absent or no such number."""
     value = properties.get(name)
     if isinstance(value, str):
         value = read_number(value, points_are_decimal=True).value
