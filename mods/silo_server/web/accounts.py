@@ -97,7 +97,7 @@ class PageGuard(Guard):
 
 
 async def _pending_form(request: Request) -> UnsentForm | None:
-    """Return what the request's form holds; None if it is none, or too large to be carried along."""
+    """Read the form that a request sends; None if it sends none, or one too large to carry along."""
     length = request.headers.get("content-length", "")
     small = length.isdigit() and int(length) <= MOST_KEPT
     is_form = request.headers.get("content-type", "").startswith(FORM_TYPES)
@@ -146,7 +146,7 @@ async def to_login(request: Request, error: Exception) -> Response:
 
 
 async def send_again(request: Request, error: Exception) -> Response:
-    """Ask whether a form of an earlier session is to be sent."""
+    """Ask whether to send a form of an earlier session now."""
     assert isinstance(error, OldFormError)
     actor, kept = error.actor, error.kept
     return await anyio.to_thread.run_sync(
@@ -161,7 +161,7 @@ Next = Annotated[str, Query(max_length=500)]
 
 @router.get("/login")
 def login_form(request: Request, next: Next = START) -> Response:
-    """Return the login form; users who are logged in already are sent on."""
+    """Show the login form; redirect users who are logged in already."""
     if find_actor(request) is not None:
         return back(local_path(next))
     return _login_page(request, local_path(next))
@@ -195,13 +195,13 @@ def log_in(request: Request, server: ServerDep, form: Form) -> Response:
 
 @router.get("/login/link/{secret}")
 def login_link(request: Request, secret: str, next: Next = START) -> Response:
-    """Ask whether to use the link up: what only looks at links (mail scanners, previews) must not do that."""
+    """Ask before the link is used up: mail scanners and previews open links, and must not do that."""
     return page_for(request, None, "login_link.html", secret=secret, target=local_path(next))
 
 
 @router.post("/login/link/{secret}", dependencies=[Depends(own_form)])
 def use_link(request: Request, server: ServerDep, secret: str, form: Form) -> Response:
-    """Begin a session by a one-time link; one that was used already leads on where the session lives."""
+    """Begin a session by a one-time link; a used one still leads on in a browser that is logged in."""
     target = local_path(text(form, "next"))
     try:
         session = access.use_login_link(server.db, secret, client_address(request))
@@ -224,7 +224,7 @@ def ask_for_program(call: Reader, name: ProgramName, proof: Proof) -> Response:
 
 @router.post("/login/program")
 def let_program_in(call: Reader, name: ProgramName, proof: Proof) -> Response:
-    """Make a token whose secret only the program knows: no more than its SHA-256 came here."""
+    """Make a token for a program, which alone knows its secret: only the SHA-256 came here."""
     with call.write(even_when_read_only=True) as tx:
         access.let_program_in(tx, name, proof)
     return back("/account", _("%(name)s is logged in. You may close this page.", name=name))
@@ -241,7 +241,7 @@ def log_out(call: Reader) -> Response:
 
 @router.post("/language", dependencies=[Depends(own_form)])
 def choose_language(form: Form) -> Response:
-    """Keep the language that a person chose in this browser."""
+    """Keep the language that a person chose, in a cookie of this browser."""
     chosen = text(form, "language")
     if chosen not in LANGUAGES:
         raise RejectedError(f"language: wanted one of {', '.join(LANGUAGES)}, got {chosen!r}")
@@ -262,7 +262,7 @@ MODES = ("normal", "read-only")
 
 @router.get("/users")
 def users_page(call: Administrator) -> Response:
-    """Return all users and tokens; a login link that was just made is shown once."""
+    """Show all users and tokens, and once a login link that was just made."""
     link = secret_of(call.request)
     response = _show(call, link=link)
     return take_away_secret(call.request, response, "/users") if link else response
@@ -289,7 +289,7 @@ def create_user(call: Administrator, form: Form) -> Response:
 
 @router.post("/users/{username}")
 def change_user(call: Administrator, username: str, form: Form) -> Response:
-    """Change what the admin changed: a user's role, right to approve, or whether the user may log in."""
+    """Save what the admin changed: a user's role, right to approve, or whether the user may log in."""
     typed = {name: text(form, name) for name in ("role", "active", "approver") if name in form}
     seen = {name: text(form, f"was_{name}") for name in typed if f"was_{name}" in form}
     try:
@@ -329,7 +329,7 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
 
 @router.post("/users/{username}/login-link")
 def create_login_link(call: Administrator, username: str) -> Response:
-    """Return a link that lets this user in once; it is shown once, on the page that this leads to."""
+    """Make a link that lets this user in once; the page that follows shows it once."""
     with call.write(even_when_read_only=True) as tx:
         secret = access.create_login_link(tx, username)
         access.note(tx, "login_link.created", username)
@@ -340,7 +340,7 @@ def create_login_link(call: Administrator, username: str) -> Response:
 
 @router.post("/mode")
 def set_mode(call: Administrator, form: Form) -> Response:
-    """Take changes, or take none until set otherwise."""
+    """Allow changes, or refuse them until the mode is set again."""
     mode = text(form, "mode")
     if mode not in MODES:
         raise RejectedError(_("mode: wanted normal or read-only; load the page again"))
@@ -354,7 +354,7 @@ def set_mode(call: Administrator, form: Form) -> Response:
 
 @router.get("/system")
 def system_page(call: Administrator) -> Response:
-    """Return how the server is, for those who look after it."""
+    """Show the state of the server to an administrator."""
     server = call.server
     state = standing(server.db, server.hub, server.files, server.large_reads)
     with call.read() as tx:
@@ -365,7 +365,7 @@ def system_page(call: Administrator) -> Response:
 
 @router.get("/audit")
 def audit_page(call: Administrator, before: PageFrom = None, after: PageFrom = None) -> Response:
-    """Return who did what, newest first."""
+    """Show the audit list, newest first."""
     with call.read() as tx:
         part = part_of(partial(access.list_entries, tx), AUDIT_SIZE, before, after)
     return page(call, "audit.html", entries=part.rows, part=part)
@@ -418,7 +418,7 @@ TokenId = Annotated[int, Path(ge=1, le=2**62)]
 
 @router.get("/account")
 def account_page(call: Reader) -> Response:
-    """Return the own tokens, never their secrets, and a form for the password."""
+    """Show the person's own tokens (never their secrets), and a form for the password."""
     fresh = secret_of(call.request)
     response = _own_page(call, fresh=fresh)
     return take_away_secret(call.request, response, "/account") if fresh else response
@@ -426,7 +426,7 @@ def account_page(call: Reader) -> Response:
 
 @router.post("/account/tokens")
 def create_token(call: Reader, form: Form) -> Response:
-    """Make a token. Its secret is shown once, on the page that this leads to."""
+    """Make a token. The page that follows shows its secret once."""
     name, ends, wanted = text(form, "name"), text(form, "days"), text(form, "scope") or Scope.WRITE
     if not 0 < len(name) <= 200:
         return _own_page(call, problem=_("A token needs a name of at most 200 characters."))
@@ -457,7 +457,7 @@ def revoke_token(call: Reader, token_id: TokenId, form: Form) -> Response:
 
 @router.post("/account/password")
 def set_password(call: Reader, form: Form) -> Response:
-    """Set the own password; ends all own sessions. Asks for the old one, but after a login link."""
+    """Set the person's password and end all their sessions. Needs the old one, but not after a login link."""
     password, again = password_of(form, "password"), password_of(form, "again")
     try:
         if password != again:

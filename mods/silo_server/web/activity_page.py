@@ -107,7 +107,7 @@ def activity_page(
     until: Annotated[str, Query(max_length=10)] = "",
     newer_than: PageFrom = None,
 ) -> Response:
-    """Return what happened, newest first, by kind, user, item (with all that is ``inside``) and days.
+    """Show what happened, newest first, by kind, user, item (with all that is ``inside``) and days.
 
     ``before`` and ``after`` page through it; ``newer_than`` is for the page's script, which knows the rest.
     """
@@ -121,7 +121,7 @@ def activity_page(
         if newer_than is None:
             part = part_of(partial(events.newest, tx, asked), MOST, before, after)
         else:
-            # The newest of them, where there are more than a page holds.
+            # The newest of them, if there are more than a page holds.
             newest = [event for event in events.newest(tx, asked, MOST) if event.id > newer_than]
             part = ListPart(newest, None, None)
         last = events.head(tx)
@@ -146,14 +146,14 @@ def activity_page(
 
 
 def _day(text: str) -> str:
-    """Return a day as it was given, "" for anything else: a filter that nobody can mean filters nothing."""
+    """Read a day; "" for anything else, as a filter that nobody can mean filters nothing."""
     with suppress(ValueError):
         return date.fromisoformat(text).isoformat()
     return ""
 
 
 def entry_of(event: LoggedEvent, item: Item | None = None) -> ActivityEntry:
-    """Return an event in words. ``item``: what it is about, as it is now."""
+    """Describe an event in words. ``item``: what it is about, as it is now."""
     data: dict[str, Any] = json.loads(event.data)
     number = item.part_number if item else str(data.get("item") or data.get("part_number") or "")
     path = f"/items/{segment(number)}" if number else ""
@@ -200,7 +200,7 @@ def _counts(name: str, data: Mapping[str, Any]) -> tuple[tuple[str, int, str], .
 
 
 PAGE_SIZE = 50
-# So many lines of each change stand on the list; the others are a click away.
+# The list shows so many lines of each change; the others are a click away.
 TOLD_LINES = 12
 KNOWN = 500
 USUAL_DAYS = 30
@@ -209,9 +209,7 @@ MOST_CHANGES = 1000
 
 @router.get("/items/{part_number}/history")
 def history_page(call: Reader, part_number: str, before: PageFrom = None, after: PageFrom = None) -> Response:
-    """Return all changes with their lines, newest first; ``before`` and ``after`` are the changes to page
-    from.
-    """
+    """Show all changes of a BOM, newest first; ``before`` and ``after`` are the changes to page from."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         part = part_of(partial(history.list_changes, tx, item), PAGE_SIZE, before, after)
@@ -238,8 +236,9 @@ def changes_page(
     since: Annotated[str, Query(max_length=40)] = "",
     until: Annotated[str, Query(max_length=40)] = "",
 ) -> Response:
-    """Return what changed in a product over all levels: between dates or revisions, or since the person
-    looked.
+    """Show what changed in a product over all levels.
+
+    Between two dates or revisions; since the person last looked (``look``); or in the last 30 days.
     """
     problem, first, last, status = "", "", "", 200
     happenings: Sequence[history.PastChange] = ()
@@ -285,7 +284,7 @@ def changes_page(
 def compare_page(
     call: Reader, part_number: str, old: PageFrom = None, new: PageFrom = None, all: bool = False
 ) -> Response:
-    """Show two points of time, line by line; without ``old`` what the newest change did."""
+    """Show two points of time, line by line; without ``old``, what the newest change did."""
     return _compare(call, part_number, (old, new), show_all=all)
 
 
@@ -347,7 +346,7 @@ STATUSES = (N_("added"), N_("removed"), N_("changed"), N_("unchanged"))
 
 @router.post("/items/{part_number}/restore")
 def restore(call: Writer, part_number: str, form: Form) -> Response:
-    """Make the BOM again what it was, where nobody changed it since the page was shown; a new change."""
+    """Restore an earlier state of the BOM, as a new change, if nobody changed it since the page was shown."""
     change_id, reason = whole(form, "change_id"), text(form, "reason")
     if change_id is None:
         raise RejectedError(_("change_id: wanted the number of a change, got none; load the page again"))
@@ -375,5 +374,5 @@ def restore(call: Writer, part_number: str, form: Form) -> Response:
         )
         points = (change_id, None)
         return _compare(call, part_number, points, problem=problem, reason=reason, status=412)
-    said = _("Restored: %(lines)s as of change %(change)s.", lines=plural(was, "line"), change=change_id)
-    return back(bom_path(part_number), said, undo=[made])
+    notice = _("Restored: %(lines)s as of change %(change)s.", lines=plural(was, "line"), change=change_id)
+    return back(bom_path(part_number), notice, undo=[made])

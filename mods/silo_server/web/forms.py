@@ -46,7 +46,7 @@ Form = Annotated[FormData, Depends(_form)]
 
 
 def text(form: FormData, name: str, most: int = 500) -> str:
-    """Return a text field, trimmed; "" if it is absent or a file. RejectedError above ``most``."""
+    """Read a text field, trimmed; "" if it is absent or a file. RejectedError above ``most`` characters."""
     value = form.get(name)
     if not isinstance(value, str):
         return ""
@@ -66,22 +66,22 @@ def text(form: FormData, name: str, most: int = 500) -> str:
 
 
 def texts(form: FormData, name: str) -> list[str]:
-    """Return all values of a repeated field."""
+    """Read all values of a repeated field."""
     return [value for value in form.getlist(name) if isinstance(value, str)]
 
 
 def password_of(form: FormData, name: str) -> str:
-    """Return a password as it was typed: spaces at its ends belong to it."""
+    """Read a password as it was typed: spaces at its ends belong to it."""
     value = form.get(name)
     return value[: MAX_PASSWORD + 1] if isinstance(value, str) else ""
 
 
 def whole(form: FormData, name: str) -> int | None:
-    """Return a whole number, None if there is none."""
+    """Read a whole number; None if there is none."""
     return whole_number(text(form, name))
 
 
-# Forms with one of these fields are not kept: a password goes nowhere but where it was typed for.
+# Forms with one of these fields are not kept: a password goes only where it was typed for.
 _PASSWORDS = frozenset({"password", "again", "current"})
 # Fields that no person typed.
 _MACHINE = re.compile(
@@ -105,7 +105,7 @@ class UnsentForm:
 
     @property
     def typed(self) -> list[tuple[str, str]]:
-        """Return (field, text) of what a person typed or chose, in words."""
+        """List (label, text) of what a person typed or chose."""
         typed_fields = [
             (name, value) for name, value in self.fields if value and not _MACHINE.fullmatch(name)
         ]
@@ -115,7 +115,7 @@ class UnsentForm:
 
     @property
     def packed(self) -> str:
-        """Return the form as one text, which travels in the login form; "" if it is too large."""
+        """Pack the form into one text, which travels in the login form; "" if it is too large."""
         text = json.dumps([self.path, self.fields, self.files])
         if len(text) > MOST_KEPT:
             return ""
@@ -130,7 +130,7 @@ def _label(name: str) -> str:
 
 
 def kept_form(path: str, form: FormData) -> UnsentForm | None:
-    """Return what a form holds but its secret; None if it holds a password."""
+    """Copy what a form holds, without its secret; None if it holds a password."""
     if _PASSWORDS & form.keys():
         return None
     pairs = form.multi_items()
@@ -140,7 +140,7 @@ def kept_form(path: str, form: FormData) -> UnsentForm | None:
 
 
 def unpacked(packed: str) -> UnsentForm | None:
-    """Return what :attr:`Kept.packed` was made of; None if it was not, or leads elsewhere."""
+    """Unpack a text of :attr:`UnsentForm.packed`; None if it is something else."""
     unpacker = zlib.decompressobj()
     try:
         data = unpacker.decompress(base64.b64decode(packed, validate=True), MOST_KEPT * 4)
@@ -152,21 +152,19 @@ def unpacked(packed: str) -> UnsentForm | None:
 
 
 def local_path(target: str) -> str:
-    """Return ``target`` where it is a path of this server, else the start page: nobody is sent elsewhere."""
+    """Return ``target`` if it is a path of this server, else the start page: nobody is sent elsewhere."""
     plain = target.startswith("/") and not target.startswith(("//", "/\\"))
     return target if plain and target.isprintable() else "/"
 
 
 def back_to(form: FormData, usual: str, below: str = "/items/") -> str:
-    """Return the page that a form came from (``back``) if it is below a path, else the usual one."""
+    """Return the page that a form came from (``back``) if it is below ``below``, else the usual one."""
     path = text(form, "back", 2000)
     return path if path.startswith(below) else usual
 
 
 def own_site(request: Request) -> bool | None:
-    """Return True for a form of one of our pages, False for another site's, None if the browser does not
-    say.
-    """
+    """Check if a form comes from our own pages; None if the browser does not say."""
     site = request.headers.get("sec-fetch-site")
     if site is not None:
         return site in ("same-origin", "none")
@@ -183,7 +181,7 @@ class AmbiguousError(RejectedError):
 
 
 def amount(typed: str, name: str = "quantity") -> float:
-    """Return a quantity as people type it (``silo.bom.numbers``); RejectedError says what is wrong with it.
+    """Read a quantity as people type it (``silo.bom.numbers``); RejectedError says what is wrong.
 
     Raises AmbiguousError for "1,000": the person is asked which of the two numbers was meant.
     """
@@ -199,7 +197,7 @@ def amount(typed: str, name: str = "quantity") -> float:
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """What a form changes, where others may have changed the same thing since it was shown.
+    """What a form changes; others may have changed the same thing since it was shown.
 
     mine
         what this person changed, and nobody else: to be written.
@@ -215,13 +213,12 @@ class Edit:
 
 
 def same_text(a: str, b: str, *, lines: bool = False) -> bool:
-    """Return True for two texts that a form sends back alike: without spaces at the ends, and without line
-    breaks.
+    """Check if a form sends both texts back alike: without spaces at the ends, and without line breaks.
 
-    Programs store such texts, which nobody has changed where only a browser did.
+    Programs store texts with them; if only the browser took them away, nobody has changed the text.
 
     lines
-        the field has several lines, and keeps their breaks, each as ``\n``.
+        the field has several lines, and keeps their breaks, each as one line feed.
     """
 
     def sent(text: str) -> str:
@@ -268,7 +265,7 @@ def compared(
 
 
 def back(path: str, notice: str = "", *, undo: Sequence[int] = ()) -> Response:
-    """Go and look at ``path`` (303); ``notice`` stands there on top, once.
+    """Redirect to ``path`` (303); ``notice`` is shown on top of that page, once.
 
     It travels in a cookie and not in the address, so that no link can put words into our mouth. The address
     has the cookie's key: no other tab, nor a script that fetches a page there, takes the notice.
@@ -278,8 +275,8 @@ def back(path: str, notice: str = "", *, undo: Sequence[int] = ()) -> Response:
     """
     key = secrets.token_hex(4) if notice else ""
     page, mark, place = path.partition("#")
-    said = f"{'&' if '?' in page else '?'}{NOTICE}={key}" if key else ""
-    response = RedirectResponse(f"{page}{said}{mark}{place}", 303)
+    query = f"{'&' if '?' in page else '?'}{NOTICE}={key}" if key else ""
+    response = RedirectResponse(f"{page}{query}{mark}{place}", 303)
     if notice:
         changes = ",".join(str(change) for change in undo if change)
         response.set_cookie(
@@ -293,7 +290,7 @@ def back(path: str, notice: str = "", *, undo: Sequence[int] = ()) -> Response:
 
 
 def back_with_secret(request: Request, path: str, name: str, secret: str) -> Response:
-    """Go to ``path`` (303), which shows a new secret once: to load that page again makes no second one.
+    """Redirect to ``path`` (303), which shows a new secret once: to load that page again makes no second.
 
     The secret travels in a cookie for that page alone, which :func:`secret_of` reads and the page takes away.
     """
@@ -312,7 +309,7 @@ def back_with_secret(request: Request, path: str, name: str, secret: str) -> Res
 
 
 def secret_of(request: Request) -> tuple[str, str] | None:
-    """Return (name, secret) that waits to be shown on this page, None if there is none."""
+    """Read (name, secret) that waits to be shown on this page; None if there is none."""
     try:
         name, secret = json.loads(unquote(request.cookies.get(SECRET_COOKIE, "")))
     except (ValueError, TypeError):
@@ -321,6 +318,6 @@ def secret_of(request: Request) -> tuple[str, str] | None:
 
 
 def take_away_secret(request: Request, response: Response, path: str) -> Response:
-    """Take the cookie of :func:`back_with_secret` away, now that its secret was shown."""
+    """Delete the cookie of :func:`back_with_secret`, now that its secret was shown."""
     response.delete_cookie(SECRET_COOKIE, path=server_of(request).settings.root_path + path)
     return response

@@ -54,13 +54,13 @@ class Upload:
 
 @router.get("/items/{part_number}/import")
 def import_page(call: Writer, part_number: str) -> Response:
-    """Choose a file."""
+    """Show the form in which a person chooses a file."""
     return _show(call, part_number, None)
 
 
 @router.post("/items/{part_number}/import/check")
 def check(call: Writer, part_number: str, form: Form) -> Response:
-    """Say what the file would do; nothing is written. The same file again, with other columns, comes back."""
+    """Show what the file would do; write nothing. The same file may come again, with other columns."""
     allowed = _allowed(form)
 
     def show(upload: Upload | None, layout: Layout | None, problem: Problem) -> Response:
@@ -84,7 +84,7 @@ def checked(
 
 @router.post("/items/{part_number}/import")
 def apply(call: Writer, part_number: str, form: Form) -> Response:
-    """Write it; where the BOM changed since the check, check again instead."""
+    """Import the file; if the BOM has changed since the check, check it again instead."""
     upload, layout, allowed = carried(form), layout_of(form), _allowed(form)
     try:
         records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout)
@@ -99,7 +99,7 @@ def apply(call: Writer, part_number: str, form: Form) -> Response:
         return _show(call, part_number, upload, layout, problem, allowed)
     except SiloError as error:
         return _show(call, part_number, upload, layout, Problem.of(error), allowed)
-    said = _(
+    notice = _(
         "Imported %(file)s: %(added)s added, %(changed)s changed, %(parts)s made."
         if plan.new
         else "Imported %(file)s: %(added)s added, %(changed)s changed.",
@@ -108,7 +108,7 @@ def apply(call: Writer, part_number: str, form: Form) -> Response:
         changed=plan.count("change"),
         parts=plural(len(plan.new), "part"),
     )
-    return back(bom_path(part_number), said, undo=[change])
+    return back(bom_path(part_number), notice, undo=[change])
 
 
 def _allowed(form: FormData) -> Allowed:
@@ -117,7 +117,7 @@ def _allowed(form: FormData) -> Allowed:
 
 @dataclass(frozen=True)
 class Problem:
-    """Why a file was not taken; with the file, where the person can say how to read it."""
+    """Why a file was not taken; with the file, if the person can say how to read it."""
 
     words: str = ""
     status: int = 200
@@ -130,7 +130,7 @@ class Problem:
 
 
 def layout_of(form: FormData, of: imports.Table = imports.BOM) -> Layout | None:
-    """Return how the person wants the file to be read; None if that was not chosen."""
+    """Read how the person wants the file to be read; None if that was not chosen."""
     if "header" not in form:
         return None
     marks = {mark.value: mark for mark in Mark}
@@ -157,7 +157,7 @@ def _show(
         item = get_item(tx, part_number)
         plan = imports.plan_import(tx, part_number, records, allowed) if upload else None
     rows = plan.rows if plan else ()
-    said = {row.row: changes(row.before, row.after) for row in rows if row.before and row.after}
+    line_changes = {row.row: changes(row.before, row.after) for row in rows if row.before and row.after}
     # What is wrong, and what would change, is worth reading; rows that are as they were are not.
     order = {"error": 0, "add": 1, "change": 1, "skip": 2, "same": 2}
     file = upload or problem.upload
@@ -171,7 +171,7 @@ def _show(
         allowed=allowed,
         categories=find_schema(None).categories.values(),
         rows=sorted(rows, key=lambda row: (order[row.status], row.row))[:MOST_ROWS],
-        said=said,
+        line_changes=line_changes,
         problem=problem.words,
         file=file,
         reading=reading(file, layout or problem.layout) if file else None,
@@ -189,7 +189,7 @@ _LABELS = {
 
 
 def reading(file: Upload, layout: Layout | None, of: imports.Table = imports.BOM) -> dict[str, Any]:
-    """Return how the file is read, for the form in which a person changes that."""
+    """Describe how the file is read, for the form in which a person changes that."""
     layout_read = layout or imports.guess_of(file.data, of) or Layout(imports.likely_delimiter(file.data), 0)
     lines = imports.first_lines(file.data, layout_read.delimiter, layout_read.header + 6)
     header = lines[layout_read.header] if layout_read.header < len(lines) else []

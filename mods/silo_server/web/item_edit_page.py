@@ -65,7 +65,7 @@ class FormState:
 
 @router.get("/items/new")
 def new_page(call: Writer, category: str = "") -> Response:
-    """Return an empty form."""
+    """Show an empty form for a new item."""
     typed = {"category": category, "id": str(uuid.uuid4())}
     typed |= {
         f"p.{property_field.name}": property_field.default
@@ -77,7 +77,7 @@ def new_page(call: Writer, category: str = "") -> Response:
 
 @router.post("/items/new")
 def make(call: Writer, form: Form) -> Response:
-    """Make an item; the form's ``id`` makes a form that is sent twice one item."""
+    """Make an item; a form that is sent twice makes only one, as its ``id`` is the same."""
     typed = _typed(form) | {"id": text(form, "id")}
     try:
         properties, problems = _properties(typed, {}, {})
@@ -104,13 +104,15 @@ def make(call: Writer, form: Form) -> Response:
             item, made = service.create_item(tx, new)
     except SiloError as error:
         return _page(call, None, FormState(typed, {}, _problems(error), {}, error.status_hint))
-    said = _("%(number)s made." if made else "%(number)s was made already.", number=isolate(item.part_number))
-    return back(f"/items/{segment(item.part_number)}", said)
+    notice = _(
+        "%(number)s made." if made else "%(number)s was made already.", number=isolate(item.part_number)
+    )
+    return back(f"/items/{segment(item.part_number)}", notice)
 
 
 @router.get("/items/{part_number}/edit")
 def edit_page(call: Writer, part_number: str) -> Response:
-    """Return the form with what the item is."""
+    """Show the form with the present values of an item."""
     with call.read() as tx:
         item = get_item(tx, part_number)
         uses = where_used(tx, item, limit=1)[1]
@@ -120,7 +122,7 @@ def edit_page(call: Writer, part_number: str) -> Response:
 
 @router.post("/items/{part_number}/edit")
 def change(call: Writer, part_number: str, form: Form) -> Response:
-    """Change what the person changed in the form."""
+    """Save what the person changed in the form."""
     typed, was = _typed(form), _typed(form, "was.")
     weighed = text(form, "weighed")
     try:
@@ -145,31 +147,31 @@ def change(call: Writer, part_number: str, form: Form) -> Response:
             user=isolate(item.updated_by),
         )
         return _again(call, part_number, FormState(merged, now, [problem], clashes, 412))
-    said = (
+    notice = (
         _("%(number)s changed.", number=isolate(after.part_number))
         if after.version != item.version
         else _("Nothing differs, so nothing was saved.")
     )
-    return back(f"/items/{segment(after.part_number)}", said)
+    return back(f"/items/{segment(after.part_number)}", notice)
 
 
 @router.post("/items/{part_number}/file")
 def upload(call: Writer, part_number: str, form: Form) -> Response:
-    """Return a file as a new revision."""
+    """Store an uploaded file as a new revision of the item."""
     file = form.get("file")
     path = f"/items/{segment(part_number)}"
     if not isinstance(file, UploadFile) or not file.filename:
         raise RejectedError(_("no file was chosen, so nothing was uploaded"))
 
     def answer(tx: Tx, of: Item | Document, revision: Revision) -> Response:
-        said = _(
+        notice = _(
             "%(file)s is revision %(number)s.",
             file=isolate(revision.file_name or ""),
             number=revision.revision_number,
         )
         if isinstance(of, Item) and (draft := draft_of(tx, of)):
-            said += _(" It is part of draft %(label)s; revision %(released)s stays as it is.", **draft)
-        return back(f"{path}#revisions", said)
+            notice += _(" It is part of draft %(label)s; revision %(released)s stays as it is.", **draft)
+        return back(f"{path}#revisions", notice)
 
     comment, key = text(form, "comment", LONGEST), text(form, "key", 128) or None
     origin = RevisionOrigin(whole(form, "base_revision"))
@@ -196,17 +198,17 @@ def archive(call: Writer, part_number: str, form: Form) -> Response:
         item = service.get_item(tx, part_number)
         used, uses = where_used(tx, item, limit=5)
         service.archive_item(tx, part_number, whole(form, "version"))
-    said = _("%(number)s is in the archive. Its number stays taken.", number=isolate(part_number))
+    notice = _("%(number)s is in the archive. Its number stays taken.", number=isolate(part_number))
     if uses:
         numbers = ", ".join(isolate(usage.parent.part_number) for usage in used)
         more = _(" and %(used)s more", used=uses - len(used)) if uses > len(used) else ""
-        said += _(" It stays in the BOM of %(numbers)s.", numbers=numbers + more)
-    return back(f"/items/{segment(part_number)}", said)
+        notice += _(" It stays in the BOM of %(numbers)s.", numbers=numbers + more)
+    return back(f"/items/{segment(part_number)}", notice)
 
 
 @router.post("/items/{part_number}/unarchive")
 def unarchive(call: Writer, part_number: str, form: Form) -> Response:
-    """Bring an item back."""
+    """Bring an item back from the archive."""
     with call.write() as tx:
         item = service.unarchive_item(tx, part_number)
     return back(
@@ -215,7 +217,7 @@ def unarchive(call: Writer, part_number: str, form: Form) -> Response:
 
 
 def texts_of(item: Item) -> dict[str, str]:
-    """Return an item as the texts of its form."""
+    """Write an item as the texts of its form."""
     shown = {name: str((item.texts[name] if name in TEXTS else getattr(item, name)) or "") for name in OWN}
     names = {property_field.name for property_field in find_schema(item.schema).fields}
     for name, value in item.properties.items():
@@ -227,7 +229,7 @@ def texts_of(item: Item) -> dict[str, str]:
 
 
 def property_text(value: Any) -> str:
-    """Return a property as text: numbers as people read them, what is nested as JSON."""
+    """Write a property as text: numbers as people read them, what is nested as JSON."""
     if isinstance(value, str):
         return value
     if isinstance(value, bool) or value is None or isinstance(value, list | dict):
@@ -236,7 +238,7 @@ def property_text(value: Any) -> str:
 
 
 def shown_properties(item: Item) -> list[tuple[str, str, str]]:
-    """Return (label, text, unit) of an item's properties: those of the schema first, in its order."""
+    """List (label, text, unit) of an item's texts and properties, those of the schema in its order."""
     fields = {column.name: column for column in find_schema(item.schema).fields}
     order = [name for name in fields if name in item.properties]
     order += sorted(name for name in item.properties if name not in fields)
@@ -296,9 +298,7 @@ def _change(tx: Tx, item: Item, typed: Mapping[str, str], mine: set[str], commen
 def _properties(
     typed: Mapping[str, str], before: Mapping[str, Any], changed: set[str] | Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the properties behind a form, and what is wrong with it; ``changed`` empty: all that is
-    typed.
-    """
+    """Read the properties of a form, and what is wrong with them; ``changed`` empty: all fields."""
     fields = {property_field.name: property_field for property_field in find_schema(None).fields}
     properties, problems = dict(before), []
     for key in changed or [key for key in typed if key.startswith(("p.", "o."))]:
@@ -325,7 +325,7 @@ def _properties(
 
 
 def _as_before(written: str, before: Any) -> Any:
-    """Return a property without a field: a number or a truth value stays one, where what was typed is one."""
+    """Read a property without a field: a number or a truth value stays one, if what was typed is one."""
     if isinstance(before, bool):
         return {"true": True, "false": False}.get(written.casefold(), written)
     if isinstance(before, int | float):
@@ -335,18 +335,18 @@ def _as_before(written: str, before: Any) -> Any:
 
 
 def _typed(form: FormData, prefix: str = "") -> dict[str, str]:
-    """Return the texts of a form by field; properties without a field come as pairs of name and value."""
-    result = {name: _text(form, prefix + name) for name in OWN if prefix + name in form}
+    """Read the texts of a form by field; properties without a field come as pairs of name and value."""
+    typed = {name: _text(form, prefix + name) for name in OWN if prefix + name in form}
     if not prefix:
-        result = dict.fromkeys(OWN, "") | result
+        typed = dict.fromkeys(OWN, "") | typed
     for key in form:
         if key.startswith(f"{prefix}p.") or (prefix and key.startswith(f"{prefix}o.")):
-            result[key[len(prefix) :]] = _text(form, key)
+            typed[key[len(prefix) :]] = _text(form, key)
         elif not prefix and key.startswith("o.") and key.endswith(".name"):
             name = text(form, key, 200)
             if name:
-                result[f"o.{name}"] = _text(form, f"{key[:-5]}.value")
-    return result
+                typed[f"o.{name}"] = _text(form, f"{key[:-5]}.value")
+    return typed
 
 
 def _same(name: str, a: str, b: str) -> bool:

@@ -89,18 +89,18 @@ class Look:
 
     @property
     def flips(self) -> list[str]:
-        """Return the branches that are not as ``depth`` says."""
+        """List the branches that are not as ``depth`` says."""
         return list(dict.fromkeys(filter(None, self.flip.split(","))))
 
     def address(self, path: str) -> Address:
-        """Return the page with this view."""
+        """Return the address of the page with this view."""
         usual = {"view": "tree", "page": 1, "depth": 0, "pieces": 1}
         names = ("view", "q", "type", "sort", "page", "depth", "flip", "pieces", "beside")
         values = {name: getattr(self, name) for name in names}
         return Address(path, {n: str(v) for n, v in values.items() if v not in ("", usual.get(n))})
 
     def flipped(self, key: str) -> str:
-        """Return ``flip`` if this branch is the other way round."""
+        """Return ``flip`` with this branch the other way round."""
         keys = self.flips
         return ",".join(name for name in keys if name != key) if key in keys else ",".join([*keys, key])
 
@@ -169,18 +169,18 @@ class ShownStructure:
 
     @cached_property
     def parts(self) -> Mapping[int, RolledItem]:
-        """Return what a filter looks in, for all of the graph."""
+        """Read what a filter looks in, for all of the graph."""
         return tree.parts_of(self._tx, self.graph)
 
     @cached_property
     def fitting(self) -> Callable[[Line], bool]:
-        """Return the test of lines that the view's filter is; without a filter nothing is read for it."""
+        """Make the test of lines for the view's filter; without a filter it reads nothing."""
         look = self.look
         return tree.sought(look.q, look.type, self.parts) if look.is_filtered else lambda _line: True
 
     @cached_property
     def leaves(self) -> Sequence[tree.FlatRow]:
-        """Return the flat list, unfiltered."""
+        """Add up the flat list, unfiltered."""
         return tree.flatten(self.graph)
 
     @cached_property
@@ -191,22 +191,20 @@ class ShownStructure:
         return tree.found_parts(self.graph, self.fitting)
 
     def lines_of(self, item_id: int, level: int) -> Sequence[Line]:
-        """Return the lines of what a row of this level shows; below the open levels they are read when asked
-        for.
-        """
+        """Return the lines below a row of this level; below the open levels read them only when needed."""
         if item_id not in self._lines and level >= self.look.depth and not self.look.is_filtered:
             self._lines[item_id] = lines_of_many(self._tx, [item_id]).get(item_id, [])
         return self._lines.get(item_id, ())
 
     def worth(self, line: Line) -> MassAndCost:
-        """Return what the child of a line is worth, to sort by it."""
+        """Return mass and cost of one piece of a line's child, to sort by it."""
         if line.child_id not in self._worths:
             known = self._known({other.child_id for other in self._lines[line.parent_id]})
             self._worths |= {child: worth for child, (_part, worth, _summary) in known.items()}
         return self._worths[line.child_id]
 
     def _known(self, children: Collection[int]) -> dict[int, tuple[RolledItem, MassAndCost, Summary | None]]:
-        """Return each child, its worth and its summary; without a BOM it is worth what it states."""
+        """Read each child, its mass and cost, and its summary; without a BOM it has what it states."""
         parts = tree.some_parts(self._tx, children)
         by_item = summaries(self._tx, {child for child in children if parts[child].has_bom})
         return {
@@ -216,7 +214,7 @@ class ShownStructure:
         }
 
     def dressed(self, rows: Sequence[tuple[StructureRow, Sequence[str]]]) -> list[Branch]:
-        """Return the rows with everything that they show; beside each stand the doubts of its line."""
+        """Give the rows everything that they show; beside each row come the doubts of its line."""
         known = self._known({row.line.child_id for row, _ in rows})
 
         def dress(row: StructureRow, doubts: Sequence[str]) -> Branch:
@@ -232,14 +230,14 @@ class ShownStructure:
 
 
 def usual_depth(counts: Sequence[int]) -> int:
-    """Return how many levels fit on a page, at least one."""
+    """Count the levels that fit on a page, at least one."""
     return max(1, sum(rows <= PAGE_ROWS for rows in accumulate(counts)))
 
 
 def tree_page(shown: ShownStructure, total: int) -> tuple[Page[Branch], Sequence[Branch]]:
-    """Return a page of the open rows, and the branches above its first one (none on the first page).
+    """Make a page of the open rows, and the branches above its first one (none on the first page).
 
-    TooLargeError where more is open than anybody can page through.
+    TooLargeError if more is open than anybody can page through.
     """
     look = shown.look
     rows = list(islice(_walk(shown), MOST_OPEN + 1))
@@ -311,12 +309,12 @@ def _tree_keys(shown: ShownStructure) -> Mapping[str, Callable[[Line], Any]]:
 
 
 def _cost_key(costs: Mapping[str, Decimal]) -> Decimal | None:
-    # Currencies cannot be compared; where there are several, the amounts are.
+    # Currencies cannot be compared; if there are several, the amounts are.
     return max(costs.values(), default=None)
 
 
 def flat_page(shown: ShownStructure) -> Page[Branch]:
-    """Return a page of the leaf parts, each with its total over the whole tree."""
+    """Make a page of the leaf parts, each with its total over the whole tree."""
     look = shown.look
     rows = arranged(shown.found, look.sort, _flat_keys(shown))
     table = page_of(rows, len(shown.leaves), look.page, shown.page_rows)
@@ -366,7 +364,7 @@ def item_page(
     used_from: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
     revisions_before: Annotated[int, Query(ge=1, le=2**31 - 1)] = 2**31 - 1,
 ) -> Response:
-    """Return the item and everything around it; ``view=flat`` shows the leaf parts with their totals.
+    """Show an item and everything around it; ``view=flat`` shows the leaf parts with their totals.
 
     ``used_from`` pages through where it is used, ``revisions_before`` through its revisions.
     """
@@ -405,7 +403,7 @@ def item_page(
 
 
 def _beside(tx: Tx, part_number: str) -> dict[str, Any] | None:
-    """Return what stands beside the table of a chosen row: its item."""
+    """Read what is shown beside the table: the item of a chosen row; None if there is none."""
     try:
         item = get_item(tx, part_number, include_archived=True)
     except NotFoundError:
@@ -419,7 +417,7 @@ def _beside(tx: Tx, part_number: str) -> dict[str, Any] | None:
 
 @router.get("/documents/{uuid}")
 def document_page(call: Reader, uuid: str) -> Response:
-    """Return a file: which items are in it, what it links to, what uses it, and its revisions."""
+    """Show a file: the items in it, the files that it links to, those that use it, and its revisions."""
     with call.read() as tx:
         document_json = told_of(tx, uuid)
         history, _ = revisions.list_revisions(tx, revisions.get_document(tx, document_json["id"]), PAGE_SIZE)
@@ -428,7 +426,7 @@ def document_page(call: Reader, uuid: str) -> Response:
 
 @router.get("/items/{part_number}/print")
 def print_page(call: Reader, part_number: str, look: Asked) -> Response:
-    """Return the BOM for paper: all rows of the view on one page, with what a reader must know on top."""
+    """Show the BOM for paper: all rows of the view on one page, with what a reader must know on top."""
     with call.server.large_reads.enter():
         with call.read() as tx:
             item = get_item(tx, part_number, include_archived=True)
@@ -440,7 +438,7 @@ def print_page(call: Reader, part_number: str, look: Asked) -> Response:
 
 
 def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[str, Any]:
-    """Return what the templates of a BOM over all levels show: table, totals, what the last sync left out."""
+    """Collect what a BOM over all levels shows: table, totals, and what the last sync left out."""
     last = last_sync(tx, item)
     values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.gaps), "problem": ""}
     values |= dict.fromkeys(("table", "totals", "of_all")) | dict.fromkeys(("levels", "depth"), 0)
@@ -492,7 +490,7 @@ class Totals:
 
     @classmethod
     def of(cls, summary: Summary) -> Totals:
-        """Return those of a whole product."""
+        """Take the totals of a whole product from its summary."""
         same = {name: getattr(summary, name) for name in names_of(cls) if name not in ("mass", "costs")}
         return cls(summary.worth.mass, summary.worth.costs, **same)
 
@@ -504,7 +502,7 @@ class Totals:
         found: Sequence[tree.FlatRow],
         parts: Mapping[int, RolledItem],
     ) -> Totals:
-        """Return those of what a filter has found, with all that is in it."""
+        """Add up the totals of what a filter has found."""
         leaves = tree.leaves_in(graph, found)
         alone = set() if leaves is found else standing_alone(tx, graph)
         cost = tree.roll_up_cost(leaves, parts)
@@ -534,7 +532,7 @@ def items_page(
     sort: Annotated[str, Query(max_length=20)] = "",
     number: Annotated[int, Query(ge=1, le=10**7, alias="page")] = 1,
 ) -> Response:
-    """Search as you type; without script the form does the same."""
+    """Show the items that match; the search runs while a person types or, without script, by its form."""
     query = ItemQuery(
         search=q,
         item_type=type or None,

@@ -79,7 +79,7 @@ class LineForm:
 
 
 def shown(state: LineState) -> dict[str, str]:
-    """Return the fields of a line as its form shows them."""
+    """Write the fields of a line as its form shows them."""
     return {
         "quantity": quantity(state.quantity),
         "reference_designators": " ".join(state.reference_designators),
@@ -88,7 +88,7 @@ def shown(state: LineState) -> dict[str, str]:
 
 
 def read(form: FormData) -> LineForm:
-    """Return what came back; texts as they were typed."""
+    """Read the form of a line; texts stay as they were typed."""
     typed = {name: _text(form, name) for name in FIELDS if name in form}
     if readings := _text(form, "quantity_is"):
         typed["quantity"] = readings  # the answer to "which of the two numbers?"
@@ -103,7 +103,7 @@ def read(form: FormData) -> LineForm:
 
 
 def edit_of(sent: LineForm, now: LineState) -> Edit:
-    """Return what the form changes on the line as it is now; RejectedError if a choice was not made."""
+    """Find what the form changes on the line as it is now; RejectedError if a choice was not made."""
     if unmade(sent):
         names = ", ".join(_(FIELDS[name]) for name in unmade(sent))
         raise RejectedError(_("%(names)s: choose yours or theirs", names=names))
@@ -116,8 +116,7 @@ def edit_of(sent: LineForm, now: LineState) -> Edit:
 
 
 def still_typed(typed: Mapping[str, str], seen: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
-    """Return what a form that was refused shows: what the person changed, and for the rest the line as it is
-    now.
+    """Make the fields of a refused form: what the person changed, else the line as it is now.
 
     The form is compared with ``now`` when it comes back, so an old text of a field that the person left alone
     would revert what others wrote there.
@@ -132,7 +131,7 @@ def still_typed(typed: Mapping[str, str], seen: Mapping[str, str], now: Mapping[
 
 
 def unmade(sent: LineForm) -> list[str]:
-    """Return the fields for which a choice was asked for and not made."""
+    """List the fields for which a choice was asked for and not made."""
     names = [name for name in sent.asked if sent.picked.get(name) not in (MINE, THEIRS)]
     return [other for name in names for other in group_of(name)]
 
@@ -143,7 +142,7 @@ def group_of(name: str) -> Sequence[str]:
 
 
 def values_of(texts: Mapping[str, str]) -> dict[str, Any]:
-    """Return the texts of fields as a line has them; RejectedError if one is unusable."""
+    """Read the texts of fields as values of a line; RejectedError if one is unusable."""
     values: dict[str, Any] = {}
     for name, written in texts.items():
         most = MOST.get(name, MOST_TEXT)
@@ -166,7 +165,7 @@ def values_of(texts: Mapping[str, str]) -> dict[str, Any]:
 
 
 def decision_of(form: FormData) -> tuple[ReviewAction, str | None]:
-    """Return what a form decides, and why; RejectedError if it has no button of ours."""
+    """Read what a form decides, and why; RejectedError if it has no button of ours."""
     try:
         action = ReviewAction(text(form, "action"))
     except ValueError:
@@ -175,8 +174,7 @@ def decision_of(form: FormData) -> tuple[ReviewAction, str | None]:
 
 
 def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
-    """Return the decisions in a submitted form: one action for each line (by its id, or its child) in
-    ``chosen``.
+    """Read the decisions in a form: one for each line (by its id, or its child) in ``chosen``.
 
     names
         line id → part number, of the BOM's lines. After the id may stand the mark of what was seen.
@@ -194,7 +192,7 @@ def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
 
 
 def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict[str, list[str]]:
-    """Return line id → what happened to it after change ``after``, in words, newest first."""
+    """Describe what happened to lines after change ``after``, by line id, newest first."""
     return {
         line_id: [f"{_became(line)}, {by_whom(change)}" for change, line in story]
         for line_id, story in history.stories(tx, parent, line_ids, after).items()
@@ -204,7 +202,7 @@ def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict
 def disputed(
     tx: Tx, parent: Item, lines: Sequence[Line], review: Review
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Return line id → who set its quantity here, and line id → what CAD says of it; both in words."""
+    """Describe who set quantities here, and what CAD says of these lines; both by line id."""
     told_quantity = told_quantities(tx, [parent.id]).get(parent.id, {})
     overrides = [line for line in lines if line.state.override]
     asked = {*(line.id for line in overrides), *(conflict.line.id for conflict in review.conflicts)}
@@ -220,7 +218,7 @@ def disputed(
 
 
 def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
-    """Return the change in which a person gave a line the quantity that it has."""
+    """Find the change in which a person gave a line its present quantity; None if a merge did."""
     for change, line in story:
         before = line.before.quantity if line.before else None
         if line.after is not None and line.after.quantity != before:
@@ -231,14 +229,12 @@ def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
 def _cad_words(
     line: Line, quantities: Mapping[int, float], by_hand: Change | None, merge: Change | None
 ) -> str:
-    """Return what CAD says of a line whose quantity a person changed: the same as the conflict above it
-    says.
-    """
+    """Describe CAD's quantity for a line that a person changed; the conflict above it says the same."""
     if line.child_id in quantities:
-        said = quantities[line.child_id]
+        cad_quantity = quantities[line.child_id]
         return (
-            _("CAD says %(quantity)s", quantity=of_cad(said, line.state.unit))
-            if said
+            _("CAD says %(quantity)s", quantity=of_cad(cad_quantity, line.state.unit))
+            if cad_quantity
             else _("CAD no longer has it")
         )
     if merge is not None and by_hand is not None and merge.id > by_hand.id:
@@ -246,9 +242,9 @@ def _cad_words(
     return _("CAD said %(quantity)s before", quantity=of_cad(line.state.cad_quantity, line.state.unit))
 
 
-def of_cad(said: float | None, unit: str | None) -> str:
-    """Return a quantity of CAD's beside a line with this unit: ``6``, or ``6 pieces`` beside ``0.5 m``."""
-    return quantity(said, unit if counts_pieces(unit) else _("piece") if said == 1 else _("pieces"))
+def of_cad(count: float | None, unit: str | None) -> str:
+    """Write a quantity of CAD beside a line with this unit: ``6``, or ``6 pieces`` beside ``0.5 m``."""
+    return quantity(count, unit if counts_pieces(unit) else _("piece") if count == 1 else _("pieces"))
 
 
 def _became(line: ChangedLine) -> str:
@@ -269,24 +265,25 @@ def _same(name: str, a: str, b: str) -> bool:
 
 
 def _text(form: FormData, name: str) -> str:
-    """Return a field of any length: :func:`values_of` refuses a long one by the name that the page shows."""
+    """Read a field of any length: :func:`values_of` refuses a long one by the label that the page shows."""
     return text(form, name, sys.maxsize)
 
 
 def by_whom(change: Change) -> str:
-    """Return ``by ann, 2026-02-08 22:15: one spare``; a sync names its file."""
+    """Describe who made a change: ``by ann, 2026-02-08 22:15: one spare``; a sync names its file."""
     values = {"user": isolate(change.username), "at": change.at[:16].replace("T", " ")}
-    said = _(
+    words = _(
         "sync by %(user)s, %(at)s" if change.kind == ChangeKind.MERGE else "by %(user)s, %(at)s", **values
     )
     if change.document_file:
-        said += _(", from %(document_file)s", document_file=isolate(change.document_file))
-    return f"{said}: {isolate(change.reason)}" if change.reason else said
+        words += _(", from %(document_file)s", document_file=isolate(change.document_file))
+    return f"{words}: {isolate(change.reason)}" if change.reason else words
 
 
 def sentence(line: ChangedLine) -> tuple[str, str]:
-    """Return (mark, words) of what one change made of one line: ``~``, ``F01-0001 M8x20 Bolt: quantity 8 →
-    12``.
+    """Describe what a change made of a line: (mark, ``F01-0001 M8x20 Bolt: quantity 8 → 12``).
+
+    The mark is ``added``, ``removed``, ``changed``, or ``warn`` if CAD lost the line.
     """
     who = f"{isolate(line.child.part_number)} {isolate(line.child.name)}".strip()
     if line.before is None and line.after is not None:
@@ -296,37 +293,37 @@ def sentence(line: ChangedLine) -> tuple[str, str]:
         return "removed", _("%(who)s: removed", who=who)
     assert line.before is not None  # a changed line has both states
     gone = line.after.unreferenced_since is not None and line.before.unreferenced_since is None
-    said = ", ".join(changes(line.before, line.after)) or _("no visible change")
-    return ("warn" if gone else "changed"), f"{who}: {said}"
+    words = ", ".join(changes(line.before, line.after)) or _("no visible change")
+    return ("warn" if gone else "changed"), f"{who}: {words}"
 
 
 def changes(before: LineState, after: LineState) -> list[str]:
-    """Return what differs between two states of a line."""
-    said: list[str] = []
+    """List the differences between two states of a line, in words."""
+    differences: list[str] = []
     if (before.quantity, before.unit) != (after.quantity, after.unit):
         old, new = quantity(before.quantity, before.unit), quantity(after.quantity, after.unit)
-        said.append(_("quantity %(old)s → %(new)s", old=old, new=new))
+        differences.append(_("quantity %(old)s → %(new)s", old=old, new=new))
     if before.unreferenced_since is None and after.unreferenced_since is not None:
-        said.append(_("no longer referenced by the assembly"))
+        differences.append(_("no longer referenced by the assembly"))
     back = before.unreferenced_since is not None and after.unreferenced_since is None
     if back and after.source == "assembly":
-        said.append(_("referenced again"))
+        differences.append(_("referenced again"))
     if before.source != after.source:
         manual = after.source == "manual"
-        said.append(_("now a manual line") if manual else _("owned by the assembly again"))
+        differences.append(_("now a manual line") if manual else _("owned by the assembly again"))
     if before.reason != after.reason and after.reason:
-        said.append(_("reason: %(reason)s", reason=isolate(after.reason)))
+        differences.append(_("reason: %(reason)s", reason=isolate(after.reason)))
     for name, words in _NAMES.items():
         old, new = (_quoted(getattr(state, name)) for state in (before, after))
         if old != new:
-            said.append(f"{_(words)} {old} → {new}")
-    return said
+            differences.append(f"{_(words)} {old} → {new}")
+    return differences
 
 
 def sentences(
     lines: Sequence[ChangedLine], most: int = 30, count: int | None = None
 ) -> list[tuple[str, str]]:
-    """Return the lines of a change, which has ``count`` of them; beyond ``most`` only how many more."""
+    """Describe the lines of a change, which has ``count`` of them; beyond ``most`` only count them."""
     line_sentences = [sentence(line) for line in lines[:most]]
     rest = (len(lines) if count is None else count) - most
     return (

@@ -103,7 +103,7 @@ class RefusedDecision(Exception):
 
 
 def bom_path(part_number: str) -> str:
-    """Return the merge page of an item."""
+    """Return the address of an item's merge page."""
     return f"/items/{segment(part_number)}/bom"
 
 
@@ -118,7 +118,7 @@ def merge_page(call: Reader, part_number: str, edit: Annotated[str, Query(max_le
 
 @router.post("/items/{part_number}/bom/decide")
 def decide(call: Writer, part_number: str, form: Form) -> Response:
-    """Carry a decision out, for one line or for all chosen ones, if they are as the person saw them."""
+    """Carry out a decision, for one line or for all chosen lines, if they are as the person saw them."""
     chosen = [value.partition(" ")[0] for value in texts(form, "chosen")]
     reasons = {chosen[0] if chosen and "bulk" not in form else "": text(form, "reason")}
     asked = PageState(chosen=chosen, reasons=reasons)
@@ -140,7 +140,7 @@ def decide(call: Writer, part_number: str, form: Form) -> Response:
                 count=count,
             )
             refusals = [
-                f"{names.get(line_id, _('A line'))}: {said}" for line_id in story for said in story[line_id]
+                f"{names.get(line_id, _('A line'))}: {words}" for line_id in story for words in story[line_id]
             ] or gone
             left = [line_id for line_id in chosen if line_id not in error.line_ids]
             raise RefusedDecision(replace(asked, problem=problem, story=refusals, chosen=left), 412) from None
@@ -151,7 +151,7 @@ def decide(call: Writer, part_number: str, form: Form) -> Response:
 
 @router.post("/items/{part_number}/bom/undo")
 def undo(call: Writer, part_number: str, form: Form) -> Response:
-    """Take a change back, as a new change."""
+    """Undo a change, as a new change."""
 
     def work(tx: Tx) -> tuple[str, int]:
         change_id = whole(form, "change_id")
@@ -164,7 +164,7 @@ def undo(call: Writer, part_number: str, form: Form) -> Response:
 
 @router.post("/items/{part_number}/bom/lines")
 def add_line(call: Writer, part_number: str, form: Form) -> Response:
-    """Add a manual line. Where the part has one already, that one is opened with what was typed."""
+    """Add a manual line. If the part has a line already, open that one with what was typed."""
     sent = line_form.read(form)
     child = text(form, "child")
     asked = PageState(typed={**sent.typed, "child": child}, why=sent.why)
@@ -189,7 +189,7 @@ def add_line(call: Writer, part_number: str, form: Form) -> Response:
 
 @router.post("/items/{part_number}/bom/lines/{line_id}")
 def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Response:
-    """Change what the person changed in the form of a line; what two people changed is asked about."""
+    """Save what the person changed in the form of a line; ask about what two people changed."""
 
     def change(tx: Tx, line: Line, sent: LineForm, asked: PageState, news: list[str]) -> tuple[str, int]:
         if clashes := line_form.unmade(sent):
@@ -209,8 +209,8 @@ def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
         also = _(" Meanwhile: %(told)s.", told="; ".join(news)) if edit.theirs and news else ""
         if not edited.change_id or edited.line is None:
             return _("Your values are the same as in Silo, so nothing was changed.") + also, 0
-        said = _("%(number)s changed.", number=isolate(edited.child_part_number))
-        return said + also, edited.change_id
+        notice = _("%(number)s changed.", number=isolate(edited.child_part_number))
+        return notice + also, edited.change_id
 
     return _do_line(call, part_number, line_id, form, change)
 
@@ -241,7 +241,7 @@ def _do_line(
     form: FormData,
     act: Callable[[Tx, Line, LineForm, PageState, list[str]], tuple[str, int]],
 ) -> Response:
-    """Do ``act`` to the line of a form. Where it is gone, what was typed stays in the form for a new one.
+    """Do ``act`` to the line of a form. If the line is gone, what was typed stays in the form for a new one.
 
     act
         gets the line as it is now, the form, how the page shows it again, and what happened to the line
@@ -281,7 +281,7 @@ def _do(
     work: Callable[[Tx], tuple[str, int]],
     asked: PageState | None = None,
 ) -> Response:
-    """Do ``work`` and go back; where it cannot be done, the page says why and keeps what was typed."""
+    """Do ``work`` and go back; if it cannot be done, the page says why and keeps what was typed."""
     view = view_of(text(form, "view", 1000))
     given = replace(asked or PageState(), view=view)
     try:
@@ -332,7 +332,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
         item=item,
         total=len(lines),
         table=table,
-        # A line is named by its child, which is shorter than its id, where the child has no other line.
+        # A line is named by its child, which is shorter than its id, if the child has no other line.
         several={child for child, count in Counter(line.child_id for line in lines).items() if count > 1},
         table_at=table_at,
         shows=SHOWS,
@@ -386,7 +386,7 @@ _SORTS: Mapping[str, Callable[[Line], Any]] = {
 
 
 def table_of(lines: Sequence[Line], path: str, view: str) -> tuple[Page[Line], Address]:
-    """Return the lines that the query ``view`` asks for, and the address with it."""
+    """Find the lines that the query ``view`` asks for; return a page of them, and its address."""
     asked = {name: value[:200] for name, value in parse_qsl(view) if name in ("q", "show", "sort", "page")}
     test, shown = fits(asked.get("q", "")), SHOWS.get(asked.get("show", ""))
     shown_lines = [

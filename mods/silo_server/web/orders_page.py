@@ -38,7 +38,7 @@ AskedFor = Annotated[OrderRequest, Depends(asked_of)]
 
 @router.get("/items/{part_number}/suppliers")
 def suppliers_page(call: Reader, part_number: str) -> Response:
-    """Return the table of an item's supplier parts, and its last changes."""
+    """Show the table of an item's supplier parts, and its last changes."""
     return _suppliers(call, part_number)
 
 
@@ -84,17 +84,17 @@ def save_suppliers(call: Writer, part_number: str, form: Form) -> Response:
         return _suppliers(call, part_number, VersionConflictError(problem), typed)
     except SiloError as error:
         return _suppliers(call, part_number, error, typed)
-    said = (
+    notice = (
         _("Suppliers of %(number)s saved.", number=isolate(item.part_number))
         if change
         else _("Nothing differs, so nothing was saved.")
     )
-    return back(f"/items/{segment(item.part_number)}/suppliers", said)
+    return back(f"/items/{segment(item.part_number)}/suppliers", notice)
 
 
 @router.post("/items/{part_number}/suppliers/undo")
 def undo_suppliers(call: Writer, part_number: str, form: Form) -> Response:
-    """Take the newest change of the table back."""
+    """Undo the newest change of the table."""
     with call.write() as tx:
         item = suppliers.undo_supplier_change(tx, part_number, whole(form, "change") or 0)
     return back(f"/items/{segment(item.part_number)}/suppliers", _("The last change is undone."))
@@ -107,7 +107,7 @@ def order_page(
     asked: AskedFor,
     number: Annotated[int, Query(ge=0, le=10**9, alias="page")] = 1,
 ) -> Response:
-    """Return what to order for so many pieces; page 0 has all rows, for paper."""
+    """Show what to order for so many pieces; page 0 has all rows, for paper."""
     with call.server.large_reads.enter(), call.read() as tx:
         product = get_item(tx, part_number, include_archived=True)
         labels = [
@@ -154,7 +154,7 @@ def order_page(
 
 
 def _some(rows: Sequence[OrderRow]) -> dict[str, bool]:
-    """Return which columns say anything."""
+    """Find which columns say anything."""
     return {
         "ordered": any(row.ordered for row in rows),
         "mass": any(row.mass for row in rows),
@@ -163,7 +163,7 @@ def _some(rows: Sequence[OrderRow]) -> dict[str, bool]:
 
 
 def _fact_of(row: OrderRow) -> str:
-    """Return what the box of a row records, beside how much."""
+    """Write what the box of a row records, without the quantity."""
     offer = row.offer
     fact: dict[str, Any] = {"part_number": row.item.part_number, "unit": row.unit}
     if offer is not None:
@@ -174,7 +174,7 @@ def _fact_of(row: OrderRow) -> str:
 
 @router.post("/items/{part_number}/order")
 def record(call: Writer, part_number: str, form: Form) -> Response:
-    """Note the chosen parts as ordered, or say of them that they are made or bought."""
+    """Record the chosen parts as ordered, or mark them as made or bought."""
     chosen = [_read_fact(key) for key in texts(form, "chosen")]
     kind = text(form, "kind")
     with call.write() as tx:
@@ -182,14 +182,14 @@ def record(call: Writer, part_number: str, form: Form) -> Response:
             for number in dict.fromkeys(key["part_number"] for key in chosen):
                 item_service.change_item(tx, number, ItemChange(texts={"sourcing_type": kind}))
             made, bought = N_("%(count)s now made."), N_("%(count)s now bought.")
-            said = _(made if kind == "manufactured" else bought, count=len(chosen))
-            said = said if chosen else _("Nothing was chosen.")
+            notice = _(made if kind == "manufactured" else bought, count=len(chosen))
+            notice = notice if chosen else _("Nothing was chosen.")
         else:
             facts = [_order_of(form, key) for key in chosen]
             done = record_all(tx, part_number, facts, text(form, "note"))
-            said = _("%(count)s noted as ordered.", count=len(done))
+            notice = _("%(count)s noted as ordered.", count=len(done))
     home = f"/items/{segment(part_number)}/order"
-    return back(back_to(form, home, home), said)
+    return back(back_to(form, home, home), notice)
 
 
 def _read_fact(written: str) -> dict[str, Any]:
@@ -203,16 +203,16 @@ def _read_fact(written: str) -> dict[str, Any]:
 def _order_of(form: FormData, fact: Mapping[str, Any]) -> OrderedBody:
     number, unit = str(fact.get("part_number")), fact.get("unit")
     quantity = amount(text(form, f"quantity.{number}.{unit or ''}"), number)
-    said = {name: value for name, value in fact.items() if value is not None}
+    given = {name: value for name, value in fact.items() if value is not None}
     try:
-        return OrderedBody.model_validate(said | {"quantity": quantity})
+        return OrderedBody.model_validate(given | {"quantity": quantity})
     except ValidationError:
         raise RejectedError(_(_STALE)) from None
 
 
 @router.post("/items/{part_number}/order/{order_id}/take-back")
 def take_back(call: Writer, part_number: str, order_id: int, form: Form) -> Response:
-    """Say that something was not ordered after all."""
+    """Record that an order was not placed after all."""
     with call.write() as tx:
         orders.take_back(tx, part_number, order_id)
     return back(f"/items/{segment(part_number)}/order#recorded", _("Taken back; it stays in the list below."))
@@ -220,7 +220,7 @@ def take_back(call: Writer, part_number: str, order_id: int, form: Form) -> Resp
 
 @router.get("/suppliers")
 def prices_page(call: Reader) -> Response:
-    """Import prices of suppliers, and the site's currencies."""
+    """Show where prices of suppliers are imported, and the site's currencies."""
     return _prices(call)
 
 
@@ -270,7 +270,7 @@ def _records(
 
 @router.post("/suppliers/check")
 def check(call: Writer, form: Form) -> Response:
-    """Say what a table would change; nothing is written."""
+    """Show what a table would change; write nothing."""
     return checked(form, TABLE, partial(_prices, call))
 
 

@@ -50,7 +50,7 @@ ROUTERS = (
 
 
 class Spoken:
-    """Says in which language a page is; what the API answers never depends on it."""
+    """Sets the language of a page; the answers of the API never depend on it."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -76,12 +76,12 @@ class OwnFiles(StaticFiles):
 
 
 def install(app: FastAPI) -> None:
-    """Add what is no route: static files, the language, the way to the login page, errors as pages."""
+    """Add what is not a route: static files, the language, the way to the login page, errors as pages."""
     app.add_middleware(Spoken)
     app.mount(
         "/static", OwnFiles(packages=[("silo_server.web", "static"), ("silo", "viewer")]), name="static"
     )
-    # Browsers get pages where the handlers that ``app`` has give JSON.
+    # Browsers get pages instead of the JSON that the handlers of ``app`` give.
     for kind, handler in list(app.exception_handlers.items()):
         app.add_exception_handler(kind, _for_browsers(cast(Handler, handler)))
     app.add_exception_handler(LoginNeededError, to_login)
@@ -105,7 +105,7 @@ TITLES = {
 
 
 def wants_page(request: Request) -> bool:
-    """Return True for a browser that shows a page; the API and programs get JSON."""
+    """Return True if a browser asks for a page; the API and programs get JSON."""
     return not request.url.path.startswith("/api/") and "text/html" in request.headers.get("accept", "")
 
 
@@ -120,7 +120,7 @@ def _for_browsers(handler: Handler) -> Handler:
 
 
 async def error_page(request: Request, plain: Response) -> Response:
-    """Return the page for an error that was answered as JSON."""
+    """Make the page for an error that was answered as JSON."""
     values: dict[str, Any] = json.loads(bytes(plain.body))
 
     kept = getattr(request.state, "kept", None)
@@ -147,9 +147,7 @@ async def error_page(request: Request, plain: Response) -> Response:
 
 
 def _page_above(request: Request) -> str:
-    """Return the page that the form of this address stands on: the nearest one above that can be
-    looked at.
-    """
+    """Find the page with the form of this address: the nearest one above that can be opened."""
     path = request.scope["path"].rstrip("/")
     while path:
         path = path.rpartition("/")[0]

@@ -42,7 +42,7 @@ def _path(part_number: str) -> str:
 
 @router.get("/items/{part_number}/releases")
 def releases_page(call: Reader, part_number: str) -> Response:
-    """Return all revisions of a product, with the forms that submit, approve, reject and end them."""
+    """Show all revisions of a product, with the forms that submit, approve, reject and end them."""
     return _show(call, part_number)
 
 
@@ -66,9 +66,7 @@ def _show(
 
 
 def state_of(tx: Tx, item: Item, list_of_releases: list[Release] | None = None) -> dict[str, Any]:
-    """Return what pages say of a product: the revision that is released, and whether something changed
-    since.
-    """
+    """Find the revision that is released or in review, and whether the product changed since."""
     list_of_releases = releases.list_releases(tx, item) if list_of_releases is None else list_of_releases
     released = next((release for release in list_of_releases if release.status == "released"), None)
     waiting = next((release for release in list_of_releases if release.status == "review"), None)
@@ -98,7 +96,7 @@ def submit(call: Writer, part_number: str, form: Form) -> Response:
 
 @router.post("/items/{part_number}/releases/{label}/approval")
 def approve(call: Reader, part_number: str, label: str, form: Form) -> Response:
-    """Approve what is in review, in spite of what blocks if a reason is given."""
+    """Approve a revision in review; with a reason, in spite of what blocks."""
     typed = {name: text(form, name, 2000) for name in ("approval", "override")}
     try:
         with call.write() as tx:
@@ -112,7 +110,7 @@ def approve(call: Reader, part_number: str, label: str, form: Form) -> Response:
 
 @router.post("/items/{part_number}/releases/{label}/end")
 def end(call: Reader, part_number: str, label: str, form: Form) -> Response:
-    """Reject, withdraw, or call obsolete."""
+    """Reject or withdraw a revision in review, or call a released one obsolete."""
     status = text(form, "status")
     if status not in ENDS:
         return _show(call, part_number, _("Load the page again: the state has changed."), 400)
@@ -132,7 +130,7 @@ def release_page(
     view: Annotated[str, Query(max_length=10)] = "tree",
     number: Annotated[int, Query(alias="page", ge=1, le=10**9)] = 1,
 ) -> Response:
-    """Return one revision as it was frozen: its tree, or the flat list with totals, and its files."""
+    """Show one revision as it was frozen: its tree, or the flat list with totals, and its files."""
     with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         release = releases.get_release(tx, item, label)
@@ -161,7 +159,7 @@ def release_page(
 
 
 def _rows(product: ProductContent, *, flat: bool) -> Any:
-    """Return the rows of the table: the line, its depth, its total, and what one piece is worth."""
+    """Yield the rows of the table: the line, its depth, its total, mass and cost of one piece."""
     if flat:
         for row in tree.flatten(product.graph):
             yield row.line, 1, row.total, product.worths[row.line.child_id]

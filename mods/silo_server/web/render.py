@@ -52,14 +52,12 @@ _CATALOGUES = {
     name: gettext.translation("silo_server", Path(__file__).parents[1] / "locale", [name], fallback=True)
     for name in LANGUAGES
 }
-# Of the request that is answered; what is no page is English.
+# The language of the page that is answered; all that is no page is English.
 LANGUAGE: ContextVar[str] = ContextVar("LANGUAGE", default="en")
 
 
 def language_for(chosen: str, accepted: str) -> str:
-    """Return the language of a page: what a person chose, else the best of an ``Accept-Language``, else
-    English.
-    """
+    """Choose a page's language: the person's choice, else the best ``Accept-Language``, else English."""
     if chosen in LANGUAGES:
         return chosen
     best, weight = "en", 0.0
@@ -74,7 +72,7 @@ def language_for(chosen: str, accepted: str) -> str:
 
 
 def _(text: str, **values: object) -> str:
-    """Return ``text`` in the language of the page, with ``values`` in the place of ``%(name)s``."""
+    """Translate ``text`` into the language of the page, with ``values`` in place of ``%(name)s``."""
     translation = _CATALOGUES[LANGUAGE.get()].gettext(text) if text else ""
     return translation % values if values else translation
 
@@ -89,12 +87,12 @@ SCRIPTS += [Path(silo.__file__).with_name("viewer") / "viewer.js"]
 
 
 def script_words() -> dict[str, str]:
-    """Return text → translation, for the scripts of a page."""
+    """Translate the texts of a page's scripts: text → translation."""
     return {text: _(text) for path in SCRIPTS for text in texts_of_script(path)}
 
 
 def texts_of_script(path: Path) -> list[str]:
-    """Return the texts of a script that are translated: ``_("Page %(n)s", { n })``."""
+    """Find the texts of a script that are translated: ``_("Page %(n)s", { n })``."""
     return [json.loads(text) for text in re.findall(r'\b_\(("(?:[^"\\]|\\.)*")', path.read_text("utf-8"))]
 
 
@@ -117,8 +115,7 @@ _WORD = re.compile(r"[^\W\d_]{2}|\b[aI]\b")
 
 
 def translated(template: str, translate: Callable[[str], str]) -> str:
-    """Return a template in another language: each text and each attribute that is read, as ``translate`` has
-    it.
+    """Translate a template by ``translate``: each text and each attribute that people read.
 
     A text is a sentence with the elements in it; its expressions and the tags with attributes are
     placeholders: ``Suppliers of %(part_number)s``. Statements and all other elements end it.
@@ -147,13 +144,13 @@ def _has_words(pieces: Sequence[str]) -> bool:
 
 
 def _is_apart(pieces: Sequence[str]) -> bool:
-    """Return True for space or an element with a sign in it, at an end of a sentence."""
+    """Return True for space, or an element with only a sign in it, at an end of a sentence."""
     element = len(pieces) > 1 and not _has_words(pieces) and not any(piece[:1] == "{" for piece in pieces)
     return element or (len(pieces) == 1 and not pieces[0].strip())
 
 
 def _sentence(run: Sequence[str], translate: Callable[[str], str]) -> str:
-    """Return a run of texts, expressions and tags, translated in its largest parts that are sentences."""
+    """Translate a run of texts, expressions and tags in the largest parts that are sentences."""
     if not _has_words(run):
         return "".join(run)
     ends: dict[int, int] = {}
@@ -214,8 +211,9 @@ def _message(run: Sequence[str], translate: Callable[[str], str]) -> str:
 
 
 def _name_of(piece: str) -> str:
-    """Return ``part_number`` for ``{{ item.part_number | bdi }}``, ``count`` for ``{{ plural(…) }}``,
-    ``link``.
+    """Name the placeholder of an expression or a tag.
+
+    ``part_number`` for ``{{ item.part_number | bdi }}``, ``count`` for ``{{ plural(…) }}``, ``link``.
     """
     if piece.startswith("<"):
         tag = piece[1:].partition(" ")[0]
@@ -237,7 +235,7 @@ SWITCHED_OFF = ' disabled aria-describedby="closed" title="{}"'
 
 
 def quantity(value: float | None, unit: str | None = None) -> str:
-    """Return ``12``, ``2.5 m``; a dash where there is none."""
+    """Write a quantity: ``12``, ``2.5 m``; a dash if there is none."""
     if value is None:
         return "–"
     shown = str(int(value)) if value == int(value) and abs(value) < 1e15 else f"{value:.12g}"
@@ -246,16 +244,14 @@ def quantity(value: float | None, unit: str | None = None) -> str:
 
 @lru_cache(maxsize=4096)
 def when(stamp: str | None) -> Markup | str:
-    """Return ``2026-02-08 22:15`` (UTC, as stored) with its full form for machines; a dash where there is
-    none.
-    """
+    """Write a time: ``2026-02-08 22:15`` (UTC), with its full form for machines; a dash if there is none."""
     if not stamp:
         return "–"
     return Markup('<time datetime="{}">{}</time>').format(wire(stamp), stamp[:16].replace("T", " "))
 
 
 def size(count: int | None) -> str:
-    """Return ``812 bytes``, ``14 kB``, ``3.2 MB``, ``68.7 GB``."""
+    """Write a number of bytes: ``812 bytes``, ``14 kB``, ``3.2 MB``, ``68.7 GB``; "" if there is none."""
     if count is None:
         return ""
     if count < 1000:
@@ -274,8 +270,9 @@ _GRAMS = Decimal("0.001")
 
 
 def bdi(text: object) -> Markup:
-    """Return what somebody typed, as text whose direction ends with it. A bare ``<bdi>`` ends at a U+2069
-    inside.
+    """Enclose what somebody typed, so that its direction ends with it.
+
+    In a bare ``<bdi>`` the direction would end at a U+2069 inside.
     """
     return Markup(f"<bdi>{escape(closed(str(text)))}</bdi>")
 
@@ -291,9 +288,7 @@ def isolate(text: str) -> str:
 
 
 def closed(text: str) -> str:
-    """Return ``text`` without characters that turn what follows it: isolates are closed, all others left
-    out.
-    """
+    """Keep characters in ``text`` from turning what follows it: close isolates, remove all others."""
     if TURNING.search(text) is None:
         return text
     kept: list[str] = []
@@ -310,12 +305,12 @@ def closed(text: str) -> str:
 
 
 def grouped(value: Decimal) -> str:
-    """Return ``12 345.6``: groups of three digits with a narrow space that does not break; no exponent."""
+    """Write ``12 345.6``: groups of three digits with a narrow space that does not break; no exponent."""
     return f"{value:,f}".replace(",", "\u202f")
 
 
 def mass(kilograms: float | Decimal | None) -> str:
-    """Return ``20.7 t``, ``3 kg``, ``12.5 g``: four digits at most; a dash where there is none."""
+    """Write a mass: ``20.7 t``, ``3 kg``, ``12.5 g``, with four digits or all before the point; or a dash."""
     if kilograms is None:
         return "–"
     exact = _rounded(as_decimal(kilograms))
@@ -328,8 +323,9 @@ def mass(kilograms: float | Decimal | None) -> str:
 
 
 def money(amount: float | Decimal | None, currency: str | None = None) -> str:
-    """Return ``12 345.60 EUR``; parts of a cent keep their digits (``0.0042 EUR``). A dash where there is
-    none.
+    """Write an amount: ``12 345.60 EUR``; a dash if there is none.
+
+    Parts of a cent keep their digits (``0.0042 EUR``).
     """
     if amount is None:
         return "–"
@@ -352,13 +348,13 @@ def spoken(text: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """Say a message as a sentence: a capital first, and a full stop where it has no end."""
+    """Say a message as a sentence: a capital first, and a full stop if it has no end."""
     text = spoken(text)
     return f"{text[:1].upper()}{text[1:]}{'' if not text or text.endswith(('.', '?', '!')) else '.'}"
 
 
 def segment(text: str) -> str:
-    """Return a part number as one segment of a path."""
+    """Quote a part number as one segment of a path."""
     return quote(text, safe="")
 
 
@@ -368,7 +364,7 @@ class _Translated(Extension):
 
 
 def environment(language: str) -> Environment:
-    """Return what compiles the templates of a language."""
+    """Make the environment that compiles the templates of a language."""
     made = Environment(
         loader=PackageLoader("silo_server.web", "templates"),
         extensions=[] if language == "en" else [_Translated],
@@ -390,10 +386,10 @@ _LINK = re.compile(r'(\s(?:href|src|action|formaction|data-events)=")/(?!/)')
 
 
 def _state(request: Request, waiting: int | None, actor: Actor | None) -> tuple[bool, int, int]:
-    """Return whether the server takes no changes, how many BOMs wait, if the page does not say, and how much
-    waits for this person.
+    """Read what each page shows: if no changes are taken, how many BOMs wait, how much for this person.
 
-    Without its database these are unknown; the page says so.
+    ``waiting``: the number of BOMs that wait, if the page has counted them. Without the database all of this
+    is unknown; the page says so.
     """
     try:
         with server_of(request).db.read() as tx:
@@ -404,16 +400,16 @@ def _state(request: Request, waiting: int | None, actor: Actor | None) -> tuple[
 
 
 def page(call: Call, template: str, *, status: int = 200, **values: Any) -> Response:
-    """Return a page for somebody who is logged in; see :func:`page_for`."""
+    """Make a page for somebody who is logged in; see :func:`page_for`."""
     return page_for(call.request, call.actor, template, status=status, **values)
 
 
 def page_for(
     request: Request, actor: Actor | None, template: str, *, status: int = 200, **values: Any
 ) -> Response:
-    """Return a page. ``actor`` None: nobody is logged in. A notice that waits in its cookie is shown once.
+    """Make a page. ``actor`` None: nobody is logged in. A notice that waits in its cookie is shown once.
 
-    Looks into the database for the server's mode, so not to be called on the event loop.
+    Do not call it on the event loop: it reads the server's mode from the database.
     """
     closed, waiting, for_me = _state(request, values.pop("waiting", None), actor)
     cookie = f"{NOTICE_COOKIE}_{request.query_params.get(NOTICE, '')}"
@@ -463,17 +459,17 @@ class Address:
     params: Mapping[str, str] = field(default_factory=dict)
 
     def url(self, **changes: object) -> str:
-        """Return the address with these changes; None, "" and False leave a part out."""
+        """Return the address with these changes; None, "" and False remove a part."""
         changed = {**self.params, **{name: "" if value is None else value for name, value in changes.items()}}
         kept = {name: str(value) for name, value in changed.items() if value not in ("", False)}
         return f"{self.path}?{urlencode(kept)}" if kept else self.path
 
     def query(self, **changes: object) -> str:
-        """Return the view alone, with its question mark; "" if all is as usual."""
+        """Return the query alone, with its question mark; "" if all is as usual."""
         return self.url(**changes)[len(self.path) :]
 
     def but(self, *names: str) -> Mapping[str, str]:
-        """Return the view without these parts: what a form must carry on beside its own fields."""
+        """Return the view without these parts: what a form must carry beside its own fields."""
         return {name: value for name, value in self.params.items() if name not in names and value}
 
 
@@ -489,17 +485,17 @@ class Page(Generic[T]):
 
     @property
     def last(self) -> int:
-        """Return the number of the last page."""
+        """Count the pages; the last page has this number."""
         return max(1, -(-self.found // self.size))
 
     @property
     def start(self) -> int:
-        """Return how many rows stand before this page."""
+        """Count the rows before this page."""
         return (self.number - 1) * self.size
 
     @property
     def words(self) -> str:
-        """Return ``12 of 340 lines`` in numbers only: ``12 of 340``, ``1 to 100 of 340``."""
+        """Describe the page in numbers: ``12 of 340``, ``1 to 100 of 340``."""
         if self.found > self.size:
             first, last = self.start + 1, self.start + len(self.rows)
             shown = _("%(first)s to %(last)s of %(found)s", first=first, last=last, found=self.found)
@@ -510,14 +506,14 @@ class Page(Generic[T]):
 
 
 def page_of(rows: Sequence[T], total: int, number: int, size: int = PAGE_ROWS) -> Page[T]:
-    """Return the page with this number; the last one where there are fewer."""
+    """Take the page with this number from the rows; the last one if there are fewer."""
     last = max(1, -(-len(rows) // size))
     number = min(max(number, 1), last)
     return Page(rows[(number - 1) * size : number * size], total, len(rows), number, size)
 
 
 def arranged(rows: Sequence[T], sort: str, keys: Mapping[str, Callable[[T], Any]]) -> Sequence[T]:
-    """Return the rows by the column that ``sort`` names (``mass``, ``-mass`` for the largest first).
+    """Sort the rows by the column that ``sort`` names (``-mass``: the largest mass first).
 
     Equal rows stay in their order; rows without a value come last either way. Numbers in texts count as such:
     M3×6 comes before M3×10.
@@ -570,7 +566,7 @@ def part_of(
     before: int | None,
     after: int | None,
 ) -> ListPart[N]:
-    """Return the part before an id, or the nearest one after an id; the newest where neither is given.
+    """Read the part before an id, or the nearest one after an id; the newest if neither is given.
 
     read
         (limit, before, after) → rows, newest first.

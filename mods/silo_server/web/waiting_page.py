@@ -63,9 +63,7 @@ def waiting_page(
     sort: Annotated[str, Query(max_length=20)] = "",
     number: Annotated[int, Query(ge=1, le=10**7, alias="page")] = 1,
 ) -> Response:
-    """Return the table; ``folder`` is a project's folder or one in it, ``who`` settles the BOM (``-``:
-    nobody).
-    """
+    """Show the BOMs that wait: in ``folder`` and below, those that ``who`` settles (``-``: nobody)."""
     view = {"q": q, "folder": folder, "kind": kind, "who": who, "sort": sort}
     view |= {"page": str(number) if number > 1 else ""}
     return _show(call, {name: value for name, value in view.items() if value})
@@ -94,22 +92,22 @@ def decide(call: Writer, form: Form) -> Response:
 
     changes, problems = _each(call, chosen, lambda value: value.rpartition(" ")[0], work)
     if lines:
-        said = _(
+        notice = _(
             "%(lines)s in %(boms)s %(done)s.",
             lines=plural(lines, "line"),
             boms=plural(len(changes), "BOM"),
             done=_(DONE[action]),
         )
     else:
-        said = _("The chosen BOMs have nothing open of this kind, so nothing was changed.")
+        notice = _("The chosen BOMs have nothing open of this kind, so nothing was changed.")
     if problems:
-        return _show(call, view, said, problems, text(form, "reason"), 409, changes)
-    return back(Address("/waiting", view).url(), said, undo=changes)
+        return _show(call, view, notice, problems, text(form, "reason"), 409, changes)
+    return back(Address("/waiting", view).url(), notice, undo=changes)
 
 
 @router.post("/waiting/undo")
 def undo(call: Writer, form: Form) -> Response:
-    """Take one decision about many BOMs back: a new change in each of them."""
+    """Undo one decision about many BOMs: a new change in each of them."""
     made = list(dict.fromkeys(text(form, "changes", 20_000).split(",")))[::-1]
 
     def work(tx: Tx, change: str) -> int:
@@ -117,10 +115,10 @@ def undo(call: Writer, form: Form) -> Response:
         return history.undo(tx, history.item_changed_by(tx, number), number, None)[0]
 
     changes, problems = _each(call, made, lambda change: _("change %(id)s", id=change), work)
-    said, view = _("Undone in %(boms)s.", boms=plural(len(changes), "BOM")), _view_of(form)
+    notice, view = _("Undone in %(boms)s.", boms=plural(len(changes), "BOM")), _view_of(form)
     if problems:
-        return _show(call, view, said, problems, status=409)
-    return back(Address("/waiting", view).url(), said)
+        return _show(call, view, notice, problems, status=409)
+    return back(Address("/waiting", view).url(), notice)
 
 
 @router.post("/waiting/assign")
@@ -142,7 +140,7 @@ def assign(call: Writer, form: Form) -> Response:
 
 @router.get("/mine")
 def mine_page(call: Reader) -> Response:
-    """Return the open BOMs that are the person's own, and what they follow, news first."""
+    """Show the open BOMs that are the person's own, and what the person follows, news first."""
     with call.read() as tx:
         rows = waiting(tx)
         subjects = review.followed(tx, call.actor)
@@ -160,13 +158,15 @@ def mine_page(call: Reader) -> Response:
 
 @router.post("/mine/follow")
 def follow(call: Reader, form: Form) -> Response:
-    """Begin or end to follow an item or a folder."""
+    """Begin or stop following an item or a folder."""
     on = bool(text(form, "on"))
     target = text(form, "target", 1024) or f"folder:{text(form, 'folder', 1000)}"
     with call.write(even_when_read_only=True) as tx:
         review.follow(tx, target, on=on)
-    said = _("You follow it now: the page For me says what changes.") if on else _("You no longer follow it.")
-    return back(back_to(form, "/mine"), said)
+    notice = (
+        _("You follow it now: the page For me says what changes.") if on else _("You no longer follow it.")
+    )
+    return back(back_to(form, "/mine"), notice)
 
 
 @router.post("/mine/seen")
@@ -185,17 +185,15 @@ def _view_of(form: FormData) -> dict[str, str]:
 
 
 def _gone(call: Call, action: ReviewAction, chosen: Sequence[str]) -> dict[str, Sequence[Line]]:
-    """Return part number → the lines that ``action`` would remove; what has changed since is left out
-    here.
-    """
-    result: dict[str, Sequence[Line]] = {}
+    """Find the lines that ``action`` would remove, by part number; BOMs that changed since are left out."""
+    gone: dict[str, Sequence[Line]] = {}
     with call.read() as tx:
         for value in chosen:
             part_number, _space, seen = value.rpartition(" ")
             with suppress(SiloError):
                 if lines := lines_for(tx, part_number, action, seen)[1]:
-                    result[part_number] = lines
-    return result
+                    gone[part_number] = lines
+    return gone
 
 
 def _each(
@@ -226,7 +224,7 @@ def _each(
 def _show(
     call: Call,
     view: Mapping[str, str],
-    said: str = "",
+    outcome: str = "",
     problems: list[str] | None = None,
     reason: str = "",
     status: int = 200,
@@ -263,7 +261,7 @@ def _show(
         kinds=KINDS,
         people=people,
         open=_open_of(*rows),
-        said=said,
+        outcome=outcome,
         # What was done beside the problems can be undone as well.
         done=changes,
         reason=reason,
@@ -273,7 +271,7 @@ def _show(
 
 
 def _open_of(*rows: Waiting) -> list[str]:
-    """Return what is open in these BOMs, by kind, in words."""
+    """Count what is open in these BOMs, by kind, in words."""
     unreferenced, conflicts, left_out, unregistered = (
         sum(count(row) for row in rows) for _words, count in KINDS.values()
     )
@@ -287,6 +285,6 @@ def _open_of(*rows: Waiting) -> list[str]:
 
 
 def _folders(folder: str) -> list[str]:
-    """Return a folder and all that it lies in: ``robot/arm`` is in ``robot``."""
+    """List a folder and all that it lies in: ``robot``, ``robot/arm``."""
     parts = folder.split("/")
     return ["/".join(parts[:end]) for end in range(1, len(parts) + 1)] if folder else []
