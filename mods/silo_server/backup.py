@@ -142,7 +142,7 @@ def back_up(settings: Settings, target: Path, report: Report = lambda _: None) -
 
 
 def verify(source: Path) -> Manifest:
-    """Return the manifest of a backup that is whole: the database and all files are as they were written.
+    """Check that database and files of a backup are as they were written; return its manifest.
 
     Raises ConfigError.
     """
@@ -160,14 +160,14 @@ def verify(source: Path) -> Manifest:
 def restore(
     settings: Settings, source: Path, *, replace: bool = False, report: Report = lambda _: None
 ) -> Manifest:
-    """Make database and files those of the backup, in one transaction: all of it or nothing.
+    """Restore database and files from a backup; the database in one transaction, all of it or nothing.
 
     The backup is verified, and brought to the newest schema in a copy, before anything is touched. A server
     may run meanwhile: it answers from the old state until the new one is committed; then its listeners get a
     ``reset``. Files that the backup does not have stay in the store.
 
     replace
-        needed where the database has items already.
+        needed if the database has items already.
     """
     made = verify(source)
     check_revision(made.schema, "backup")
@@ -228,7 +228,7 @@ def _save_tables(settings: Settings, path: Path, report: Report) -> tuple[str, d
         if not inspect(tx.conn).has_table("alembic_version"):
             raise ConfigError("backup: this is not the database of a Silo server")
         schema = str(tx.conn.scalar(text("SELECT version_num FROM alembic_version")))
-        # The backup has the schema that the database has, also where that is older than this version's.
+        # The backup has the schema that the database has, even if that is older than this version's.
         check_revision(schema)
         upgrade(new, schema)
         with new.engine.execution_options(silo_write=True).connect() as writer, writer.begin():
@@ -290,7 +290,7 @@ def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) ->
 
 
 def _keep_out(tx: Tx, revoked: Sequence[str], inactive: Sequence[str]) -> None:
-    """Keep revoked what was revoked, and inactive who was deactivated, since the backup was made."""
+    """Revoke tokens and deactivate users again, if that was done since the backup was made."""
     tokens = one_of(tx, api_tokens.c.token_hash, revoked) & api_tokens.c.revoked_at.is_(None)
     tx.conn.execute(update(api_tokens).where(tokens).values(revoked_at=tx.stamp))
     tx.conn.execute(update(users).where(one_of(tx, users.c.username_key, inactive)).values(active=False))
@@ -299,15 +299,15 @@ def _keep_out(tx: Tx, revoked: Sequence[str], inactive: Sequence[str]) -> None:
 def _copy_rows(reader: Connection, query: Select[Any], writer: Tx, target: Table) -> int:
     count = 0
     names = [c.name for c in target.columns]
-    with reader.execute(query, execution_options={"yield_per": PAGE}) as result:
-        for page in result.partitions(PAGE):
+    with reader.execute(query, execution_options={"yield_per": PAGE}) as rows:
+        for page in rows.partitions(PAGE):
             insert_rows(writer, target, [dict(zip(names, row, strict=True)) for row in page])
             count += len(page)
     return count
 
 
 def _highest_ids(connection: Connection, tables: Collection[Table]) -> dict[str, int]:
-    """Return the highest id that was ever given out, by table."""
+    """Find the highest id that each table has ever given out."""
     names = [t.name for t in tables if "id" in t.c and t.c["id"].type.python_type is int]
     if connection.dialect.name == "sqlite":
         rows = connection.execute(text("SELECT name, seq FROM sqlite_sequence")).all()
@@ -334,7 +334,7 @@ def _set_highest_ids(connection: Connection, highest: dict[str, int]) -> None:
 
 
 def _checksums(path: Path) -> set[str]:
-    """Return every file that the saved database refers to."""
+    """Find the hashes of all files that the saved database refers to."""
     checksums: set[str] = set()
     with closing(sqlite3.connect(path)) as saved:
         # An older schema has fewer tables.
@@ -346,7 +346,7 @@ def _checksums(path: Path) -> set[str]:
 
 
 def _copy_files(source: FileStore, target: FileStore, wanted: Collection[str]) -> list[str]:
-    """Copy what the target lacks; the hashes that the source does not have, or has damaged."""
+    """Copy the files that the target lacks; return the hashes that the source lacks or has damaged."""
     return [c for c in sorted(wanted) if not target.renew(c) and not target.copy_from(source, c)]
 
 

@@ -9,7 +9,7 @@ One dispatcher per process, any number of listeners, no queue and no thread per 
 
 The log in the database is the truth. The hub keeps the newest part of it in memory (the ring) as ready-made
 frames and wakes all listeners when it grows. A listener is only a cursor, the id of the last event it was
-given; it takes what is newer from the ring, or, when it is too slow or was away, from the log. So a slow
+given; it takes what is newer from the ring or, if it is too slow or was away, from the log. So a slow
 client blocks nobody, costs nothing and loses nothing; only one that is behind the log's horizon is sent
 ``reset`` and must read everything again.
 
@@ -59,13 +59,13 @@ class LoggedEvent:
 
     @property
     def mark(self) -> EventMark:
-        """Return what a listener that was given this event comes back with."""
+        """Return the mark that a listener sends when it comes back after this event."""
         return EventMark(self.id, f"{zlib.crc32(f'{self.name} {self.at} {self.data}'.encode()):08x}")
 
 
 @dataclass(frozen=True, slots=True)
 class EventMark:
-    """A place in the log: an event's number, and a tag of what it said; "" where there is no event.
+    """A place in the log: an event's number, and a tag of what it said; "" if there is no event.
 
     A restored database gives the numbers that it had given out since the backup to other events. The tag
     shows that: it is the log's epoch, for each event alone, so that however a database is put back, a
@@ -127,7 +127,7 @@ def released(tx: Tx, item: Item, label: str, what: str) -> None:
 
 
 def set_mode(tx: Tx, mode: str) -> str:
-    """Take changes (``normal``), or none (``read-only``); returns the mode that the server is in now."""
+    """Set the mode, ``normal`` or ``read-only`` (no changes); return the mode that now counts."""
     access.note(tx, "mode.set", mode, f"{mode_of(tx)} → {mode}")
     put_state(tx, "mode", mode)
     tx.emit(NewEvent("server.state", dumps({"mode": mode_of(tx)})))
@@ -135,7 +135,7 @@ def set_mode(tx: Tx, mode: str) -> str:
 
 
 def read_after(tx: Tx, after: int, limit: int = 500) -> list[LoggedEvent]:
-    """Return the next events after id ``after``, oldest first."""
+    """Read the next events after id ``after``, oldest first."""
     rows = tx.conn.execute(select(events).where(events.c.id > after).order_by(events.c.id).limit(limit)).all()
     return [from_row(LoggedEvent, row) for row in rows]
 
@@ -167,8 +167,9 @@ def newest(
     before: int | None = None,
     after: int | None = None,
 ) -> list[LoggedEvent]:
-    """Return the newest events that were asked for, newest first; ``before`` and ``after`` are ids to page
-    from.
+    """Read the newest of the events that ``asked`` describes, newest first.
+
+    ``before`` and ``after`` are ids to page from.
     """
     query = select(events)
     if asked.names:
@@ -190,32 +191,32 @@ def newest(
 
 
 def usernames(tx: Tx) -> list[str]:
-    """Return everybody of whom there are events."""
+    """List all users with events, by name."""
     scalars = tx.conn.scalars(select(events.c.username).distinct().where(events.c.username.is_not(None)))
     return sorted(scalars, key=str.casefold)
 
 
 def horizon_of(tx: Tx) -> int:
-    """Return the newest id that was trimmed away."""
+    """Find the newest id that was trimmed away; 0 if none was."""
     return int(get_state(tx, HORIZON) or 0)
 
 
 def bounds(tx: Tx) -> tuple[int, int]:
-    """Return (horizon, head): the newest id that was trimmed away, and the newest id there is."""
+    """Find (horizon, head): the newest id that was trimmed away, and the newest id of all."""
     horizon = horizon_of(tx)
     head = tx.conn.scalar(select(func.max(events.c.id))) or 0
     return horizon, max(head, horizon)
 
 
 def head(tx: Tx) -> EventMark:
-    """Return the newest place of the log."""
+    """Find the mark of the newest event."""
     return mark_at(tx, bounds(tx)[1])
 
 
 def reaches(tx: Tx, mark: EventMark) -> bool:
-    """Return True if the log goes back to ``mark`` without a gap: what came after it can be given, all of it.
+    """Check if the log has all events after ``mark``, without a gap.
 
-    False for one that was trimmed away, that is of the future, or whose event is another one by now.
+    False if the mark was trimmed away, is in the future, or now belongs to another event.
     """
     horizon, newest_id = bounds(tx)
     if not horizon <= mark.id <= newest_id:
@@ -224,15 +225,15 @@ def reaches(tx: Tx, mark: EventMark) -> bool:
 
 
 def mark_at(tx: Tx, event_id: int) -> EventMark:
-    """Return the mark of the event with this id; without a tag where there is none, or no more."""
+    """Find the mark of the event with this id; without a tag if there is no such event any more."""
     row = tx.conn.execute(select(events).where(events.c.id == event_id)).one_or_none()
     return from_row(LoggedEvent, row).mark if row is not None else EventMark(event_id)
 
 
 def trim(tx: Tx, keep: int, keep_bytes: int | None = None, limit: int | None = None) -> int:
-    """Forget all but the newest ``keep`` events, and of those all beyond ``keep_bytes`` of data.
+    """Delete all events but the newest ``keep``, and of these all beyond ``keep_bytes`` of data.
 
-    At most ``limit`` at once, the oldest first. Returns how many went. The horizon says up to where.
+    At most ``limit`` at once, the oldest first. Returns how many were deleted; the last is the new horizon.
     """
     horizon, head = bounds(tx)
     cut = head - keep
@@ -249,15 +250,15 @@ def trim(tx: Tx, keep: int, keep_bytes: int | None = None, limit: int | None = N
 
 
 def bytes_of(tx: Tx, written: ColumnElement[str]) -> ColumnElement[int]:
-    """Return how many bytes a text takes, uncompressed."""
+    """Make the expression for the size of a text [bytes], uncompressed."""
     return func.octet_length(written) if tx.postgres else func.length(cast(written, LargeBinary))
 
 
 def beyond(tx: Tx, newest: Select[Any], budget: int) -> Any:
-    """Return the key of the newest row with which the sizes pass ``budget``; None if they never do.
+    """Find the newest row at which the sizes pass ``budget`` [bytes]; None if they never do.
 
     newest
-        selects (key, size in bytes), newest first. One row is always kept.
+        selects (key, size in bytes), newest first. Returns a key; never that of the first row.
     """
     total = 0
     with tx.conn.execute(newest, execution_options={"yield_per": 1000}) as rows:
@@ -312,7 +313,7 @@ class Batch:
 
 
 def to_frame(event: LoggedEvent) -> Frame:
-    """Return ``id:``, ``event:``, ``data:`` and an empty line; the data is JSON and so has no line break."""
+    """Write an event as a frame: ``id:``, ``event:``, ``data:`` (JSON, so no line break), an empty line."""
     mark = event.mark
     payload = f"id: {mark}\nevent: {event.name}\ndata: {event.data}\n\n".encode()
     return Frame(mark, event.item_uuid, event.part_number_key, payload)
@@ -338,7 +339,7 @@ class Hub:
         self._listener: _PostgresListener | None = None
 
     async def start(self) -> None:
-        """Begin at the log's present end."""
+        """Start the dispatcher at the present end of the log."""
         self._loop = asyncio.get_running_loop()
         self.head = await asyncio.to_thread(self._read_head)
         self._ring_start = self.head.id
@@ -358,7 +359,7 @@ class Hub:
             await asyncio.to_thread(self._listener.stop)
 
     def close(self) -> None:
-        """Let all listeners go; the server is about to stop."""
+        """End all streams; the server is about to stop."""
         self.closed = True
         self._wake()
 
@@ -372,9 +373,7 @@ class Hub:
         await self._news.wait()
 
     async def take(self, cursor: EventMark) -> Batch:
-        """Return what comes after ``cursor``: from the ring where it reaches back far enough, else from the
-        log.
-        """
+        """Read what comes after ``cursor``: from the ring if it goes back far enough, else from the log."""
         if cursor.id >= self.head.id:
             return Batch((), cursor)
         if cursor.id >= self._ring_start:
@@ -392,7 +391,7 @@ class Hub:
         return newer
 
     async def place(self, last: EventMark | None) -> tuple[EventMark, bool]:
-        """Return (cursor to begin at, whether a ``reset`` is due) for a client that says what it saw last."""
+        """Find (cursor to begin at, whether a ``reset`` is due) for a client that last saw ``last``."""
         # The log and not the ring says where "now" is: the ring may be a moment behind a commit.
         return await asyncio.to_thread(self._read_place, last)
 
@@ -430,8 +429,9 @@ class Hub:
             self._wake()
 
     async def _begin_again(self) -> None:
-        """Make all listeners read everything again: the log was trimmed beyond them, or the database
-        restored.
+        """Make all listeners read everything again.
+
+        The log was trimmed beyond them, or the database was restored.
         """
         logger.warning("the event log is another one than before; every listener gets a reset")
         self.head = await asyncio.to_thread(self._read_head)
@@ -446,7 +446,7 @@ class Hub:
             self._beat_now()
 
     def beat(self) -> None:
-        """Send a heartbeat now, with which each stream checks if it may continue; from any thread."""
+        """Send a heartbeat now, at which each stream checks if it may continue; any thread may call this."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._beat_now)
 
@@ -462,7 +462,7 @@ class Hub:
         news.set()
 
     def _read_page(self, after: EventMark) -> list[Frame] | None:
-        """Return what comes after ``after``; None if that is no place of this log."""
+        """Read the frames that come after ``after``; None if that is no place of this log."""
         with self._db.read() as tx:
             if not reaches(tx, after):
                 return None

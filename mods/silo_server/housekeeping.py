@@ -83,7 +83,7 @@ logger = logging.getLogger("silo_server.housekeeping")
 STATE = "housekeeping"
 FILES_STATE = "housekeeping_of_files"
 BATCH = 1000
-# So long a name may log in from an address as before, whatever strangers try.
+# For so long a name may log in from an address where it did before, whatever strangers try.
 PLACE_DAYS = 90
 # An upload is in the store before the row that refers to it is committed; a day is far more than that takes.
 ORPHAN_SECONDS = 24 * 3600.0
@@ -102,7 +102,7 @@ class Run:
 
 
 def last_run(tx: Tx) -> Run | None:
-    """Return the newest run of any process, None if there was none yet."""
+    """Read the newest run of any process; None if there was none yet."""
     kept = get_state(tx, STATE)
     return None if kept is None else Run(**json.loads(kept))
 
@@ -135,7 +135,7 @@ def tidy(db: Database, store: FileStore) -> Run:
 
 
 async def keep_tidy(db: Database, store: FileStore, ending: asyncio.Event) -> None:
-    """Run every ``housekeeping_seconds`` until ``ending``; a run that has begun is finished first."""
+    """Run :func:`tidy` every ``housekeeping_seconds`` until ``ending``; a run that has begun is finished."""
     while not ending.is_set():
         with suppress(TimeoutError):
             await asyncio.wait_for(ending.wait(), db.settings.housekeeping_seconds)
@@ -168,7 +168,7 @@ def _repeat(db: Database, step: Step) -> int:
 def _old(
     table: Table, key: str, when: str, age: Callable[[Tx], datetime | None], *also: ColumnElement[bool]
 ) -> Step:
-    """Delete the rows whose time ``when`` is at or before ``age``; nothing where that is None."""
+    """Make the step that deletes the rows with a time ``when`` up to ``age``; none if ``age`` gives None."""
 
     def step(tx: Tx) -> int:
         before = age(tx)
@@ -218,9 +218,7 @@ def _events(tx: Tx) -> int:
 
 
 def _history(tx: Tx) -> int:
-    """Fold, for one BOM, the changes older than ``history_days`` into one, which has the state they
-    led to.
-    """
+    """Fold the changes of one BOM older than ``history_days`` into one, with the state they led to."""
     before = _days("history_days")(tx)
     if before is None:
         return 0
@@ -301,7 +299,7 @@ def _remove_orphans(db: Database, store: FileStore) -> int:
 
 
 LATER_SECONDS = 1.0
-# [s] A probe that takes longer says no for the time being.
+# [s] How long /health and /ready wait for a probe.
 HEALTH_SECONDS, READY_SECONDS = 0.2, 2.0
 # [bytes] With less, a database soon cannot write what is asked of it.
 MIN_FREE = 64 * 1024 * 1024
@@ -316,11 +314,11 @@ class Later:
         self._thread = threading.Thread(target=self._run, name="silo-later", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Write the rest down, and end; a database that hangs is not waited for."""
+        """Write the rest down, and end; does not wait long for a database that hangs."""
         self._stopping.set()
         self._thread.join(timeout=2)
 
@@ -347,7 +345,7 @@ class ServerStanding:
 
     @property
     def ready(self) -> bool:
-        """Return True if it can do all of its work."""
+        """Return True if the server can do all of its work."""
         return self.database == self.files == "ok"
 
 
@@ -362,7 +360,7 @@ class Probe:
         self.last = ServerStanding("normal", "ok", "ok")
 
     async def look(self, seconds: float) -> ServerStanding | None:
-        """Return how the server is now, None if that does not turn out within ``seconds``."""
+        """Look at database and store; None if that takes longer than ``seconds``."""
         if self._running is None or self._running.done():
             self._running = asyncio.get_running_loop().run_in_executor(self._executor, self._look)
         running = self._running  # while this one waits, another caller may begin the next look
@@ -370,7 +368,7 @@ class Probe:
         return running.result() if done else None
 
     def stop(self) -> None:
-        """Take no more looks."""
+        """Begin no more looks."""
         self._executor.shutdown(wait=False, cancel_futures=True)
 
     def _look(self) -> ServerStanding:
@@ -389,7 +387,7 @@ class Probe:
 
 
 def has_space(folder: Path, wanted: int) -> bool:
-    """Return True if the disk of this folder has so many bytes free; also where nobody can say."""
+    """Check if the disk of a folder has ``wanted`` bytes free; True if that is unknown."""
     try:
         return shutil.disk_usage(folder).free >= wanted
     except OSError:
@@ -426,7 +424,7 @@ class Metrics:
         return Gauge(name, text, registry=self._registry, multiprocess_mode="livesum")
 
     def request(self, method: str, route: str, status: int, seconds: float) -> None:
-        """Count an answer; ``status`` 0 for none."""
+        """Count an answer, and its time; ``status`` 0: there was none."""
         # A method may be any word that a client sends; routes are ours.
         method_name = (
             method if method in ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS") else "other"
@@ -435,7 +433,7 @@ class Metrics:
         self._seconds.labels(method_name, route).observe(seconds)
 
     def render(self, db: Database, hub: Hub, files: FileStore) -> bytes:
-        """Return the text for Prometheus. The database's numbers are left out while it cannot be read."""
+        """Write the numbers of this process, or of all workers, and of the database, for Prometheus."""
         self._listeners.set(hub.listeners)
         self._connections.set(db.connections)
         now = CollectorRegistry()
@@ -470,7 +468,7 @@ class Metrics:
 
 
 def standing(db: Database, hub: Hub, files: FileStore, large_reads: Turnstile) -> dict[str, Any]:
-    """Return how this server is at the moment, for an administrator; the queues are those of one process."""
+    """Collect the state of this server for an administrator; the queues are those of one process."""
     with db.read() as tx:
         row = sessions.c
         counts = {

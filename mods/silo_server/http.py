@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Around the whole application: an id for each request, a line of log, metrics, the sub-path.
 
-The id is the caller's own ``X-Request-ID`` where it has a plain one; it is in the answer's headers, in the
+The id is the caller's own ``X-Request-ID`` if it has a plain one; it is in the answer's headers, in the
 log line, and in the log of a fault. Log lines are JSON on standard error (``SILO_REQUEST_LOG``); they never
 hold a query, a token or a login link's secret.
 
@@ -65,7 +65,7 @@ class RequestInfo:
 
 
 def info_of(scope: Scope) -> RequestInfo:
-    """Return the request's info; one of its own where the application runs without :class:`Observed`."""
+    """Return the info of a request; a new one if the application runs without :class:`Observed`."""
     info = scope.get(KEY)
     return info if isinstance(info, RequestInfo) else RequestInfo("-")
 
@@ -142,7 +142,7 @@ class Observed:
 
 
 def log_to_stderr(settings: Settings) -> None:
-    """Let a server process write its log: requests as JSON where they are asked for, else what went wrong."""
+    """Write a line of JSON for each request to standard error, if the settings ask for it."""
     if settings.request_log:
         handler: logging.Handler = logging.StreamHandler(sys.stderr)
         handler.setFormatter(logging.Formatter("%(message)s"))
@@ -156,7 +156,7 @@ RETRY_SECONDS = "5"
 
 
 def install(app: FastAPI) -> None:
-    """Teach ``app`` the one shape."""
+    """Make ``app`` answer each error in the one JSON shape."""
     app.add_exception_handler(SiloError, _silo_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_exception)
@@ -178,7 +178,7 @@ def error_answer(
     revision: Mapping[str, Any] | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """Return an error in the one shape; ``problems``, ``path`` and ``revision`` only where there are any."""
+    """Answer with an error in the one JSON shape; empty details are left out."""
     body: dict[str, Any] = {"error": code, "message": message}
     if problems:
         body["problems"] = list(problems)
@@ -283,7 +283,7 @@ async def _disconnected(request: Request, error: Exception) -> Response:
 
 # A body may take another second for each BODY_PACE bytes.
 BODY_PACE = 8 * 1024
-# [s] So often half a body is looked at: whether the server is about to stop.
+# [s] So often a request that waits for its body checks if the server is about to stop.
 CLOSING_SECONDS = 0.5
 CLOSE = {"Connection": "close"}
 # Answers from this size on are compressed; a packet or two are sent as they are.

@@ -69,10 +69,10 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
     """Bring the database up to date and let the first admin in.
 
     token
-        ``SILO_API_TOKEN``, made a token of the first admin; a new one is made where None.
+        ``SILO_API_TOKEN``, which becomes a token of the first admin; a new one is made if None.
     reset_admin
-        the user with this name becomes an active admin, is made where there is none, and is let in: the way
-        back for those who locked themselves out.
+        the user with this name becomes an active admin, is made if there is none, and is let in: the way
+        back for people who locked themselves out.
     """
     upgrade(db)
     with db.write(even_when_read_only=True) as tx:
@@ -112,7 +112,7 @@ READING_THREADS = 40
 
 
 def routers() -> tuple[APIRouter, ...]:
-    """Return all routes; imported late, for they are half of the import, and a backup needs none of them."""
+    """Import and return all routers; late, as this takes half of the import, and a backup needs none."""
     from silo_server.routes import bom, items, orders, releases, scene, system
     from silo_server.web import pages
 
@@ -134,14 +134,14 @@ def routers() -> tuple[APIRouter, ...]:
 
 
 def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
-    """Return the server as an ASGI application; ``bootstrap.prepare`` has brought the database up to date."""
+    """Make the server as an ASGI application; :func:`prepare` has brought the database up to date."""
     from silo_server.routes.context import Server
 
     db = Database(settings, clock)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        # Changes that wait hold a thread each; what is left is for those who read.
+        # Each change that waits holds a thread; the other threads are for readers.
         anyio.to_thread.current_default_thread_limiter().total_tokens = WRITERS_WAITING + READING_THREADS
         hub, files, uses = Hub(db), FileStore(settings.storage), Later(db)
         probe = Probe(db, files)
@@ -183,15 +183,16 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
 
 
 def app_from_environment() -> Observed:
-    """Make the application for other ASGI servers: ``uvicorn --factory
-    silo_server.run:app_from_environment``.
+    """Make the application for another ASGI server.
+
+    ``uvicorn --factory silo_server.run:app_from_environment``
     """
     settings = settings_from_environment()
     return observed(create_app(settings), settings)
 
 
 def observed(app: FastAPI, settings: Settings) -> Observed:
-    """Return the application as it is served: with request ids, log, metrics, below its sub-path."""
+    """Wrap the application as it is served: with request ids, log, metrics, below its sub-path."""
     return Observed(app, settings, app.state.metrics)
 
 
@@ -234,7 +235,7 @@ class Greeting:
     warnings: Sequence[str] = ()
 
     def lines(self) -> list[str]:
-        """Return the lines for people, and for scripts that look for the first address and the token."""
+        """Write the lines for people, and for scripts that look for the first address and the token."""
         lines = [
             f"Silo server: {self.url}",
             *([f"Token:       {self.token}"] if self.token else []),
@@ -326,10 +327,10 @@ def serve(
     reset_admin: str | None = None,
     tell: Callable[[Greeting], None] = _tell,
 ) -> None:
-    """Serve until interrupted; reports the address, a token and a login link through ``tell`` first.
+    """Serve until interrupted; report the address, a token and a login link through ``tell`` first.
 
     token
-        the first token; ``SILO_API_TOKEN`` where None, a new one where that is not set either.
+        the first token; if None, ``SILO_API_TOKEN``; if that is not set either, a new one.
     reset_admin
         the name of the user who becomes an active admin, and is let in.
     port
@@ -346,7 +347,7 @@ def serve(
     given = token or os.environ.get("SILO_API_TOKEN") or None
     if given:
         access.check_configured_secret(given)
-    sock = _bind(host, port)  # first: where the port is taken, no token is made that nobody sees
+    sock = _bind(host, port)  # first: if the port is taken, no token is made that nobody sees
     try:
         welcome = _prepare(settings, given, reset_admin)
     except BaseException:
@@ -375,7 +376,7 @@ def serve(
 
 
 def start_warnings(settings: Settings, loopback: bool, free: int) -> list[str]:
-    """Return what is wrong with the settings of a server.
+    """List what is wrong with the settings of a server.
 
     loopback
         only this machine sees it.
@@ -513,7 +514,7 @@ def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | N
 
 
 def share_the_processor() -> None:
-    """Set Python for large answers beside small ones; for a process that does nothing but serve.
+    """Tune Python for large answers beside small ones; for a process that does nothing but serve.
 
     An answer of 100 000 rows is as many small objects; the collector, as it is set, would look through all of
     them (and through every loaded module) again and again while they are made. Half the time would go. And
@@ -531,7 +532,7 @@ def _end_with(sentinel: int, server: SiloServer) -> None:
 
 def _bind(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # asyncio turns Nagle's algorithm off only where the protocol is named; with it each answer takes 40 ms.
+    # asyncio turns Nagle's algorithm off only if the protocol is named; with it each answer takes 40 ms.
     sock = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     own_the_port(sock)
     try:

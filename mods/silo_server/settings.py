@@ -36,23 +36,20 @@ def utc_now() -> datetime:
 
 
 def stamp(when: datetime) -> str:
-    """Return a time as stored: microseconds always, so that text order is time order
-    (``2026-02-08T22:15:00.000000Z``).
-    """
+    """Write a time as it is stored (``2026-02-08T22:15:00.000000Z``): text order is time order."""
     return when.astimezone(UTC).replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"
 
 
 def wire(stored: str | None) -> str | None:
-    """Return a time as sent to clients, to the microsecond, so that it means the same moment when it comes
-    back.
+    """Write a stored time as clients get it, to the microsecond: when it comes back, it means the same.
 
-    Without the fraction where there is none, as in the spec (``2026-02-08T22:15:00Z``).
+    Without the fraction if that is 0, as in the spec (``2026-02-08T22:15:00Z``).
     """
     return None if stored is None else stored.replace(".000000Z", "Z")
 
 
 def spec_time(stored: str) -> str:
-    """Return a time as the spec's events have it: whole seconds (``2026-02-08T22:15:00Z``)."""
+    """Write a time as the spec's events have it: whole seconds (``2026-02-08T22:15:00Z``)."""
     return stored[:19] + "Z"
 
 
@@ -126,12 +123,12 @@ class Settings:
     database_url
         ``sqlite:///path`` or ``postgresql://user:password@host/database``.
     files_dir
-        where uploads are kept by hash; beside an SQLite database where not given.
+        where uploads are kept by hash; if not given, beside an SQLite database.
     poll_seconds
         how often the event log is looked at without a notice of news: the safety net for a lost
         notification, and how SQLite's changes by another process are seen.
     public_url
-        how users reach the server (``https://silo.example.com``), for links that are sent on. Where it is
+        how users reach the server (``https://silo.example.com``), for links that are sent on. If it is
         not given: the address that the server listens on.
     request_head_seconds, request_body_seconds
         how long a client may take to send a request; a body gets a second more for each 8 KiB of it.
@@ -146,7 +143,7 @@ class Settings:
     event_log_size, event_log_bytes
         events kept for replay; a client that was away longer gets ``reset``.
     sync_days, sync_bytes
-        for how long, and how much of, the answers to merges are kept for a repeated request.
+        for how many days, and up to how many bytes, answers are kept for repeated requests.
     warnings
         what was wrong with the settings at the start, for the page of the system; not from the environment.
     release_labels
@@ -207,7 +204,7 @@ class Settings:
 
     @property
     def sqlalchemy_url(self) -> str:
-        """Return the URL with the driver that we ship. Raises ConfigError for a database of another kind."""
+        """Return the URL with the driver that we ship. Raises ConfigError for any other kind of database."""
         for short in ("postgresql://", "postgres://"):
             if self.database_url.startswith(short):
                 return "postgresql+psycopg://" + self.database_url[len(short) :]
@@ -225,7 +222,7 @@ class Settings:
 
     @property
     def sqlite_path(self) -> Path | None:
-        """Return the database file, None for another database; in-memory databases are refused."""
+        """Return the path of the SQLite file, None for PostgreSQL; ConfigError for a database in memory."""
         if not self.is_sqlite:
             return None
         name = self.database_url.partition(":///")[2].partition("?")[0]
@@ -238,7 +235,7 @@ class Settings:
 
     @property
     def storage(self) -> Path:
-        """Return where uploaded files are kept."""
+        """Return the folder where uploaded files are kept."""
         if self.files_dir is not None:
             return self.files_dir
         path = self.sqlite_path
@@ -256,7 +253,7 @@ _ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir":
 
 
 def settings_from_environment(environ: Mapping[str, str] | None = None, **given: Any) -> Settings:
-    """Return settings from ``SILO_…`` variables (docs/server.md lists them); what is given wins over them."""
+    """Read the settings from ``SILO_…`` variables (docs/server.md lists them); ``given`` wins over them."""
     environ = os.environ if environ is None else environ
     values: dict[str, Any] = {"database_url": default_database_url()}
     kinds = {f.name: str(f.type) for f in fields(Settings)}

@@ -33,12 +33,12 @@ _DIGITS = 309
 
 
 def dumps(value: Any) -> str:
-    """Compact JSON text, as stored and sent."""
+    """Write compact JSON text, as it is stored and sent."""
     return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
 
 
 def json_problem(value: Any) -> str | None:
-    """Return what is wrong with a JSON value that a user gave, None if nothing is."""
+    """Say what is wrong with a JSON value that a user gave; None if nothing is."""
     stack = [(value, 1)]
     while stack:
         part, depth = stack.pop()
@@ -69,7 +69,7 @@ def check_json(name: str, value: Any) -> None:
 
 
 def merge_patch(target: Any, patch: Any) -> Any:
-    """Return ``target`` after a JSON merge patch (RFC 7386): null removes a member, objects merge.
+    """Apply a JSON merge patch (RFC 7386) to ``target``: null removes a member, objects merge.
 
     The patch has passed the guard, which bounds how deep this goes.
     """
@@ -119,7 +119,7 @@ class Scope(StrEnum):
 
     @property
     def role(self) -> Role:
-        """Return the role beyond which this scope does not go."""
+        """Return the highest role that a token of this scope can have."""
         return {Scope.READ: Role.VIEWER, Scope.WRITE: Role.EDITOR, Scope.ADMIN: Role.ADMIN}[self]
 
     def covers(self, wanted: Scope) -> bool:
@@ -132,7 +132,7 @@ class Actor:
     """Who does something, and from where.
 
     role
-        what this caller may do: the user's role, or less where the token's scope is narrower.
+        what this caller may do: the user's role, or less if the token's scope is narrower.
     scope, expires_at
         those of the token (``auth_source`` token); ``expires_at`` None = until it is revoked.
     by_link
@@ -157,7 +157,7 @@ class Actor:
 
     @property
     def own_id(self) -> int:
-        """Return the user's id; every caller that a guard let in is a user."""
+        """Return the user's id; each caller that a guard let in is a user."""
         assert self.user_id is not None
         return self.user_id
 
@@ -204,18 +204,18 @@ class Item:
 
     @property
     def subject(self) -> str:
-        """Return what people read in messages."""
+        """Return the name of the item for messages: its part number."""
         return self.part_number
 
     @property
     def is_bought(self) -> bool:
-        """Return True for an item that is purchased: it says so, or says nothing and a supplier is known."""
+        """Return True for a purchased item: it says so, or says nothing and a supplier is known."""
         return bought(self.texts.get("sourcing_type"), self.supplier_parts or self.properties.get("supplier"))
 
 
-def bought(said: str | None, supplier: object) -> bool:
-    """Answer :attr:`Item.is_bought`."""
-    return said == "purchased" or bool(not said and supplier)
+def bought(sourcing: str | None, supplier: object) -> bool:
+    """Decide :attr:`Item.is_bought` from the sourcing type and the supplier."""
+    return sourcing == "purchased" or bool(not sourcing and supplier)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,13 +232,13 @@ class Document:
 
     @property
     def subject(self) -> str:
-        """Return what people read where an item has its part number."""
+        """Return the name of the document for messages."""
         return f"document {self.uuid}"
 
 
 @dataclass(frozen=True, slots=True)
 class Revision:
-    """A revision of an item: a property snapshot and, where one was uploaded, a file; or one of a document.
+    """A revision of an item: a property snapshot and, if one was uploaded, a file; or one of a document.
 
     base_revision, file_path, links
         what the client said of the file (:class:`silo.api.wire.Revision`).
@@ -312,15 +312,13 @@ def names_of(kind: Any) -> Iterable[str]:
 
 
 def from_row(kind: type[T], row: Any, /, **given: Any) -> T:
-    """Return a frozen value from a row whose columns have the names of its fields; ``given`` wins over
-    them.
-    """
+    """Make a frozen value from a row with columns named as its fields; ``given`` wins over the row."""
     values = row._asdict() | given  # in half the time of an attribute for each
     return kind(**{name: values[name] for name in names_of(kind)})
 
 
 def to_wire(value: Any, *left_out: str) -> dict[str, Any]:
-    """Return the fields of a frozen value, under their own names, as the API sends them."""
+    """Return the fields of a frozen value as the API sends them, under their own names."""
     kind = type(value)
     if kind not in _TIMES:
         # Found once for each class: a BOM has thousands of lines.

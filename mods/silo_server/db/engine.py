@@ -5,7 +5,7 @@ Reads see one snapshot (SQLite: a transaction of its WAL; PostgreSQL: REPEATABLE
 
 Every wait ends. Readers and writers have connections of their own, so that reads work while a writer
 waits for another process, a locked row or a disk. Writers queue in a turnstile and are sent away (503,
-BusyError) where too many wait or it takes too long; PostgreSQL has time-outs for locks and statements, and a
+BusyError) if too many wait or it takes too long; PostgreSQL has time-outs for locks and statements, and a
 connection whose server does not answer at all is given up by us.
 
 Writes: SQLite has one writer at a time (``BEGIN IMMEDIATE``); inside a process the turnstile queues them,
@@ -88,7 +88,7 @@ class Turnstile:
 
     @contextmanager
     def enter(self) -> Iterator[None]:
-        """Stay inside until the block ends. Raises BusyError; then nothing was done."""
+        """Wait for a place, and stay inside until the block ends. Raises BusyError; then nothing was done."""
         with self._lock:
             if self.full:
                 raise BusyError(f"too many {self._who} are waiting; nothing was changed, try again later")
@@ -109,23 +109,23 @@ class Turnstile:
                 self._here -= 1
 
     def close(self) -> None:
-        """End for the server's end: who waits leaves now, who is inside at the next :meth:`check`."""
+        """Send all away, as the server stops: those who wait now, those inside at the next :meth:`check`."""
         self._closed = True
         self._free.release(self._room)
 
     def check(self) -> None:
-        """Raise BusyError if the server ends."""
+        """Raise BusyError if the server is stopping."""
         if self._closed:
             raise BusyError("the server is stopping; try again later")
 
     @property
     def here(self) -> int:
-        """Return how many are inside or wait."""
+        """Return how many threads are inside or wait."""
         return self._here
 
     @property
     def full(self) -> bool:
-        """Return True if the next one is sent away."""
+        """Return True if the next thread is sent away."""
         return self._here >= self._room
 
 
@@ -163,13 +163,13 @@ class Tx:
 
     @property
     def stamp(self) -> str:
-        """Return the transaction's one time, as stored."""
+        """Return the time of the transaction, as it is stored; it has only one."""
         return stamp(self.at)
 
     def take_time(self, after: str) -> None:
         """Take the time again behind a lock; later than ``after``, whatever the clock says.
 
-        Else what waited longer would be of an earlier time than what it waited for.
+        Otherwise a change would have an earlier time than the change that it waited for.
         """
         self.at = max(self.clock(), datetime.fromisoformat(after) + timedelta(microseconds=1))
 
@@ -182,13 +182,13 @@ class Tx:
         self.pending.append(new)
 
     def end_access(self) -> None:
-        """Make every event stream check with the commit if it may still be read."""
+        """Make every event stream check, after the commit, if its caller may still read it."""
         self.ends_access = True
         if self.postgres:
             self.conn.execute(select(func.pg_notify(EVENT_CHANNEL, "access")))
 
     def lock(self, key: int) -> None:
-        """Take this lock until the commit; SQLite's writers are alone anyhow."""
+        """Take this lock until the commit; SQLite needs none: it has one writer at a time."""
         if self.postgres:
             self.conn.execute(select(func.pg_advisory_xact_lock(key)))
 
@@ -231,9 +231,9 @@ class Database:
 
     @contextmanager
     def write(self, actor: Actor = SYSTEM, *, even_when_read_only: bool = False) -> Iterator[Tx]:
-        """Write all or nothing: state, history and events are committed together.
+        """Open a transaction: state, history and events are committed together, or nothing is.
 
-        Raises ReadOnlyError while the server takes no changes, BusyError where it would wait too long.
+        Raises ReadOnlyError while the server takes no changes, BusyError if it would wait too long.
         """
         with self.turn.enter(), self._writer.connect() as conn, conn.begin():
             tx = Tx(conn, actor, self.clock(), self.settings, self.clock)
@@ -251,30 +251,30 @@ class Database:
 
     @property
     def connections(self) -> int:
-        """Return how many are in use now, by readers, writers and those who look after the whole."""
+        """Return how many connections are in use now."""
         pools: list[Any] = [engine.pool for engine in {self.engine, self._reads, self._writes}]
         return sum(pool.checkedout() for pool in pools)
 
     def close(self) -> None:
-        """Give all connections back."""
+        """Close all connections."""
         for engine in (self.engine, self._reads, self._writes):
             engine.dispose()
 
 
 def mode_of(tx: Tx) -> str:
-    """Return ``normal`` or ``read-only``; kept in the database, so that all processes agree."""
+    """Read the mode, ``normal`` or ``read-only``: of the settings, else of the database (all processes)."""
     if tx.settings.read_only:
         return "read-only"
     return get_state(tx, "mode") or "normal"
 
 
 def get_state(tx: Tx, key: str) -> str | None:
-    """Return the value kept under ``key``, None if there is none."""
+    """Read the value that is stored under ``key``; None if there is none."""
     return tx.conn.scalar(select(server_state.c.value).where(server_state.c.key == key))
 
 
 def put_state(tx: Tx, key: str, value: str) -> None:
-    """Keep ``value`` under ``key``."""
+    """Store ``value`` under ``key``."""
     done = tx.conn.execute(update(server_state).where(server_state.c.key == key).values(value=value))
     if done.rowcount == 0:
         tx.conn.execute(insert(server_state).values(key=key, value=value))
@@ -309,10 +309,10 @@ def _flush_events(tx: Tx) -> None:
 
 
 def uses_of(which: ColumnElement[bool], *, kept: bool = False) -> Select[Any]:
-    """Return the ids of these items and of all that they are in, on any level.
+    """Select the ids of these items and of all that they are in, on any level.
 
     kept
-        only of what has a summary; nothing above something without one has one.
+        only items with a summary; above an item without one, nothing has one.
     """
     above = select(items.c.id).where(which).cte("above", recursive=True)
     step = select(bom_lines.c.parent_id).join(above, bom_lines.c.child_id == above.c.id)
@@ -328,9 +328,9 @@ def _reader_options(settings: Settings) -> dict[str, Any]:
 
 
 def _postgres_engine(settings: Settings, connections: int, seconds: float | None = None) -> Engine:
-    """Make an engine. ``seconds``: how long one statement may take, None = as long as it takes."""
+    """Make an engine. ``seconds``: the longest time for one statement; None: no limit."""
 
-    # Compiling a query costs more than any of ours takes; a look into an index is one into memory.
+    # Compiling a query takes longer than running any of ours; an index is read from memory.
     options = ["-c jit=off -c random_page_cost=1.1"]
     if seconds is not None:
         milliseconds = {
@@ -389,7 +389,7 @@ def _sqlite_engine(settings: Settings) -> Engine:
     path = settings.sqlite_path
     assert path is not None  # the caller asked
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with suppress(OSError):  # what is wrong with the place, SQLite says
+    with suppress(OSError):  # SQLite reports what is wrong with the place
         _keep_private(path)
     engine = create_engine(
         settings.sqlalchemy_url,
@@ -433,7 +433,7 @@ FEW = 500
 
 
 def one_of(tx: Tx, column: ColumnElement[Any], values: Collection[Any]) -> ColumnElement[bool]:
-    """Return the condition that ``column`` is one of ``values``, as one parameter for any number of them."""
+    """Make the condition that ``column`` is one of ``values``; they are one parameter, however many."""
     listed = list(values)
     if tx.postgres:
         array: ColumnElement[Any] = cast(literal(listed, ARRAY(column.type)), ARRAY(column.type))
@@ -444,7 +444,7 @@ def one_of(tx: Tx, column: ColumnElement[Any], values: Collection[Any]) -> Colum
 
 
 def insert_rows(tx: Tx, table: Table, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Insert all ``rows`` (same keys each) into ``table``."""
+    """Insert all ``rows``, which have the same keys, into ``table``."""
     if not rows:
         return
     if not tx.postgres:
@@ -488,8 +488,10 @@ def _unnest(table: Table, names: Sequence[str], rows: Sequence[Mapping[str, Any]
 
 
 def among(tx: Tx, column: ColumnElement[Any], query: Select[Any]) -> ColumnElement[bool]:
-    """Return the condition that ``column`` is one of those that ``query`` selects. PostgreSQL would rather
-    read all of a table, not knowing how many they are (66 000 parents: 45 s instead of 0.1 s).
+    """Make the condition that ``column`` is one of those that ``query`` selects.
+
+    PostgreSQL does not know how many they are, and would rather read all of a table; so they are an array (66
+    000 parents: 0.1 s instead of 45 s).
     """
     if not tx.postgres:
         return column.in_(query)
@@ -504,7 +506,7 @@ def newest_first(
     before: int | None = None,
     after: int | None = None,
 ) -> list[Any]:
-    """Return a page of a list by its ids, newest first: those before an id, or the nearest after one."""
+    """Read a page of a list by its ids, newest first: those before an id, or the nearest after one."""
     if before is not None:
         query = query.where(column < before)
     if after is None:
@@ -526,7 +528,7 @@ class KeyedRequest:
 
     @classmethod
     def of(cls, subject: str, key: str | None, *content: Any) -> KeyedRequest | None:
-        """Return the request with this content (JSON values); None for a request without a key."""
+        """Make the request with this content (JSON values); None if the request has no key."""
         if not key:
             return None
         written = json.dumps(content, sort_keys=True, separators=(",", ":"))
@@ -543,9 +545,10 @@ class KeptAnswer:
 
 
 def earlier_answer(tx: Tx, request: KeyedRequest | None) -> KeptAnswer | None:
-    """Return the answer to the same request of before, None if there was none.
+    """Find the answer that the same request got before; None if there was none.
 
-    The caller holds a lock that makes two repeats wait for one another. Raises ConflictError.
+    The caller holds a lock that makes two repeats wait for one another. ConflictError if the key
+    was used for another request.
     """
     if request is None:
         return None

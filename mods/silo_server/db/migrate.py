@@ -99,7 +99,6 @@ def _only(condition: str) -> dict[str, Any]:
 
 
 def _first_schema(op: Operations) -> None:
-    """Make the tables of the first schema."""
     metadata = MetaData(naming_convention=NAMES)
     Table(
         "server_state",

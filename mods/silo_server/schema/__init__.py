@@ -59,11 +59,11 @@ class PropertyField:
 
     @property
     def title(self) -> str:
-        """Return ``Mass [kg]``."""
+        """Return the label with its unit: ``Mass [kg]``."""
         return f"{self.label} [{self.unit}]" if self.unit else self.label
 
     def read(self, text: str) -> str | int | float:
-        """Return the value that somebody typed; RejectedError says what was wanted. ``text`` is not empty."""
+        """Read a value that somebody typed, not empty; RejectedError says what was wanted."""
         if self.type in ("number", "integer"):
             return self._number(text)
         if self.options and text not in self.options:
@@ -108,30 +108,30 @@ class Schema:
     fields: tuple[PropertyField, ...]
 
     def number(self, category: str, serial: int) -> str:
-        """Return ``F01-0001``. A serial beyond the digits grows; gaps are tolerated everywhere."""
+        """Write ``F01-0001``. A serial with more digits makes it longer; gaps are allowed everywhere."""
         return f"{category}{self.separator}{serial:0{self.serial_digits}d}"
 
     def category(self, code: str) -> Category:
-        """Return the category, in whatever case it is asked for."""
-        result = self.categories.get(code.strip().upper())
-        if result is None:
+        """Find a category by its code, in upper or lower case; RejectedError if there is none."""
+        found = self.categories.get(code.strip().upper())
+        if found is None:
             raise RejectedError(
                 f"category: wanted a category of schema {self.name} (such as A01, F01, M01), got {code!r}; "
                 f"GET /api/schemas/{self.name} lists them"
             )
-        return result
+        return found
 
 
 @cache
 def schemas() -> Mapping[str, Schema]:
-    """Return all schemas by name."""
+    """Read all schemas, by name."""
     text = resources.files("silo_server.schema").joinpath("kindred_rd.toml").read_text("utf-8")
     schema = _parse(tomllib.loads(text))
     return {schema.name: schema}
 
 
 def find_schema(name: str | None) -> Schema:
-    """Return the schema called ``name``, or the default one; NotFoundError otherwise."""
+    """Find the schema called ``name``, or the default one; NotFoundError if there is none."""
     wanted = name or DEFAULT_SCHEMA
     schema = schemas().get(wanted)
     if schema is None:
@@ -162,7 +162,7 @@ def _parse_field(raw: Mapping[str, Any]) -> PropertyField:
 
 
 def describe(schema: Schema) -> dict[str, Any]:
-    """Return the schema as ``GET /api/schemas/{name}`` sends it: the segments with their values."""
+    """Describe a schema as ``GET /api/schemas/{name}`` sends it: the segments with their values."""
     values = {category.code: category.name for category in schema.categories.values()}
     return {
         "name": schema.name,
@@ -180,9 +180,7 @@ def describe(schema: Schema) -> dict[str, Any]:
 
 
 def _described_rules(schema: Schema) -> dict[str, Any]:
-    """Return a wrong file costs the proposals, not the schema; those who register parts read what is
-    wrong.
-    """
+    """Return the category rules or, if the file is wrong, none, and the problem for those who register."""
     try:
         return {"category_rules": category_rules(schema)}
     except ConfigError as error:
@@ -195,11 +193,10 @@ RULES = "SILO_CATEGORY_RULES"
 
 
 def category_rules(schema: Schema, env: Mapping[str, str] = os.environ) -> list[Mapping[str, Any]]:
-    """Return which category a name of a part stands for: of the site's file, else of the one beside the
-    schema.
+    """Read the rules that map names of parts to categories: the site's, else those beside the schema.
 
-    Read again each time, so that an edit counts at once. ConfigError where the site's file is wrong, with all
-    that is wrong in it. It names the file without its folder, for every designer reads it.
+    The file is read each time, so that an edit counts at once. ConfigError if the site's file is wrong, with
+    all that is wrong in it. It names the file without its folder, as every designer reads it.
     """
     path = env.get(RULES)
     name = f"{RULES} ({Path(path).name})" if path else "category_rules.toml"
@@ -225,7 +222,7 @@ def category_rules(schema: Schema, env: Mapping[str, str] = os.environ) -> list[
 
 
 def _places(text: str, count: int) -> list[str]:
-    """Return where each rule stands in the file."""
+    """Name the place of each rule in the file, for messages."""
     lines = [number for number, line in enumerate(text.splitlines(), 1) if _RULE.match(line)]
     if len(lines) != count:
         return [f"rule {number}" for number in range(1, count + 1)]
@@ -236,7 +233,7 @@ _RULE = re.compile(r"\s*\[\[\s*[\"']?rules[\"']?\s*\]\]")
 
 
 def describe_form(schema: Schema) -> dict[str, Any]:
-    """Return the form descriptor: a two-stage category picker, the item's fields, and the property fields."""
+    """Describe the form of an item: a two-stage category picker, the item's fields, and the properties."""
     return {
         "schema": schema.name,
         "category_picker": {
@@ -260,12 +257,12 @@ def _describe_domain(schema: Schema, code: str, label: str) -> dict[str, Any]:
 
 
 def _field(field: PropertyField) -> dict[str, Any]:
-    said = {name: value for name, value in asdict(field).items() if value not in ("", None, ())}
-    return {"required": False, **said}
+    filled = {name: value for name, value in asdict(field).items() if value not in ("", None, ())}
+    return {"required": False, **filled}
 
 
 def text_hints(field: FieldInfo) -> Mapping[str, Any]:
-    """Return what :class:`silo.api.wire.ItemTexts` says of a field for its form: ``options``, ``long``."""
+    """Return the hints of a text field for its form and its length: ``options``, ``long``, ``maxLength``."""
     hints = field.json_schema_extra
     return hints if isinstance(hints, dict) else {}
 
