@@ -326,7 +326,8 @@ String should have at most {n} characters|String should have at least {n} charac
 """
 # What no person reads as it stands, and what has a catalogue of its own.
 _WITHOUT = re.compile(
-    r"silo/(workbench/(gui|pane|preview|register|smoke|headless|settings/__init__)|inertia/|drawing/|testing\.py|cli/shapes\.py|bom/(headers|standard)\.py|api/wire\.py|"
+    r"silo/(workbench/(gui|pane|preview|register|smoke|headless|settings/__init__)|inertia/|drawing/|"
+    r"testing\.py|cli/shapes\.py|bom/(headers|standard)\.py|api/wire\.py|"
     r"fcstd/properties\.py)|silo_server/services/bom/(frozen|transfer)\.py"
 )
 # No text for people.
@@ -347,6 +348,11 @@ _NO_TEXT = re.compile(
             # patterns, names of classes, programs, types
             r"\(\?|\\(?! )|signal \(SIG|^(?=\w+[A-Z])[A-Z]\w+( [A-Z]\w+)*$|\w::\w|sys; print|\w \| \w",
             r"Mapping\[|UUIDs|^1 to 64 char|Client\(|module \{|^\{typeid\} \{name\} of|^\{meta_key\}",
+            # tables of words in files, link maps, fields, values for programmers
+            r"(^|; )\w+; \w+;|^grs; |netto|pièce|einzeln|^(no value|not (set|specified)|nicht |kein )",
+            r"^(aucune|sans|sin|nessun) |^name part_number|^(BomTable|MassProps|InertiaReport)\(|import main",
+            r"Link map for|^Each line is a|^as your robot|anything within|silo-mod (links|inertia) FILE",
+            r"^Links of the URDF|parts: \[\]|^STEP, FCStd|\}  #",
             # commands, and what only repeats a sentence
             r"^\s*silo-mod ([a-z-]+ |\[)|^silo-mod \w+$|^silo-mod \{version\}|^silo-mod: \{(?!text)\w+\}$",
             r"^silo-mod: \{(error\}\. |why\}: )",
@@ -399,7 +405,9 @@ def _other_texts(tree: ast.Module, path: Path) -> Iterator[ast.AST]:
         match node:
             case ast.FunctionDef() | ast.AsyncFunctionDef():
                 yield from node.decorator_list
-            case ast.Call(func=ast.Name("translate" | "QT_TRANSLATE_NOOP") | ast.Attribute(attr="translate")):
+            case ast.Call(
+                func=ast.Name("translate" | "QT_TRANSLATE_NOOP") | ast.Attribute(attr="translate")
+            ) if "workbench" in path.parts:
                 yield node
             case ast.Call(func=ast.Name("_" | "N_" | "plural" | "_gauge" | "Counter" | "Histogram")):
                 yield node

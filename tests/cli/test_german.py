@@ -103,6 +103,16 @@ def test_the_language_is_that_of_the_environment(
     assert spoken("not in Silo") == said
 
 
+def test_texts_of_the_pane_are_german_on_the_command_line_too(german: None) -> None:
+    """What both show stands in a call for Qt."""
+    for text in (
+        "out of date",
+        "Its file is being copied.",
+        "It is meant for a.example.com, which is not the server in use.",
+    ):
+        assert spoken(text) != text
+
+
 def test_english_reads_no_catalogue(run: Any) -> None:
     silo._sentences.cache_clear()
     assert run("--help").code == 0
