@@ -6,8 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drawn import drawn
+from freecad_cases.machines import MOSTLY_ENDS
 from gui_cases.window import Window
 from PIL import Image
+
+VERSIONS = MOSTLY_ENDS
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from freecad_cases.machines import REPOSITORY, WANTED, need, wheel, wheels_of
+from freecad_cases.machines import MOSTLY_ENDS, MOSTLY_NEWEST, REPOSITORY, WANTED, need, wheel, wheels_of
 from gui_cases.window import Window, window
 
 from silo import FREECAD_PACKAGES
@@ -68,7 +68,7 @@ def test_the_addon_manager_knows_what_to_install(read: dict[str, Any]) -> None:
     assert told["others"] == []
 
 
-@pytest.mark.parametrize("version", WANTED)
+@pytest.mark.parametrize("version", MOSTLY_ENDS)
 def test_a_clone_in_mod_works(version: str, tmp_path: Path) -> None:
     """Nothing of the working folder that is not in the repository is needed."""
     if not (REPOSITORY / ".git").exists() or shutil.which("git") is None:
@@ -112,7 +112,7 @@ def installed(
     )
 
 
-@pytest.mark.parametrize("version", WANTED)
+@pytest.mark.parametrize("version", MOSTLY_NEWEST)
 def test_packages_for_another_python_are_no_success(version: str, tmp_path: Path) -> None:
     """pip does not see it, so install-addon ends with an import inside FreeCAD."""
     freecad = need(version)
@@ -145,7 +145,7 @@ def _from_wheel(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(site)!r}); {main}"]
 
 
-@pytest.mark.parametrize("version", WANTED)
+@pytest.mark.parametrize("version", MOSTLY_ENDS)
 def test_from_the_wheel_to_a_commit(version: str, from_wheel: list[str], tmp_path: Path) -> None:
     """In a clean user folder, by the window's button and by one command, to a revision in Silo."""
     wheels = tmp_path / "wheels"
@@ -208,7 +208,7 @@ def committed(freecad: Window, name: str) -> int:
         return sum(bool(one.file_name) for one in client.revisions(item.part_number))
 
 
-@pytest.mark.parametrize("version", WANTED)
+@pytest.mark.parametrize("version", MOSTLY_NEWEST)
 def test_another_package_of_our_name_is_named_in_the_pane(version: str, tmp_path: Path) -> None:
     """Ours does not start then, and says where the other one lies."""
     with window(version, tmp_path) as freecad:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from freecad_cases import machines
-from freecad_cases.machines import REPOSITORY, WANTED, FreeCAD
+from freecad_cases.machines import MOSTLY_ENDS, REPOSITORY, WANTED, FreeCAD
 from public_projects import ASSEMBLIES
 
 from silo.bom.errors import InputError
@@ -134,6 +134,7 @@ TOPS = {
 }
 
 
+@pytest.mark.parametrize("freecad", MOSTLY_ENDS, indirect=True)
 @pytest.mark.parametrize("top", TOPS)
 def test_public_assemblies(top: str, freecad: FreeCAD, in_freecad: Callable[[Path], Assembly]) -> None:
     """Real parts: the same masses from FreeCAD's objects as from the files."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from freecad_cases import corpora, machines
-from freecad_cases.machines import WANTED
+from freecad_cases.machines import MOSTLY_ENDS, WANTED
 
 from silo.bom.model import Extraction
 from silo.cli.main import main
@@ -55,7 +55,7 @@ def test_the_view_explains_each_fixture(built_by: str, version: str, tmp_path: P
     assert differing == known
 
 
-@pytest.mark.parametrize("version", WANTED)
+@pytest.mark.parametrize("version", MOSTLY_ENDS)
 def test_each_wrong_count_is_found(version: str, tmp_path: Path) -> None:
     """Routines of the count broken on purpose, and changed lines: the witness names each, nothing else."""
     freecad = machines.need(version)
