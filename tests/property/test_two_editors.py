@@ -19,6 +19,7 @@ from random import Random
 from urllib.parse import urlencode
 
 import pytest
+from hunting import LONG
 from server_testing import Answer, Api, Databases, bom
 from web_visitor import FORM, HTML, Visitor, enter
 
@@ -34,6 +35,9 @@ TEXTS = {
     "find_number": ["", "10", "20"],
 }
 STEPS = 90
+POSTGRES = pytest.mark.postgres
+GAMES = [("sqlite", 1), pytest.param("postgres", 2, marks=POSTGRES)]
+GAMES += [("sqlite", 2), pytest.param("postgres", 1, marks=POSTGRES)] if LONG else []
 
 
 class FormReader(HTMLParser):
@@ -143,9 +147,9 @@ def api(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Api]:
     databases.close()
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(("api", "seed"), GAMES, indirect=["api"])
 def test_nothing_is_lost_or_reverted_without_a_choice(api: Api, seed: int) -> None:
-    """Random interleavings of two forms, syncs and undos on two lines."""
+    """Random interleavings of two forms, syncs and undos on two lines; SILO_LONG=1 plays each over both."""
     play(api, Random(seed), STEPS)
 
 
