@@ -315,7 +315,7 @@ BOM unchanged|BOM blocked|BOM unregistered|BOM failed|reading {n} s|server {n} s
 it is missing|{n} removed|{n} added|{n} quantity changed|{n} unreferenced|{n} in conflict|{n} broken
 {n} kept as intentional|{n} set to the assembly's quantity|{n} kept at Silo's quantity|{n} refused
 {n} question open|{n} questions open|{n} unreferenced line|{n} unreferenced lines|{n} unregistered
-changes|event streams|summaries to be kept|Supplier
+changes|event streams|summaries to be kept|Supplier|Needed|Ordered|Cost|bought|made|unsaid
 {n} conflict|{n} conflicts|at least {low} and at most {high}|viewer|editor|admin|review|released|obsolete
 draft|Draft|archived|changed|mass|size|volume|material|description|quantity {before} → {after}|notes|unit
 source|reason|revision|hidden|unreferenced|metadata|rel type

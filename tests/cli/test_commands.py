@@ -437,7 +437,7 @@ def test_the_order_list_is_that_of_the_server(run: Any, silo: Any, gearbox: Path
     assert Decimal(told["total_cost"]) == Decimal(rows[bought[0]]["cost"]) == 55 * bought[1]
     text = run(*words).out
     assert "This is the draft, not a released revision" in text
-    assert f"Cost: {told['total_cost']} EUR, without 1 parts\nLongest lead time: 9 days" in text
+    assert f"Cost: {told['total_cost']} EUR, without 1 part\nLongest lead time: 9 days" in text
     ran = run(*words, "--csv", "-", "--supplier", "Misumi")
     table = list(csv.reader(ran.out.splitlines()))
     head = next(row for row in table if "Part number" in row)

@@ -82,6 +82,25 @@ def test_tables_and_findings_are_german(german: None, run: Any, gearbox: Path) -
     assert any("is missing; used by" in finding["message"] for finding in found)
 
 
+def test_the_order_list_is_german(german: None, run: Any, silo: Any, gearbox: Path) -> None:
+    """Headings, kinds, remarks and the end, where one is no plural; names stay."""
+    run("register", gearbox, "--yes")
+    run("sync", gearbox, "--recursive")
+    number = run("bom", gearbox, "--resolve", "--json").json()["assembly"]["part_number"]
+    first, other = [row["part_number"] for row in run("order", number, "--json").json()["parts"][:2]]
+    terms = {"supplier": "Needed", "standard_cost": 0.5, "lead_time_days": 1}
+    silo.client.update_item(first, properties=terms)
+    silo.client.update_item(other, properties={"supplier": "Norelem"})
+    text = run("order", number).out
+    heads = next(line for line in text.splitlines() if "Teilenummer" in line)
+    wanted = "Teilenummer Name Benötigt Bestellt Menge Lieferant Dessen Nummer Kosten"
+    assert " ".join(heads.split()) == wanted
+    assert ("gekauft" in text, "nicht gesagt" in text, "bought" in text, "unsaid" in text) == (1, 1, 0, 0)
+    assert re.search(r"\d+ zu 0.5 EUR +Needed", text)
+    assert "kein Preis" in text
+    assert re.search(r"Kosten: [\d.]+ EUR, ohne 1 Teil\nLängste Lieferzeit: 1 Tag$", text.strip()), text
+
+
 @pytest.mark.parametrize(
     ("variables", "said"),
     [

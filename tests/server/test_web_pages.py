@@ -448,6 +448,24 @@ def test_a_file_too_large_is_a_page(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.parametrize(
+    ("language", "pages"),
+    [
+        ("en", {"": "1 row", "?view=flat": "1 part", "/bom?q=zzz": "0 of 1 line", "?q=zzz": "0 of 1 row"}),
+        ("de", {"": "1 Zeile", "?view=flat": "1 Teil", "/bom?q=zzz": "0 von 1 Position"}),
+    ],
+)
+def test_a_table_counts_one_as_one(
+    visitors: dict[str, Visitor], api: Api, language: str, pages: dict[str, str]
+) -> None:
+    """Rows, parts and lines, also in German."""
+    top, part = api.items(2)
+    api.merge(top, {part: 1})
+    for path, words in pages.items():
+        page = visitors[VIEWER].get(f"/items/{top}{path}", **{"Accept-Language": language}).body.decode()
+        assert f'id="found" role="status">{words}<' in page.replace(' class="hint"', "")
+
+
 def test_a_giant_tree_is_shown_less_deep(visitors: dict[str, Visitor], api: Api) -> None:
     """A tree too large for a page is shown less deep, says so, and has pages where all is asked for."""
     levels = [api.items(14) for _ in range(3)]

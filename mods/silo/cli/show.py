@@ -454,39 +454,30 @@ def _print_order(order: OrderList) -> None:
     head = (
         f"{order.part_number}: what to order for {order.pieces} with {order.spares} % spares. {order.state}"
     )
-    out.print(Text(plain(head), "bold"))
+    out.print(Text(plain(spoken(head)), "bold"))
     for warning in order.warnings:
-        out.print(Text(f"⚠ {plain(warning)}", "yellow"))
+        out.print(Text(f"⚠ {plain(spoken(warning))}", "yellow"))
     table = Table(box=None, pad_edge=False)
-    for title in (
-        "",
-        "Part number",
-        "Name",
-        "Needed",
-        "Ordered",
-        "Quantity",
-        "Supplier",
-        "Its number",
-        "Cost",
-    ):
-        table.add_column(title, overflow="fold")
-    table.add_column("", overflow="fold")
+    titles = ("Part number", "Name", "Needed", "Ordered", "Quantity", "Supplier", "Its number", "Cost")
+    for title in ("", *titles, ""):
+        table.add_column(spoken(title), overflow="fold")
     empty = SupplierPart(supplier="", currency="")
     for part in sorted(order.parts, key=lambda part: (part.kind, (part.supplier_part or empty).supplier)):
         of = part.supplier_part or empty
         price = f"{part.quantity} at {part.price} {of.currency}" if part.price else part.quantity or ""
         cells = (
-            *(part.kind, part.part_number, part.name, f"{part.needed} {part.unit or ''}", part.ordered),
-            *(price, of.supplier, of.number, f"{part.cost or ''} {of.currency}".strip()),
-            "; ".join((*part.remarks, *(file.name for file in part.files))),
+            *(spoken(part.kind), part.part_number, part.name, f"{part.needed} {part.unit or ''}"),
+            *(part.ordered, spoken(price), of.supplier, of.number),
+            f"{part.cost or ''} {of.currency}".strip(),
+            "; ".join((*map(spoken, part.remarks), *(file.name for file in part.files))),
         )
         table.add_row(*(Text(plain(cell)) for cell in cells))
     if order.parts:
         out.print(table)
-        days = "not known" if order.lead_time_days is None else f"{order.lead_time_days} days"
-        total = f"Cost: {order.total_cost} {order.currency}, without {order.unpriced} parts"
-        time = f"Longest lead time: {days}"
-        out.print(Text(f"{total}\n{time}"))
+        days = "not known" if order.lead_time_days is None else counted(order.lead_time_days, "day")
+        cost, without = f"{order.total_cost} {order.currency}", counted(order.unpriced, "part")
+        total = f"Cost: {cost}, without {without}" if order.unpriced else f"Cost: {cost}"
+        out.print(Text(spoken(f"{total}\nLongest lead time: {days}")))
 
 
 def run_whoami(args: argparse.Namespace) -> int:

@@ -77,9 +77,11 @@ def _(text: str, **values: object) -> str:
     return translation % values if values else translation
 
 
-def plural(number: int, one: str, many: str = "") -> str:
-    """Count as :func:`silo.bom.errors.counted` does, in the language of the page."""
-    return f"{number} {_CATALOGUES[LANGUAGE.get()].ngettext(one, many or one + 's', number)}"
+def plural(number: int, one: str, many: str = "", words: str = "") -> str:
+    """Count as :func:`silo.bom.errors.counted` does, in the language of the page; ``words``: how many of that
+    ``number``, as a table says it.
+    """
+    return f"{words or number} {_CATALOGUES[LANGUAGE.get()].ngettext(one, many or one + 's', number)}"
 
 
 SCRIPTS = sorted(Path(__file__).with_name("static").glob("*.js"))
