@@ -16,7 +16,7 @@ FREECAD_PACKAGES = {"requests": "requests>=2.31", "pydantic": "pydantic>=2.10"}
 
 
 def spoken(text: str, language: str = "") -> str:
-    """Say a finished English text of ours in a language (default: that of the environment)."""
+    """Translate a finished English text of ours into a language (default: that of the environment)."""
     if not language:
         names = ("SILO_LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG")
         language = next(filter(None, map(os.environ.get, names)), "en")

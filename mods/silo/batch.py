@@ -89,7 +89,7 @@ class TopResult:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Return everything worth a report, each once: of the walk, and of each comparison with the
+        """Return each finding for the report once: those of the walk, and of each comparison with the
         server.
         """
         unique: dict[Finding, None] = dict.fromkeys(self.whole.findings if self.whole is not None else ())
@@ -102,13 +102,15 @@ class TopResult:
 
     @property
     def unregistered(self) -> tuple[BomEntry, ...]:
-        """Return the components without an item, each once; of assemblies their outcome says it."""
+        """Return each component without an item once. The outcome of an assembly reports if the assembly
+        itself has none.
+        """
         several = [self.whole] if self.whole is not None else [outcome.resolved for outcome in self.outcomes]
         return tuple({entry.key: entry for resolved in several for entry in resolved.unresolved}.values())
 
     @property
     def fine(self) -> bool:
-        """Return True if nothing was left undone; own parts that are no items yet are."""
+        """Return True if everything was done. Own parts that are no items yet count as not done."""
         outcomes = self.outcomes
         return self.error is None and all(
             outcome.status in _FINE and not outcome.assembly.own for outcome in outcomes
@@ -135,19 +137,19 @@ def sync_top(top: str, extraction: Extraction | SiloError, api: SyncApi, options
 def _identities_before(
     compared: Iterable[tuple[Resolved, Iterable[Mapping[str, Any]]]],
 ) -> dict[tuple[str, str], str]:
-    """Return what the last syncs said of components: (file, object) → the Silo UUID of its item.
+    """Collect what the last syncs recorded of components: (file, object) → the Silo UUID of its item.
 
     compared
         assemblies, each with the server's lines.
     """
-    result: dict[tuple[str, str], str] = {}
+    identities: dict[tuple[str, str], str] = {}
     for resolved, lines in compared:
         for line in lines:
             for part in line.get("components") or ():
                 if line.get("child_id") and isinstance(part.get("file"), str):
                     path = os.path.normpath(os.path.join(resolved.folder, part["file"]))
-                    result[path, str(part.get("object") or "")] = str(line["child_id"])
-    return result
+                    identities[path, str(part.get("object") or "")] = str(line["child_id"])
+    return identities
 
 
 def _lacks_files(resolved: Resolved) -> bool:
@@ -155,9 +157,7 @@ def _lacks_files(resolved: Resolved) -> bool:
 
 
 def ask_for_moved(whole: Resolved, api: SyncApi) -> Resolved:
-    """Return :func:`suggest_by_identity`, with the lines that the server has of assemblies that lack
-    files.
-    """
+    """Ask the server for the lines of assemblies that lack files, for :func:`suggest_by_identity`."""
     lacking = [assembly for assembly in assemblies(whole) if _lacks_files(assembly)]
     return suggest_by_identity(whole, [(resolved, server_lines(resolved, api)) for resolved in lacking])
 
@@ -167,7 +167,7 @@ def suggest_by_identity(
     compared: Sequence[tuple[Resolved, Iterable[Mapping[str, Any]]]],
     candidates: Callable[[Iterable[str]], Iterable[str]] | None = None,
 ) -> Resolved:
-    """Return findings of missing files, with the one that has the identity known from the last sync.
+    """Add to findings of missing files the file that has the identity known from the last sync.
 
     compared
         assemblies, each with the server's lines.
@@ -187,9 +187,7 @@ def suggest_by_identity(
 
 
 def stopped_by(result: TopResult, api: object = None) -> SiloError | None:
-    """Return the error that makes it useless to try the next file: no right, no server, a server that is
-    busy.
-    """
+    """Return the error that makes it useless to try the next file: no right, no server, or a busy server."""
     from silo.api.policy import ends_run  # loads the network's packages
 
     errors = (result.error, *(outcome.error for outcome in result.outcomes))
@@ -197,8 +195,8 @@ def stopped_by(result: TopResult, api: object = None) -> SiloError | None:
 
 
 def _is_library(extraction: Extraction) -> bool:
-    """Return a file of screws or of several parts for others to link: unregistered, and nothing of other
-    files.
+    """Return True for a file of screws, or of several parts, that others link: not registered, and without
+    parts of other files.
     """
     path = extraction.assembly.doc_path
     return extraction.assembly.silo_uuid is None and all(
@@ -219,8 +217,8 @@ def _outcomes(whole: Resolved, api: SyncApi, options: SyncOptions) -> Iterable[O
 
 
 def source_document(entry: BomEntry, top: str = "") -> SourceDocument:
-    """Return which file, with which content, an assembly's BOM was taken from; ``top``: the assembly of the
-    run.
+    """Describe the file, and its content, from which an assembly's BOM was taken; ``top``: the assembly of
+    the run.
     """
     return SourceDocument(
         file=os.path.basename(entry.doc_path),
@@ -233,7 +231,7 @@ def source_document(entry: BomEntry, top: str = "") -> SourceDocument:
 
 
 def result_json(result: TopResult) -> dict[str, Any]:
-    """Return one file's result for machines."""
+    """Return one file's result as JSON values."""
     data: dict[str, Any] = {"top": result.top, "ok": result.fine}
     if result.error is not None:
         data["error"] = {"code": result.error.code, "message": str(result.error)}
@@ -247,7 +245,7 @@ def result_json(result: TopResult) -> dict[str, Any]:
 
 
 def outcome_json(outcome: Outcome, base: str) -> dict[str, Any]:
-    """Return one assembly's outcome for machines."""
+    """Return one assembly's outcome as JSON values."""
     head = outcome.assembly
     data: dict[str, Any] = {
         "doc_path": relative(head.doc_path, base),
@@ -285,10 +283,9 @@ _CHANGES = {
 
 
 def cell(text: str) -> str:
-    """Return text of others as Markdown that shows it and does nothing: one line, no markup, nobody is
-    notified.
+    """Return foreign text as Markdown that only shows it: one line, no markup, and GitHub notifies nobody.
 
-    On GitHub ``@team`` and ``#12`` mean somebody, escaped or not; a space without width parts them.
+    On GitHub ``@team`` and ``#12`` are links, escaped or not; a space without width separates them.
     """
     text = "".join(c if c.isprintable() else " " for c in text).strip().replace("&", "&amp;")
     text = re.sub(r"([@#])(?=\w)", "\\1\u200b", text)
@@ -340,8 +337,8 @@ class RunSummary:
 
     @property
     def exit_code(self) -> Exit:
-        """Return the worst: 3 if the server kept anything from being sent, 1 if something else was left
-        undone.
+        """Return the worst exit code: 3 if the server kept anything from being sent, 1 if something else was
+        left undone.
         """
         if self.unsent:
             return Exit.REMOTE
@@ -394,7 +391,9 @@ class RunSummary:
             files.append(file)
 
     def told(self) -> dict[str, str]:
-        """Return all that needs a person: the sentence that the next run knows it by → the report's line."""
+        """Return everything that needs a person: the sentence by which the next run knows it → the report's
+        line.
+        """
         several = ((words, files) for lines in (self.errors, self.warnings) for words, files in lines.items())
         return {
             **{words: f"{words}{_others(words, files)}" for words, files in several},
@@ -402,7 +401,7 @@ class RunSummary:
         }
 
     def new(self) -> list[str] | None:
-        """Return what the run before did not have; None if that is not known."""
+        """Return the lines that the last run did not have; None if its lines are not known."""
         if self.before is None:
             return None
         return [line for words, line in self.told().items() if words not in self.before]
@@ -411,7 +410,7 @@ class RunSummary:
         return [f"{name} ({shorten(path, self.base)})" for (path, _), name in self.unregistered.items()]
 
     def to_json(self) -> dict[str, Any]:
-        """Return the data for machines."""
+        """Return the summary as JSON values."""
         return {
             "files": self.files,
             "in_order": self.fine,
@@ -435,7 +434,7 @@ class RunSummary:
         return {"message": words, "cause": self.causes.get(words, words), "files": files}
 
     def sentence(self) -> str:
-        """Return the run in one line; first what the server kept from being sent."""
+        """Say in one line how the run went; first what the server kept from being sent."""
         words = []
         for why, count in self.unsent.most_common():
             words.append(f"{counted(count, 'assembly', 'assemblies')} not sent: {why.rstrip('.')}. ")
@@ -447,10 +446,10 @@ class RunSummary:
         return f"{kept}{', '.join(words)}."
 
     def sections(self) -> Iterator[tuple[str, list[tuple[str, list[str]]]]]:
-        """Yield what people read after the line of counts: titles, each with lines and what belongs to them.
+        """Yield the sections below the line of counts: a title, and its lines, each with the lines below it.
 
-        Errors and warnings of one cause are one line. A hint about how something is modelled is in the report
-        of the first night only.
+        Errors and warnings of one cause are one line. A hint about how something is modelled is only in the
+        first report.
         """
         before = self.before or frozenset()
         if self.before is not None:
@@ -470,7 +469,7 @@ class RunSummary:
         yield "Notes", [(note, []) for note in notes]
 
     def _grouped(self, sentences: Iterable[str]) -> list[tuple[str, list[str]]]:
-        """Return the lines of sentences; those of one cause below it, without it."""
+        """Put sentences of one cause together below a line for that cause."""
         lines, groups = self.told(), dict[str, list[str]]()
         for words in sentences:
             groups.setdefault(self.causes.get(words, words), []).append(lines[words])
@@ -486,13 +485,13 @@ class Form(Protocol):
     """How a report is written: a beginning, what became of each file, and an end."""
 
     def head(self, summary: RunSummary | None) -> str:
-        """Return the beginning; ``summary`` is None until the run has ended."""
+        """Return the beginning of the report; ``summary`` is None until the run has ended."""
         ...
 
     def one(self, result: TopResult, number: int) -> str: ...
 
     def end(self, summary: RunSummary | None) -> str:
-        """Return the end; ``summary`` is None until the run has ended."""
+        """Return the end of the report; ``summary`` is None until the run has ended."""
         ...
 
 
@@ -504,7 +503,7 @@ class ReportFile:
         self.trouble = ""
         self._form = form or form_of(path)
         self._count = 0
-        # A terminal or a pipe cannot be written again; it gets the whole at the end.
+        # A terminal or a pipe cannot be rewritten; it gets the whole report at the end.
         later = os.path.exists(path) and not os.path.isfile(path)
         self._file: BinaryIO | None = BytesIO() if later else open(path, "w+b")  # noqa: SIM115
         self._begin = self._end = 0
@@ -512,14 +511,14 @@ class ReportFile:
         self._begin = self._end
 
     def add(self, result: TopResult) -> None:
-        """Write what became of a file."""
+        """Write the result of a file into the report."""
         text = self._form.one(result, self._count)
         self._count += bool(text)
         if text:
             self._write(text, self._form.end(None))
 
     def close(self, summary: RunSummary | None = None) -> None:
-        """End the report; without a summary as it stands."""
+        """End the report; without a summary, end it as it is."""
         if self._file is None:
             return
         try:
@@ -566,7 +565,7 @@ def _bytes(text: str) -> bytes:
 
 
 def form_of(path: str) -> Form:
-    """Return the form that a file's ending names. Raises InputError for another."""
+    """Return the format that a file's ending names. Raises InputError for another ending."""
     forms: dict[str, Form] = {".md": Markdown(), ".html": Html(), ".json": Json(), ".xml": JUnit()}
     ending = Path(path).suffix.lower()
     if ending not in forms:
@@ -579,14 +578,16 @@ def form_of(path: str) -> Form:
 
 
 def is_news(outcome: Outcome) -> bool:
-    """Return True for what a reader of a report wants to see: all but assemblies that are as they were."""
+    """Return True if the report shows the assembly; it leaves out those in which nothing changed."""
     if outcome.status is Status.DRY_RUN:
         return outcome.plan is not None and (outcome.plan.news or outcome.plan.diff.drifted)
     return outcome.status is not Status.UNCHANGED
 
 
 def _changes(outcome: Outcome, base: str) -> tuple[str, str, list[tuple[str, ...]], list[str]]:
-    """Return what a reader wants of an assembly: title, file, rows of changes, and why it was not synced."""
+    """Return what the report shows of an assembly: title, file, rows of changes, and why it was not
+    synced.
+    """
     head = outcome.assembly
     who = " ".join(filter(None, (head.part_number, head.name))) or display_name(head) or head.object_name
     # Nothing changed in a BOM that was not sent.
@@ -690,13 +691,13 @@ def _list(sections: Iterable[tuple[str, Sequence[str]]]) -> str:
 
 
 def _others(words: str, files: Iterable[str]) -> str:
-    """Return the files of a sentence that it does not name itself."""
+    """Return the files that a sentence does not name itself, in brackets."""
     named = [file for file in files if file and os.path.basename(file) not in words]
     return f" ({listed(named)})" if named else ""
 
 
 def reasons_of(outcome: Outcome) -> list[str]:
-    """Return why an assembly was not synced."""
+    """Return the reasons why an assembly was not synced."""
     if outcome.error is not None:
         return [str(outcome.error)]
     return [finding.message for finding in blocking(outcome.resolved)] if outcome.status in _LEFT else []
@@ -728,11 +729,11 @@ class JUnit:
     def head(self, summary: RunSummary | None) -> str:
         summary = summary or RunSummary()
         count = summary.statuses
-        left = count[Status.BLOCKED] + count[Status.UNREGISTERED]
+        failures = count[Status.BLOCKED] + count[Status.UNREGISTERED]
         tests, errors = count.total() + summary.unread, count[Status.FAILED] + summary.unread
         return (
             '<?xml version="1.0" encoding="UTF-8"?>\n<testsuites>\n<testsuite name="silo-mod sync" '
-            f'tests="{tests}" failures="{left}" errors="{errors}">'
+            f'tests="{tests}" failures="{failures}" errors="{errors}">'
         )
 
     def one(self, result: TopResult, number: int) -> str:

@@ -74,13 +74,11 @@ class Memory:
         self.path = path or data_folder() / "standard-items.json"
 
     def known(self, server: str) -> dict[str, str]:
-        """Return what is known of a server; nothing where the file cannot be read, which only costs a
-        search.
-        """
+        """Return what is remembered of a server; {} if the file cannot be read, which only costs a search."""
         return self._read().get(server, {})
 
     def remember(self, server: str, items: Mapping[str, str]) -> None:
-        """Keep what was found or made; what cannot be written costs a search."""
+        """Keep what was found or made. If it cannot be written, that costs a search."""
         servers = self._read()
         before = servers.get(server, {})
         if items.items() <= before.items():
@@ -94,9 +92,9 @@ class Memory:
 def find_items(
     entries: Iterable[BomEntry], items_by_uuid: Mapping[str, Any], api: Any, memory: Memory | None = None
 ) -> dict[str, Mapping[str, Any]]:
-    """Return the items of standard parts that the server does not know by their UUID: UUID → item.
+    """Find the items of standard parts that the server does not know by their UUID: UUID → item.
 
-    known
+    items_by_uuid
         what the server answered for the UUIDs of the whole tree.
     """
     wanted = {
@@ -133,8 +131,8 @@ def _remembered(
 
 
 def by_description(designation: str, api: Any) -> Mapping[str, Any] | None:
-    """Return the one item whose description (or name) is exactly the designation; None for none and for
-    several.
+    """Find the one item whose description (or name) is exactly the designation; None if none or several have
+    it.
     """
     search = getattr(api, "search_items", None)
     if not callable(search):
@@ -153,7 +151,7 @@ def by_description(designation: str, api: Any) -> Mapping[str, Any] | None:
 
 
 def server_of(api: Any) -> str:
-    """Return how a memory names the server."""
+    """Return the name by which a memory knows the server."""
     return str(getattr(api, "base_url", ""))
 
 
@@ -200,14 +198,16 @@ class _Findings(tuple[Finding, ...]):
 
     @cached_property
     def _by_file(self) -> Mapping[str, list[int]]:
-        """Return where the errors of each file stand; under "" the loops, which block every assembly."""
-        result: dict[str, list[int]] = {}
+        """Return the numbers of each file's errors; under "" those of the loops, which block every
+        assembly.
+        """
+        numbers: dict[str, list[int]] = {}
         for number, finding in enumerate(self):
             if finding.severity is Severity.ERROR:
                 loop = finding.code in (FindingCode.CYCLE, FindingCode.TOO_DEEP)
                 for path in [""] if loop else dict.fromkeys(place.doc_path for place in finding.where):
-                    result.setdefault(path, []).append(number)
-        return result
+                    numbers.setdefault(path, []).append(number)
+        return numbers
 
     def blocking(self, path: str) -> tuple[Finding, ...]:
         by_file = self._by_file
@@ -231,7 +231,7 @@ class Resolved:
 
     @property
     def unregistered(self) -> tuple[BomEntry, ...]:
-        """Return the components without an item, parts first, the assembly itself last."""
+        """Return the components without an item, parts first; the assembly itself comes last."""
         head = () if self.assembly.part_number else (self.assembly,)
         return tuple(
             sorted((*self.unresolved, *head), key=lambda e: (e.is_assembly, e.is_standard, -e.level))
@@ -239,12 +239,12 @@ class Resolved:
 
     @property
     def folder(self) -> str:
-        """Return where the assembly's file lies; a merge names components relative to it."""
+        """Return the folder of the assembly's file; a merge names components relative to it."""
         return os.path.dirname(self.assembly.doc_path)
 
     @property
     def left_out(self) -> tuple[LeftOut, ...]:
-        """Return what a sync of this assembly cannot bring to the server."""
+        """Return everything that a sync of this assembly cannot send."""
         errors = (finding for finding in blocking(self))
         return left_out_of(self.entries, self.assembly.unregistered, errors, self.folder)
 
@@ -253,12 +253,12 @@ class Resolved:
         return diff_bom(self.entries, lines, self._missing())
 
     def plan(self, lines: Iterable[Mapping[str, Any]]) -> MergePlan:
-        """Return what a merge into these lines of the server would do."""
+        """Plan a merge into these lines of the server."""
         return plan_merge(self.entries, lines, self._missing())
 
     def is_news(self, plan: MergePlan, lines: Iterable[Mapping[str, Any]] = ()) -> bool:
-        """Return True if the server learns anything from this merge into these lines of its own: if only that
-        the BOM is (in)complete now, or that a component has another file.
+        """Return True if the server learns anything from a merge into these lines: also if only that the BOM
+        is complete or incomplete now, or that a component has another file.
         """
         if plan.news:
             return True
@@ -316,21 +316,21 @@ def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
 
 
 def known_items(uuids: Iterable[str], entries: Iterable[BomEntry], api: ItemLookup) -> Known:
-    """Return the server's items of these identities, and those of the standard parts among the entries."""
+    """Look up the server's items of these identities, and those of the standard parts among the entries."""
     items = look_up(uuids, api)
     return {**items, **find_items(entries, items, api)}
 
 
 def resolve_known(extraction: Extraction, items: Known) -> Resolved:
-    """Return :func:`resolve` against items fetched before; pure."""
+    """Do what :func:`resolve` does, with items that were fetched before; pure."""
     head = extraction.assembly
     entries, unresolved = resolve_with(extraction.entries, items)
     item = items.get(head.silo_uuid) if head.silo_uuid else None
     if item is not None:
         number = str(item["part_number"])
         head = replace(head, part_number=number, name=item.get("name") or item.get("description") or number)
-    left = {entry.key for entry in unresolved}
-    head = replace(head, unregistered=tuple(e for e in extraction.entries if e.key in left))
+    lacking = {entry.key for entry in unresolved}
+    head = replace(head, unregistered=tuple(e for e in extraction.entries if e.key in lacking))
     return Resolved(
         assembly=head,
         entries=tuple(entries),
@@ -347,7 +347,7 @@ def resolve_known(extraction: Extraction, items: Known) -> Resolved:
 
 
 def server_lines(resolved: Resolved, api: SyncApi) -> tuple[Mapping[str, Any], ...]:
-    """Return the server's lines of this assembly as they are now; none while it has no part number."""
+    """Return the server's present lines of this assembly; () while it has no part number."""
     number = resolved.assembly.part_number
     if number is None:
         return ()
@@ -355,17 +355,17 @@ def server_lines(resolved: Resolved, api: SyncApi) -> tuple[Mapping[str, Any], .
 
 
 def plain_lines(lines: Iterable[Any]) -> tuple[Mapping[str, Any], ...]:
-    """Return lines as mappings, whatever the client made of them."""
+    """Return the lines as mappings; a client may have made models of them."""
     return tuple(line if isinstance(line, Mapping) else line.model_dump() for line in lines)
 
 
 def compare(resolved: Resolved, api: SyncApi) -> MergePlan:
-    """Return what a merge would do, against the server's lines as they are now."""
+    """Plan a merge into the server's present lines."""
     return resolved.plan(server_lines(resolved, api))
 
 
 def names_of(resolved: Resolved, lines: Iterable[Mapping[str, Any]] = ()) -> dict[str, str]:
-    """Return part number → name, of all that was resolved and of the server's own lines; for showing."""
+    """Return part number → name, of all resolved components and of the server's own lines; for display."""
     names = {
         line["child_part_number"]: line.get("child_description") or line.get("child_name") or ""
         for line in lines
@@ -377,15 +377,16 @@ def names_of(resolved: Resolved, lines: Iterable[Mapping[str, Any]] = ()) -> dic
 def decide(
     resolved: Resolved, lines: Sequence[Mapping[str, Any]], *, allow_missing: bool = False, server: str = ""
 ) -> Outcome:
-    """Return what is to become of one assembly: unregistered, blocked, unchanged, or to be merged.
+    """Decide what happens to an assembly: it is unregistered, blocked, unchanged, or merged.
 
     lines
         the server's lines of the assembly.
     allow_missing
         sync although links are broken: lines that stood for a missing component in the last sync stay as they
-        are; what the server has not heard of stays out, and the server keeps that the BOM is incomplete.
+        are; what the server does not know stays out, and the server records that the BOM is incomplete.
     server
-        where it is merged: one that does not show which lines are unreferenced hears of each of them once.
+        the address of the server; a server that does not show which lines are unreferenced gets each of them
+        once.
     """
     if resolved.assembly.part_number is None:
         return Outcome(Status.UNREGISTERED, resolved)
@@ -397,7 +398,7 @@ def decide(
 
 
 def _reported_lines() -> Memory:
-    """Return server → part number of an assembly → its unreferenced lines that the server has heard of."""
+    """Open the memory of reported lines: server → part number of an assembly → its unreferenced lines."""
     return Memory(cache_folder() / "unreferenced.json")
 
 
@@ -409,7 +410,7 @@ def _is_told(resolved: Resolved, plan: MergePlan, server: str) -> bool:
 
 
 def merged(resolved: Resolved, plan: MergePlan, server: str) -> None:
-    """Remember what a merge has told a server that does not show which lines are unreferenced."""
+    """Remember which unreferenced lines a merge has reported to a server that does not show them."""
     if plan.flag and server and resolved.assembly.silo_uuid not in resolved.last_syncs:
         _reported_lines().remember(server, {resolved.assembly.part_number or "": "\n".join(plan.flag)})
 
@@ -431,7 +432,7 @@ def sync(
     dry_run
         compare, and send nothing.
     describe
-        finds the file of the BOM, where there is something to send.
+        finds the file of the BOM, if there is something to send.
     lines
         the server's lines of the assembly; None asks for them.
     """
@@ -453,10 +454,10 @@ def sync(
 
 
 def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | None = None) -> MergeRequest:
-    """Return the request of spec §5: the direct children only.
+    """Make the request of spec §5, with the direct children only.
 
-    A server that remembers its syncs also gets what each line is in the CAD model, and what is left out; for
-    any other the request is exactly the spec's.
+    A server that remembers its syncs also gets the components of each line in the CAD model, and what is left
+    out. Any other server gets exactly the request of the spec.
     """
     remembers = resolved.assembly.silo_uuid in resolved.last_syncs
     entries = [
@@ -470,8 +471,8 @@ def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | N
         for entry in resolved.entries
         if entry.part_number is not None
     ]
-    left = _left_out(resolved) if remembers else None
-    return MergeRequest(entries=entries, sync_id=sync_id, document=document, left_out=left)
+    left_out = _left_out(resolved) if remembers else None
+    return MergeRequest(entries=entries, sync_id=sync_id, document=document, left_out=left_out)
 
 
 def blocking(resolved: Resolved) -> tuple[Finding, ...]:
@@ -508,7 +509,8 @@ def sync_tree(
 ) -> Iterator[Outcome]:
     """Sync an assembly with all its sub-assemblies, leaves first; one failure does not stop the others.
 
-    One that concerns all of them does (:func:`silo.api.policy.ends_run`): the others have it as their error.
+    A failure that concerns all of them does (:func:`silo.api.policy.ends_run`): the remaining ones get it as
+    their error.
     """
     from silo.api.policy import ends_run  # loads the network's packages
 
@@ -539,7 +541,7 @@ class ActivityText:
     unregistered: str = ""
 
     def lines(self) -> tuple[str, ...]:
-        """Return all of it, a line each."""
+        """Return all texts of the box, a line each."""
         link = "View in Silo →" if self.resolve_url else ""
         return tuple(line for line in (self.headline, self.counts, link, self.unregistered) if line)
 
@@ -554,14 +556,14 @@ class MergeCount(StrEnum):
 
 
 def headline(item: str, translate: Translate = english) -> str:
-    """Return ``BOM Updated: ASM-001``."""
+    """Write ``BOM Updated: ASM-001``."""
     return translate("Silo", "BOM Updated: {number}").replace("{number}", item)
 
 
 def count_texts(
     diff: MergeDiff, warnings: Iterable[MergeWarning] = (), translate: Translate = english
 ) -> dict[MergeCount, str]:
-    """Return each count of a merge in words, such as ``+1 added``, without those that are zero."""
+    """Write each count of a merge that is not zero in words, such as ``+1 added``."""
     conflicts = sum(1 for warning in warnings if warning.type == "conflict")
     counted = (
         (MergeCount.ADDED, len(diff.added), translate("Silo", "+{n} added")),
@@ -573,24 +575,24 @@ def count_texts(
 
 
 def no_changes(translate: Translate = english) -> str:
-    """Return what stands there instead of counts."""
+    """Return the text that replaces the counts if all are zero."""
     return translate("Silo", "no changes")
 
 
 def counts_text(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> str:
-    """Return ``+1 added ~1 qty changed ⚠1 unreferenced``, without what is zero."""
+    """Write ``+1 added ~1 qty changed ⚠1 unreferenced``, without counts that are zero."""
     return "  ".join(count_texts(diff, warnings).values()) or no_changes()
 
 
 def unregistered_text(count: int, translate: Translate = english) -> str:
-    """Return ``2 components have no Silo part number``; "" for none."""
+    """Write ``2 components have no Silo part number``; "" for none."""
     text = translate("Silo", "{n} component has no Silo part number")
     many = translate("Silo", "{n} components have no Silo part number")
     return (text if count == 1 else many).replace("{n}", str(count)) if count else ""
 
 
 def draft_text(result: MergeResult | Revision | None, translate: Translate = english) -> str:
-    """Return which draft a change of a released product is part of; "" if nothing of it is released."""
+    """Say which draft a change of a released product is part of; "" if it is not part of one."""
     draft = result.draft if result is not None else None
     if draft is None:
         return ""
@@ -599,7 +601,9 @@ def draft_text(result: MergeResult | Revision | None, translate: Translate = eng
 
 
 def summary_texts(summary: ProductSummary, translate: Translate = english) -> tuple[list[str], list[str]]:
-    """Return what is open in each BOM of a product; and what it weighs and costs, as the server keeps it."""
+    """Say what is open in each BOM of a product, and what the product weighs and costs, as the server
+    has it.
+    """
     texts = [f"{number}: {words}" for number, words in (*summary.open.items(), *summary.incomplete.items())]
     mass = f"{summary.total_mass_kg:g} kg" if summary.total_mass_kg else ""
     costs = ", ".join(f"{total.total_cost:.2f} {total.currency}" for total in summary.totals)
@@ -620,7 +624,7 @@ def rules_text(problem: str, translate: Translate = english) -> str:
 def activity_text(
     item: str, merge: MergeEvent | MergeResult, *, resolve_url: str = "", unregistered: int = 0
 ) -> ActivityText:
-    """Return the box of one merge; ``resolve_url`` overrides the event's (made absolute by the caller)."""
+    """Make the box of one merge; ``resolve_url`` (made absolute by the caller) overrides the event's."""
     without = unregistered_text(unregistered)
     return ActivityText(
         headline=headline(item),

@@ -49,13 +49,12 @@ Check = Callable[[str], bool | None]
 
 
 def documents_in(tops: Iterable[str]) -> list[str]:
-    """Return the files that are meant, each once: a folder stands for all FCStd files below it.
+    """List the files that are meant, each once: a folder stands for all FCStd files below it.
 
     Left out are backups, hidden files and folders, recycle bins, and what a ``.siloignore`` in the folder or
     below it names (in the syntax of ``.gitignore``). A folder that cannot be listed is in the result itself,
-    so that the reader of the files reports it. A pattern
-    (``*.FCStd``) stands for what fits it: the shells of Windows hand patterns over as they are. InputError
-    names all that is not there.
+    so that the reader of the files reports it. A pattern (``*.FCStd``) stands for the files that match it,
+    since the shells of Windows pass patterns on unchanged. InputError names everything that is missing.
     """
     meant = list(chain.from_iterable(map(_documents_of, tops)))
     must_exist(*meant)
@@ -90,11 +89,11 @@ _NOT_OURS = ("#recycle", "#snapshot", "$recycle.bin", "@recycle", "@recently-sna
 
 
 def _below(folder: str, rules: tuple[tuple[int, Check], ...] = (), inner: str = "") -> Iterator[str]:
-    """Yield the FCStd files below a folder. One that cannot be listed stands for itself, so that reading it
-    fails.
+    """Yield the FCStd files below a folder. A folder that cannot be listed is yielded itself, so that reading
+    it fails.
 
     rules
-        of the folders above: where paths below each begin in ``inner``, and its patterns.
+        for each folder above: the position in ``inner`` at which paths below it begin, and its patterns.
     inner
         the folder as seen from the first one; "" or ending in ``/``.
     """
@@ -122,7 +121,7 @@ def _below(folder: str, rules: tuple[tuple[int, Check], ...] = (), inner: str = 
 
 
 def _ignored(name: str, rules: Sequence[tuple[int, Check]]) -> bool:
-    """Decide as git does: the last pattern of the innermost file that says anything about a name."""
+    """Decide as git does: the last matching pattern of the innermost file counts."""
     for begin, check in reversed(rules):
         if (decided := check(name[begin:])) is not None:
             return decided
@@ -130,8 +129,8 @@ def _ignored(name: str, rules: Sequence[tuple[int, Check]]) -> bool:
 
 
 def _patterns(path: str) -> Check:
-    """Return what a file of patterns says of a name: True to leave it out, False to keep it, None for
-    nothing.
+    """Read a file of patterns as a function of a name: True: leave it out, False: keep it, None: no pattern
+    matches.
     """
     try:
         from pathspec import GitIgnoreSpec
@@ -186,7 +185,7 @@ class Project:
 
     @classmethod
     def of(cls, path: Path | str) -> Project | None:
-        """Return the project that a file or folder lies in; None where no folder above it is one."""
+        """Find the project of a file or folder; None if no folder above it is a project."""
         folder = one_path(os.fspath(path))
         while True:
             if os.path.isfile(os.path.join(folder, PROJECT_FILE)):
@@ -197,27 +196,27 @@ class Project:
             folder = above
 
     def place(self, path: str) -> str | None:
-        """Return the path of a file relative to the root, with ``/``; None outside."""
+        """Return the path of a file relative to the root, with ``/``; None if it is outside."""
         real = one_path(path)
         inside = real.startswith(os.path.join(self.root, ""))
         return os.path.relpath(real, self.root).replace(os.sep, "/") if inside else None
 
     def path(self, place: str) -> str:
-        """Return where a file of the project lies."""
+        """Return the path of a file in the project."""
         return os.path.join(self.root, *place.split("/"))
 
     def files(self) -> dict[str, ProjectEntry]:
-        """Return what is remembered of each file, by place."""
+        """Read what is remembered of each file, by its place."""
         files_noted = read_memory(Path(self.root, PROJECT_FILE)).get("files")
-        names = {field.name for field in fields(ProjectEntry)}
+        names = {values.name for values in fields(ProjectEntry)}
         return {
-            str(place): ProjectEntry(**{key: str(value) for key, value in field.items() if key in names})
-            for place, field in (files_noted.items() if isinstance(files_noted, dict) else ())
-            if isinstance(field, dict) and field.get("document")
+            str(place): ProjectEntry(**{key: str(value) for key, value in values.items() if key in names})
+            for place, values in (files_noted.items() if isinstance(files_noted, dict) else ())
+            if isinstance(values, dict) and values.get("document")
         }
 
     def note(self, noted: Mapping[str, ProjectEntry | None]) -> None:
-        """Remember these files, None to forget one. Raises DocumentError where the folder takes nothing."""
+        """Remember these files; None forgets one. Raises DocumentError if the folder cannot be written."""
         try:
             with folder_lock(self.root, f"{PROJECT_FILE}.lock", "written", _PATIENCE_S):
                 files = {place: asdict(kept) for place, kept in self.files().items() if place not in noted}
@@ -238,17 +237,17 @@ def folder_lock(
     patience: float = 0.0,
     tell: Callable[[str], object] = lambda _text: None,
 ) -> Iterator[str]:
-    """Hold a folder alone; gives why other computers do not see that, "" where they do.
+    """Hold a folder alone; yields why other computers do not see that, "" if they do.
 
-    The lock is a file in the folder, as far as its disk carries locks, else it lies in the user's cache. It
-    ends with its process, however that ends; a file that a killed process left behind holds nothing.
+    The lock is a file in the folder, if its disk supports locks, otherwise in the user's cache. It ends with
+    its process, however that ends; a file that a killed process left holds no lock.
 
     name, doing
         the lock's file; what is done to the folder ("synced"), for the message to another process.
     tell
         gets that message after 5 seconds, then each minute.
 
-    Raises InputError with the name of who holds it, after ``patience`` seconds.
+    Raises InputError with the name of the holder, after ``patience`` seconds.
     """
     path, problem = os.path.join(one_path(folder), name), ""
     try:
@@ -285,7 +284,7 @@ def folder_lock(
 
 
 def _remove(path: str) -> bool:
-    """Return whether it is gone. One that stays holds nothing, so nobody waits for it."""
+    """Remove a file. Returns False if it stays; it holds no lock then, so nobody waits for it."""
     try:
         os.unlink(path)
     except FileNotFoundError:
@@ -304,7 +303,9 @@ def _who() -> str:
 
 
 def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[str], object]) -> BinaryIO:
-    """Return the locked file. Raises InputError where another process has it, OSError where nobody can."""
+    """Lock the file and return it. Raises InputError if another process has it, OSError if it cannot be
+    locked.
+    """
     if os.path.islink(path):  # somebody else's file may be behind it
         raise OSError(errno.ELOOP, f"{path} is a symbolic link")
     now, deleted = time.monotonic(), 0
@@ -320,7 +321,7 @@ def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[s
         elif (now := time.monotonic()) >= min(until, due):
             try:
                 who = Path(path).read_text(encoding="utf-8", errors="replace").strip()
-            except OSError:  # it has ended just now
+            except OSError:  # the holder has just ended
                 who = ""
             text = f"{folder} is being {doing} by {who or 'another process'}. Wait for it, or stop it."
             if now >= until:
@@ -332,7 +333,7 @@ def _held(path: str, folder: str, doing: str, patience: float, tell: Callable[[s
 
 
 def job_text(env: Mapping[str, str]) -> str | None:
-    """Return the arguments of a job inside FreeCAD: the file that ``SILO_ARGS_FILE`` names, else
+    """Read the arguments of a job inside FreeCAD from the file that ``SILO_ARGS_FILE`` names, else from
     ``SILO_ARGS``.
 
     An environment variable ends at 32 767 characters on Windows, and at 128 KiB on Linux. Raises OSError.
@@ -343,7 +344,7 @@ def job_text(env: Mapping[str, str]) -> str | None:
 
 
 def check_writable(*paths: str | None) -> None:
-    """Raise InputError for a file that cannot be written, before a long run ends with that news."""
+    """Raise InputError for a file that cannot be written, before a long run."""
     for path in filter(None, paths):
         folder = os.path.dirname(path) or "."
         if not os.path.isdir(folder):
@@ -353,13 +354,13 @@ def check_writable(*paths: str | None) -> None:
 
 
 def content_hash(path: Path | str) -> str:
-    """Return the SHA-256 of a file's content, in hexadecimal. Raises OSError."""
+    """Hash a file's content with SHA-256, in hexadecimal. Raises OSError."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def sha256_of(path: str) -> str:
-    """Return the hash of a document that must be readable; DocumentError if it is not."""
+    """Hash a document that must be readable; DocumentError if it is not."""
     try:
         return content_hash(path)
     except OSError as error:
@@ -367,20 +368,20 @@ def sha256_of(path: str) -> str:
 
 
 def bare_checksum(checksum: str | None) -> str:
-    """Return a SHA-256 as a server may name it, in lower-case hex; "" if it names none."""
+    """Return a server's SHA-256 in lower-case hex; "" if it gives none."""
     return (checksum or "").lower().removeprefix("sha256:")
 
 
 def seen_as(number: int, checksum: str | None) -> str:
-    """Return what names the file of a revision that a person saw: by its content too, where the server knows
-    that; a server that was restored gives the same number to another file.
+    """Return a name for the file of a revision that a person saw. It includes the file's hash, if the server
+    knows that, because a restored server gives the same number to another file.
     """
     return f"{number} {bare_checksum(checksum)}".strip()
 
 
 def shipped() -> Path:
-    """Return the folder with the example and the add-on's own files: the checkout, or what the wheel holds of
-    it.
+    """Return the folder with the example and the add-on's own files: the checkout, or the wheel's copy
+    of it.
     """
     wheel = Path(__file__).parent / "shipped"
     return wheel if wheel.is_dir() else Path(__file__).resolve().parents[2]
@@ -400,7 +401,9 @@ class FoundFile(NamedTuple):
     respelt: bool = False
 
     def is_straight(self, recorded: str, folder: str) -> bool:
-        """Return True if the path itself leads to the file: it is found so for as long as it lies there."""
+        """Return True if the path itself leads to the file, so that the link finds it as long as it stays
+        there.
+        """
         return self.real == os.path.normpath(os.path.join(folder, recorded))
 
 
@@ -430,27 +433,27 @@ class Locator:
             self.root = self._spelling.real(self.root)
 
     def real(self, path: str) -> str:
-        """Return the one path of a file: without symlinks, as its folders list it."""
+        """Return the one path of a file, without symlinks and spelt as its folders list it."""
         return self._spelling.look(path).path
 
     def inside(self, real_path: str) -> bool:
-        """Return True if a path without symlinks may be read."""
+        """Return True if the file at a path without symlinks may be read."""
         root = self.root
         return root is None or real_path == root or real_path.startswith(os.path.join(root, ""))
 
     def find(self, recorded: str, folders: tuple[str, ...]) -> FoundFile | NotFound:
-        """Return the file that a link in a document of (one of) these folders means."""
+        """Find the file to which a link in a document in (one of) these folders leads."""
         if not self.remembers_files:
             return self._find(recorded, folders)
-        result: FoundFile | NotFound | None = self._files.get((recorded, folders))
-        if result is None:
-            result = self._find(recorded, folders)
-            if isinstance(result, FoundFile):
-                self._files[recorded, folders] = result
-        return result
+        found: FoundFile | NotFound | None = self._files.get((recorded, folders))
+        if found is None:
+            found = self._find(recorded, folders)
+            if isinstance(found, FoundFile):
+                self._files[recorded, folders] = found
+        return found
 
     def learn(self, folders: tuple[str, ...], locations: Mapping[str, FoundFile]) -> None:
-        """Remember where the paths of a document's links lead, as another session found it just now."""
+        """Remember where the paths of a document's links lead, as another session has just found."""
         for recorded, location in locations.items():
             self._files.setdefault((recorded, folders), location)
 
@@ -473,11 +476,13 @@ class Locator:
         return self._respelt(recorded, folders)
 
     def lies_straight(self, path: str) -> bool:
-        """Return True if what is there has this very path: no folder is a symlink, names are as listed."""
+        """Return True if what is there has exactly this path: no folder is a symlink, and names are spelt as
+        listed.
+        """
         return self._spelling.is_plain(path)
 
     def _respelt(self, recorded: str, folders: tuple[str, ...]) -> FoundFile | NotFound:
-        """Find a file that Windows or macOS would open (``part.FCStd`` for ``Part.FCStd``), if only one
+        """Find the file that Windows or macOS would open (``part.FCStd`` for ``Part.FCStd``), if only one
         fits.
         """
         for path in _candidates(recorded, folders):
@@ -519,10 +524,10 @@ class Locator:
 
 
 def refusal(recorded: str) -> NotFound | None:
-    """Return why a recorded path is not even looked at; None if it may be.
+    """Return why a recorded path is not even looked for; None if it may be.
 
-    The rules are those of Windows, where a mere look can do harm, and the same on every platform: a project
-    must not read in one way here and in another there.
+    The rules are those of Windows, on which even a look can do harm. They are the same on every platform, so
+    that a project reads the same everywhere.
     """
     if "\0" in recorded or len(recorded) > _LONGEST:
         return NotFound(FindingCode.MISSING_FILE, "its path cannot be one")
@@ -541,7 +546,7 @@ def refusal(recorded: str) -> NotFound | None:
 def _respelt_by_disk(recorded: str, spelt: Spelt) -> bool:
     """Return True if a disk that ignores case found a name of the link under another spelling.
 
-    How the user spelt the folders above is not the link's matter.
+    The user's spelling of the folders above does not concern the link.
     """
     if spelt.path == spelt.plain:
         return False

@@ -69,7 +69,9 @@ _BUNDLES = ("/Applications", "~/Applications")
 
 
 def commands(env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT) -> Iterator[str]:
-    """Yield every ``freecadcmd`` that can be started here, those on the PATH first. ``root``: of the disk."""
+    """Yield every ``freecadcmd`` that can be started here, those on the PATH first. ``root``: the root of the
+    disk.
+    """
     on_path = (shutil.which(name, path=env.get("PATH")) for name in _COMMANDS)
     elsewhere = (str(path) for path in _matching(env, root, *_command_places(env, platform)))
     # Windows and macOS find one program under two of these names.
@@ -95,7 +97,9 @@ def _command_places(env: Mapping[str, str], platform: str) -> tuple[str, ...]:
 
 
 def start(command: str) -> list[str]:
-    """Return the words that start FreeCAD without its window: some packages need more than a path."""
+    """Return the command line that starts FreeCAD without its window; for some packages that is more than a
+    path.
+    """
     name = os.path.basename(command)
     if name.casefold().endswith(".appimage"):
         return [command, "freecadcmd"]  # an AppImage runs the program that its first argument names
@@ -107,7 +111,7 @@ def start(command: str) -> list[str]:
 def material_folders(
     env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT
 ) -> Iterator[Path]:
-    """Yield folders with FreeCAD's material cards: its own ones, then the user's. ``root``: of the disk."""
+    """Yield folders with material cards: FreeCAD's own, then the user's. ``root``: the root of the disk."""
     if platform == "win32":
         shipped = [f"{base}/{data}Mod/Material" for base in _windows(env) for data in ("data/", "")]
         own = ["{APPDATA}/FreeCAD"]
@@ -137,7 +141,7 @@ def material_folders(
 def cache_folders(
     env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT
 ) -> Iterator[Path]:
-    """Yield the cache folders of this user's FreeCADs. ``root``: of the disk."""
+    """Yield the cache folders of this user's FreeCADs. ``root``: the root of the disk."""
     # Both are used as they are; the others get a folder for the program (App/ApplicationDirectories).
     moved = [Path(env[name], part) for name, part in _MOVED_CACHES if env.get(name)]
     yield from (folder for folder in moved if folder.is_dir())
@@ -152,9 +156,9 @@ def cache_folders(
 
 
 def exchange_folder(command: str, env: Mapping[str, str] = os.environ) -> str | None:
-    """Return where files for a FreeCAD must lie so that it sees them; None if any temporary folder will do.
+    """Return the folder in which a FreeCAD can see our files; None if it sees any temporary folder.
 
-    Snap and Flatpak give a program a ``/tmp`` of its own, and a part of the user's home.
+    Under Snap and Flatpak, a program has its own ``/tmp`` and sees only a part of the user's home.
     """
     real = os.path.realpath(command)
     home = Path(env.get("HOME") or Path.home())
@@ -178,7 +182,7 @@ def _flatpak_bases() -> tuple[str, str]:
 
 
 def _matching(env: Mapping[str, str], root: Path, *patterns: str) -> Iterator[Path]:
-    """Yield what is there, each once; within a pattern the newest version first."""
+    """Yield the existing paths that match, each once; those of one pattern with the newest version first."""
     seen = set()
     for pattern in patterns:
         for path in sorted(_glob(env, root, pattern), key=_version, reverse=True):
@@ -217,7 +221,7 @@ class OpenInFreecad:
         self._hashes = frozenset(digest for cache in caches for digest in _open_in(cache, but_not))
 
     def has(self, *paths: str) -> bool:
-        """Return True if a file, by any of these spellings, is open in FreeCAD."""
+        """Return True if FreeCAD has the file open under one of these spellings."""
         return any(
             hashlib.sha1(os.fsencode(path), usedforsecurity=False).hexdigest()[:6] in self._hashes
             for path in paths
@@ -225,7 +229,7 @@ class OpenInFreecad:
         )
 
     def has_file(self, path: str) -> bool:
-        """Return True if a file is open in FreeCAD under its given, its absolute or its real path.
+        """Return True if FreeCAD has the file open under its given, its absolute or its real path.
 
         FreeCAD writes "/" on Windows too.
         """
@@ -235,16 +239,16 @@ class OpenInFreecad:
 
 
 def open_in_any() -> OpenInFreecad:
-    """Return what any FreeCAD of this user has open now."""
+    """Find what any FreeCAD of this user has open now."""
     return OpenInFreecad(cache_folders())
 
 
 def open_in_others(own_folder: str) -> OpenInFreecad:
-    """Return what FreeCADs other than this one have open now.
+    """Find what FreeCADs other than this one have open now.
 
     own_folder
         the cache folder of a document that is open here (``Document.TransientDir``); without it, nothing is
-        said.
+        found.
     """
     cache, name = os.path.split(own_folder.rstrip("/\\"))
     own = _FOLDER.fullmatch(name)
@@ -272,8 +276,8 @@ _CODE = 'import os, runpy; runpy.run_path(os.environ["SILO_SCRIPT"], run_name="_
 
 
 def find_freecadcmd(given: str | None = None, env: Mapping[str, str] = os.environ) -> str:
-    """Return the ``freecadcmd`` to start: the given one, ``SILO_FREECADCMD``, or one found. ConfigError if
-    none.
+    """Find the ``freecadcmd`` to start: the given one, that of ``SILO_FREECADCMD``, or an installed one.
+    ConfigError if there is none.
     """
     wanted = given or env.get("SILO_FREECADCMD")
     if wanted:
@@ -301,10 +305,10 @@ with open(os.environ["SILO_OUT"], "w") as out:
 
 
 def freecad_for(saved_by: tuple[int, ...]) -> tuple[str, str]:
-    """Return a FreeCAD that can open what this version saved: its command, and its own version.
+    """Find a FreeCAD that can open what the version ``saved_by`` saved: its command, and its own version.
 
-    The first here that is no older, else the newest. What ``SILO_FREECADCMD`` names is taken as it is.
-    ConfigError if there is none.
+    It is the first one that is not older, else the newest. The one that ``SILO_FREECADCMD`` names is always
+    taken. ConfigError if there is none.
     """
     given = [find_freecadcmd()] if os.environ.get("SILO_FREECADCMD") else None
     versions: list[tuple[tuple[int, ...], str]] = []
@@ -320,7 +324,7 @@ def freecad_for(saved_by: tuple[int, ...]) -> tuple[str, str]:
 def ask_inside(command: str, script: str, env: Mapping[str, str]) -> Any:
     """Run a script inside FreeCAD; return the JSON that it wrote to the file ``SILO_OUT``. ConfigError.
 
-    The script goes in a file: FreeCAD 1.1 ends at once if the text behind ``-c`` has some 250 characters.
+    The script is in a file, since FreeCAD 1.1 ends at once if the text after ``-c`` has about 250 characters.
     """
     shared = exchange_folder(command)
     if shared is not None:
@@ -329,11 +333,11 @@ def ask_inside(command: str, script: str, env: Mapping[str, str]) -> Any:
         out, path, log = (Path(folder) / name for name in ("answer.json", "ask.py", "log.txt"))
         path.write_text(script, encoding="utf-8")
         try:
-            with open(log, "wb") as said:
+            with open(log, "wb") as output:
                 run = subprocess.run(
                     [*start(command), "-c", _CODE],
                     stdin=subprocess.DEVNULL,
-                    stdout=said,
+                    stdout=output,
                     stderr=subprocess.STDOUT,
                     cwd=folder,
                     env={**os.environ, **env, "SILO_SCRIPT": str(path), "SILO_OUT": str(out)},
@@ -360,17 +364,17 @@ def run_freecad(
     hardware: bool = True,
     witness: dict[str, list[dict[str, Any]]] | None = None,
 ) -> Iterator[tuple[str, Extraction | SiloError]]:
-    """Read each file in FreeCAD; results in order, as they come.
+    """Read each file in FreeCAD; yields the results in order, as they come.
 
     timeout_s
         for one file, FreeCAD's start included.
     env
         set in FreeCAD's environment beside our own, such as ``FREECAD_USER_HOME``.
     witness
-        takes what the geometry of each file says (``silo.workbench.freecad.live``), by file.
+        receives what the geometry of each file shows (``silo.workbench.freecad.live``), by file.
 
-    A file that FreeCAD cannot read, dies of or hangs on gives its error, and the rest is still read.
-    ConfigError where there is no FreeCAD, or where it does not start.
+    A file that FreeCAD cannot read, or that makes it crash or hang, gives an error; the rest is still read.
+    ConfigError if there is no FreeCAD, or if it does not start.
     """
     freecadcmd = find_freecadcmd(command)
     rest = [os.path.abspath(top) for top in tops]
@@ -391,7 +395,7 @@ def run_freecad(
 
 
 def _result(line: Mapping[str, Any]) -> Extraction | SiloError:
-    """Return the answer of one line, or the error that the script inside FreeCAD wrote into it."""
+    """Read the answer in one line: an extraction, or the error that the script inside FreeCAD wrote."""
     error = line.get("error")
     if error is None:
         return from_plain(line["extraction"])
@@ -469,12 +473,12 @@ class FreeCADRun:
         self._folder.cleanup()
 
     def lines(self) -> Iterator[dict[str, Any]]:
-        """Yield the results as they are written; ends with the process, or with its time."""
+        """Yield the results as they are written, until the process ends or its time is over."""
         assert self._process is not None  # entered
         deadline = time.monotonic() + self.timeout_s
         with open(self._results, encoding="utf-8") as results:
             while True:
-                # Asked first: what a process wrote before it ended is read in this same round.
+                # Asked first, so that lines that a process wrote before its end are read in this round.
                 over = self._process.poll() is not None
                 for line in _complete_lines(results):
                     deadline = time.monotonic() + self.timeout_s
@@ -491,8 +495,8 @@ class FreeCADRun:
                 time.sleep(_POLL_S)
 
     def failure(self, path: str) -> SiloError:
-        """Return why the file that was being read has no result. ConfigError where FreeCAD never got that
-        far.
+        """Say why the file that was being read has no result. Raises ConfigError if FreeCAD did not even
+        begin.
         """
         if self.timed_out:
             return DocumentError(path, f"FreeCAD did not finish it within {self.timeout_s:g} s")
@@ -520,7 +524,7 @@ _CRASHED = re.compile(r"Program received signal (SIGSEGV|SIGABRT|SIGILL|SIGFPE)"
 
 
 def _last_words(code: int, log: Path) -> tuple[str, str]:
-    """Return how a FreeCAD ended, and the last lines that it said, without those of a crash."""
+    """Say how a FreeCAD ended, and return its last lines of output, without those of a crash."""
     text = log.read_text(encoding="utf-8", errors="replace")
     if crash := _CRASHED.search(text):
         code, text = -signal.Signals[crash[1]], text[: crash.start()]
@@ -528,7 +532,7 @@ def _last_words(code: int, log: Path) -> tuple[str, str]:
     return platform.how_it_ended(code), " / ".join(lines[-3:]) or "nothing"
 
 
-# The Addon Manager's name for it, so that there is one folder however it came there; and the name before.
+# The Addon Manager's name for it, so that there is only one folder; and the earlier name.
 FOLDER, OLD_FOLDER = "silo-mod", "Silo"
 
 _ASK = """
@@ -582,7 +586,7 @@ class Installation:
 
     @property
     def mod(self) -> Path:
-        """Return where the add-on goes."""
+        """Return the folder into which the add-on is installed."""
         return self.data / "Mod" / FOLDER
 
 
@@ -590,7 +594,7 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Inst
     """Ask FreeCAD for its folders and versions, and let it import what the add-on needs. Raises ConfigError.
 
     data
-        stands for the data folder that it names.
+        replaces the data folder that FreeCAD names.
     """
     command = find_freecadcmd(freecadcmd)
     env = {"SILO_ASK_DATA": str(data or ""), "SILO_ASK_NAMES": " ".join(FREECAD_PACKAGES)}
@@ -627,7 +631,7 @@ def _run(command: list[str], seconds: float, **more: Any) -> subprocess.Complete
 
 
 def _has_pip(python: str, version: tuple[int, int] | None = None) -> bool:
-    """Return True if this is a Python with pip, of that version."""
+    """Return True if this is a Python with pip; if ``version`` is given, of that version."""
     code = "import pip, sys; print(*sys.version_info[:2])"
     try:
         ran = _run([python, "-c", code], _ASK_SECONDS)
@@ -637,7 +641,7 @@ def _has_pip(python: str, version: tuple[int, int] | None = None) -> bool:
 
 
 def _any_python() -> str:
-    """Return a Python with pip. Inside FreeCAD, ``sys.executable`` is FreeCAD."""
+    """Find a Python with pip. Inside FreeCAD, ``sys.executable`` is FreeCAD."""
     paths = (sys.executable, shutil.which("python3"), shutil.which("python"), shutil.which("py"))
     for python in paths:
         if python and "freecad" not in os.path.basename(python).lower() and _has_pip(python):
@@ -649,10 +653,11 @@ def _any_python() -> str:
 
 
 def install_folder(place: Installation, source: Path | None = None, *, copy: bool = False) -> str:
-    """Link (or copy) the add-on into ``Mod``; returns what was done. A stranger's folder is left alone.
+    """Link (or copy) the add-on into ``Mod``; returns what was done. A folder that is not ours is left alone.
 
     source
-        holds what FreeCAD's loaders want at its root: the checkout, or what a wheel ships, which is copied.
+        a folder whose root has the files that FreeCAD loads: the checkout, or the wheel's files, which are
+        copied.
     """
     source = source or shipped()
     if not (source / "package.xml").is_file():
@@ -694,10 +699,10 @@ def _remove_old(place: Installation) -> None:
 
 
 def install_packages(place: Installation) -> str:
-    """Install what the add-on lacks inside this FreeCAD, and have FreeCAD import it; return where it is.
+    """Install what the add-on lacks inside this FreeCAD, let FreeCAD import it, and return its folder.
 
-    What is there already stays as it is, for other add-ons use it too. ConfigError if FreeCAD still cannot
-    import one of the packages.
+    Packages that are there already stay unchanged, because other add-ons use them too. ConfigError if FreeCAD
+    still cannot import one of the packages.
     """
     version = "{}.{}".format(*place.python)
     if place.python < (3, 11):
@@ -706,7 +711,7 @@ def install_packages(place: Installation) -> str:
         return str(place.packages)
     names = [FREECAD_PACKAGES[name] for name in place.missing]
     install = ["install", "--quiet", "--target", str(place.packages), *names]
-    # What lies there and cannot be imported, such as for another Python, is of no use to anybody.
+    # Packages there that cannot be imported, such as those for another Python, are useless.
     if any((place.packages / name).exists() for name in place.missing):
         install.append("--upgrade")
     own = next((python for python in place.pythons if _has_pip(python, place.python)), None)
@@ -718,13 +723,13 @@ def install_packages(place: Installation) -> str:
     run = _run([*command, *_constraint(place)], _PIP_SECONDS)
     if (
         run.returncode and place.constraints
-    ):  # the list is somewhere on the Internet, the packages may be near
+    ):  # the list is on the Internet, the packages may be on a server nearby
         run = _run(command, _PIP_SECONDS)
     if run.returncode:
         raise ConfigError(f"pip could not install {', '.join(names)} for Python {version}: {_pip_words(run)}")
-    left = ask_freecad(place.command, place.data).missing
-    if left:
-        reasons = "; ".join(f"{name}: {reason}" for name, reason in left.items())
+    missing = ask_freecad(place.command, place.data).missing
+    if missing:
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in missing.items())
         raise ConfigError(f"the packages are in {place.packages}, but FreeCAD cannot import them: {reasons}")
     return str(place.packages)
 

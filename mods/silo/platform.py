@@ -70,7 +70,7 @@ MODES_COUNT = os.name == "posix"
 # Another program has the file open: a virus scanner, an indexer, a colleague. ERROR_ACCESS_DENIED,
 # ERROR_SHARING_VIOLATION, ERROR_LOCK_VIOLATION of Windows; POSIX has no such error.
 _IN_USE = (5, 32, 33)
-_IGNORE_MERGE_ERRORS = 0x2  # ReplaceFileW: a right that cannot be copied is no reason to fail
+_IGNORE_MERGE_ERRORS = 0x2  # ReplaceFileW: do not fail if a right cannot be copied
 _CANNOT_MERGE = 1175  # ERROR_UNABLE_TO_REMOVE_REPLACED
 _COPYFILE_ACL, _COPYFILE_XATTR = 1, 4  # copyfile.h of macOS
 _LOCKED_BYTE = 1 << 30
@@ -84,14 +84,14 @@ _DEVICE = re.compile(
 
 
 def is_device_name(name: str) -> bool:
-    """Return True if Windows takes this name of a file for a device; asked on every platform, as files
-    travel.
+    """Return True if Windows takes this file name for a device. Ask on every platform, since files move
+    between them.
     """
     return _DEVICE.match(name) is not None
 
 
 def no_device_name(name: str) -> str:
-    """Return ``name``, or what a file of that name is called where nobody may call it so."""
+    """Return ``name``, with a mark in front if Windows does not allow it."""
     return "_" * is_device_name(name) + name
 
 
@@ -120,9 +120,9 @@ def _resources() -> Resources | None:
 
 
 def patiently(act: Callable[[], None], *, wait: Callable[[float], None] = time.sleep) -> None:
-    """Do something to a file that another program may have open for a moment; some 3 s at most.
+    """Do something to a file that another program may have open for a moment; tries for about 3 s.
 
-    Only Windows refuses that, and only its errors are waited for. Raises OSError as ``act`` does.
+    Only Windows refuses this, so it waits only after errors of Windows. Raises OSError as ``act`` does.
     """
     for seconds in _WAITS_S:
         try:
@@ -136,10 +136,11 @@ def patiently(act: Callable[[], None], *, wait: Callable[[float], None] = time.s
 
 
 def copy_rights(source: str, copy: str, *, library: Any = None) -> None:
-    """Give a copy the owner, modes, access list and tags of its source, as far as the system allows it.
+    """Copy owner, modes, access list and tags of a file to its copy, as far as the system allows it.
 
     library
-        stands for the C library of macOS; None where this is no macOS. Windows keeps them in :func:`swap`.
+        replaces the C library of macOS; None: use it on macOS only. On Windows, :func:`swap` keeps the
+        rights.
     """
     status = os.stat(source)
     with suppress(OSError, AttributeError):  # only an administrator may give files away
@@ -162,8 +163,8 @@ def copy_rights(source: str, copy: str, *, library: Any = None) -> None:
 def swap(source: str, target: str, *, merge: Callable[[str, str], int] | None = None) -> None:
     """Put a new file in the place of an old one. Raises OSError.
 
-    On Windows the file keeps the access list, streams and attributes that it had: ``merge`` stands for the
-    call that does it there, and returns an error number of Windows or 0.
+    On Windows the file keeps the access list, streams and attributes that it had: ``merge`` replaces the call
+    that does this, and returns an error number of Windows or 0.
     """
     merge = merge or (_replace_file if WINDOWS else None)
     code = merge(source, target) if merge is not None else _CANNOT_MERGE
@@ -189,9 +190,9 @@ class InUseError(PermissionError):
 
 
 def sync_folder(folder: str | os.PathLike[str]) -> None:
-    """Put the names in a folder on disk: a rename is there only with its folder. Raises OSError.
+    """Put the names in a folder on disk, since a rename is on disk only with its folder. Raises OSError.
 
-    Some shares and FUSE disks cannot do that for a folder: there is nothing more to be done, and no failure.
+    Some shares and FUSE disks cannot do that for a folder. That is no error, since nothing more can be done.
     """
     if WINDOWS:  # it neither needs nor allows that
         return
@@ -206,10 +207,10 @@ def sync_folder(folder: str | os.PathLike[str]) -> None:
 
 
 def is_locked(path: str) -> bool | None:
-    """Return True if another process holds a lock on a file; None if this cannot be known.
+    """Return True if another process holds a lock on a file; None if this is unknown.
 
-    Asking takes the lock for a moment. Must not be asked of a file that this process has locked: closing it
-    gives that lock up.
+    It takes the lock for a moment. Do not call it for a file that this process has locked: closing the file
+    would end that lock.
     """
     try:
         with open(path, "r+b") as file:
@@ -226,13 +227,14 @@ def is_locked(path: str) -> bool | None:
 
 
 def hold_lock(path: str | os.PathLike[str], *, shared: bool = False) -> BinaryIO | None:
-    """Lock a file, which is made where there is none, for as long as the result stays open.
+    """Lock a file, and make it if it does not exist, for as long as the result stays open.
 
     shared
-        with others that share it. Windows has no such lock, and needs none where it guards an open file:
-        nobody can delete that.
+        others may hold the lock too, if they share it. Windows has no such lock, and needs none to guard an
+        open file, which nobody can delete there.
 
-    None where another process holds the lock. It ends with the process, however that ends. Raises OSError.
+    Returns None if another process holds the lock. The lock ends with its process, however that ends. Raises
+    OSError.
     """
     file = open(path, "a+b")  # noqa: SIM115
     try:
@@ -264,8 +266,8 @@ def hold_lock(path: str | os.PathLike[str], *, shared: bool = False) -> BinaryIO
 
 
 def shows_locks(path: str, mounts: str = "/proc/self/mountinfo") -> bool:
-    """Return True if other computers that share the disk see a lock on it. FUSE and the folders of virtual
-    machines keep locks to themselves, without an error.
+    """Return True if other computers that share the disk see a lock on it. FUSE and shared folders of virtual
+    machines do not pass locks on, and report no error.
 
     mounts
         the system's list of what is mounted where (proc(5)); systems without that share locks.
@@ -304,12 +306,13 @@ def _is_locked_on_windows(descriptor: int) -> bool | None:
 def limit_this_process(
     *, memory: int = 0, cpu_s: int = 0, resources: Resources | None = None
 ) -> tuple[str, ...]:
-    """Limit this process as far as the platform can, each limit by itself; no core files.
+    """Limit this process as far as the platform can, each limit separately; no core files.
 
     memory, cpu_s
         bytes of address space and seconds of processor time; 0 for no limit.
 
-    Returns the names of the limits that could not be set: Windows has none, macOS refuses one of memory.
+    Returns the names of the limits that could not be set: Windows has no limits, and macOS refuses that of
+    memory.
     """
     system = resources or _resources()
     wanted = {"core": 0, **({"memory": memory} if memory else {}), **({"cpu": cpu_s} if cpu_s else {})}
@@ -326,7 +329,7 @@ def limit_this_process(
 
 
 def allow_many_files(resources: Resources | None = None) -> None:
-    """Raise the limit of open files to what the machine allows: each listener of a server is one."""
+    """Raise the limit of open files to what the machine allows, since each listener of a server needs one."""
     system = resources or _resources()
     if system is None:
         return
@@ -336,12 +339,12 @@ def allow_many_files(resources: Resources | None = None) -> None:
 
 
 def child_options(*, group: bool = False, offered: object = subprocess) -> dict[str, Any]:
-    """Return options of ``subprocess`` for a child that nobody sees: no console window opens on Windows.
+    """Return options of ``subprocess`` for a child without a window: Windows then opens no console.
 
     group
         the child and its own children can be ended together, by :func:`end`.
     offered
-        has the flags of this platform.
+        a module that has the flags of this platform.
     """
     if flags := getattr(offered, "CREATE_NO_WINDOW", 0):
         return {"creationflags": flags | (getattr(offered, "CREATE_NEW_PROCESS_GROUP", 0) if group else 0)}
@@ -360,7 +363,7 @@ def end(process: subprocess.Popen[Any]) -> None:
 
 
 def workers(count: int, begin: Callable[..., None], *arguments: Any) -> ProcessPoolExecutor:
-    """Return a pool of processes that do work for this one: Ctrl-C is its affair, and none outlives it.
+    """Start a pool of worker processes. They leave Ctrl-C to this process, and none outlives it.
 
     ``begin`` is called in each of them, with the arguments.
     """
@@ -387,7 +390,7 @@ def _begin_worker(begin: Callable[..., None], arguments: tuple[Any, ...]) -> Non
 
 
 def end_workers(pool: ProcessPoolExecutor) -> None:
-    """End a pool at once, whatever its processes do; Python has its own way from 3.14 on."""
+    """End a pool at once, whatever its processes do; from 3.14 on Python can do this itself."""
     for process in list(pool._processes.values()):
         process.kill()
     pool.shutdown(wait=True, cancel_futures=True)
@@ -397,7 +400,7 @@ _CRASHES = {"SIGSEGV", "SIGABRT", "SIGILL", "SIGBUS", "SIGFPE"}
 
 
 def how_it_ended(code: int) -> str:
-    """Return the exit code of a child in words, such as ``crashed (SIGSEGV)`` or ``ended with exit code 3``.
+    """Describe the exit code of a child, such as ``crashed (SIGSEGV)`` or ``ended with exit code 3``.
 
     A shell that started the child adds 128 to the signal; Windows has codes from 0xC0000000 on for crashes.
     """
@@ -411,7 +414,7 @@ def how_it_ended(code: int) -> str:
 
 
 def python_beside(prefix: str) -> list[str]:
-    """Return where a Python interpreter lies below its prefix."""
+    """Return the paths at which a Python interpreter may be below its prefix."""
     names = ("python.exe", "bin/python.exe") if WINDOWS else ("bin/python3", "bin/python")
     return [os.path.join(prefix, *name.split("/")) for name in names]
 
@@ -420,9 +423,10 @@ def python_beside(prefix: str) -> list[str]:
 
 
 def own_the_port(sock: socket.socket, constants: Any = socket) -> None:
-    """Let no second server listen on the same port, and this one start again at once after its end.
+    """Make sure that no second server can listen on the same port, and that this one can start again right
+    after its end.
 
-    On Windows SO_REUSEADDR means that two may share the port; there the exclusive use is asked for.
+    On Windows, SO_REUSEADDR lets two programs share the port; so exclusive use is requested there.
     """
     exclusive = getattr(constants, "SO_EXCLUSIVEADDRUSE", None)
     option = constants.SO_REUSEADDR if exclusive is None else exclusive
@@ -454,28 +458,28 @@ def _folder(
 
 
 def config_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
-    """Return where the configuration lives (not created here)."""
+    """Return the folder of the configuration (it is not created here)."""
     return _folder(env, platform, "XDG_CONFIG_HOME", ".config", "Library/Application Support", _ROAMING)
 
 
 def data_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
-    """Return where what must not be lost lives: the outbox, the journal of registrations, the embedded
+    """Return the folder of data that must not be lost: the outbox, the journal of registrations, the embedded
     database.
 
-    On Windows not in the roaming profile: a database that is copied between machines while it is open is soon
-    a broken one.
+    On Windows it is not in the roaming profile, because a database that is copied between machines while it
+    is open soon breaks.
     """
     return _folder(env, platform, "XDG_DATA_HOME", ".local/share", "Library/Application Support", _LOCAL)
 
 
 def cache_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
-    """Return where what can be made again lives."""
+    """Return the folder of data that can be made again."""
     return _folder(env, platform, "XDG_CACHE_HOME", ".cache", "Library/Caches", _LOCAL)
 
 
 def scratch_folder(prefix: str, parent: Path | str | None = None) -> tempfile.TemporaryDirectory[str]:
-    """Return a temporary folder, as a context manager of its path; below ``parent``, else where the system
-    has them.
+    """Make a temporary folder, as a context manager of its path; below ``parent``, or where the system has
+    them.
 
     A file in it that another program still has open (Windows) stays, and is no error.
     """
@@ -490,8 +494,8 @@ Stamp = tuple[int, int, int]
 def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO]:
     """Write the new content of a file: at any moment ``path`` has all of the old content or all of the new.
 
-    The new file can be read by its owner only, unless ``mode`` says otherwise. Where writing fails or the
-    block raises, the old content stays and nothing lies beside it. Raises OSError.
+    The new file can be read by its owner only, unless ``mode`` says otherwise. If writing fails or the block
+    raises, the old content stays, and no other file remains beside it. Raises OSError.
     """
     target = Path(path)
     # Beside the target, so that the rename at the end stays within one file system.
@@ -512,9 +516,9 @@ def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO
 
 
 def read_memory(path: Path) -> dict[str, Any]:
-    """Return what a small JSON file remembers; {} where it is not there, damaged, or no JSON object.
+    """Read a small JSON file; {} if it is missing, damaged, or no JSON object.
 
-    For files whose loss costs a repeated question and never an answer.
+    For files whose loss costs only a repeated question.
     """
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
@@ -524,7 +528,7 @@ def read_memory(path: Path) -> dict[str, Any]:
 
 
 def write_memory(path: Path, content: Mapping[str, Any]) -> OSError | None:
-    """Write what :func:`read_memory` reads, for its owner only. The error where that is not possible."""
+    """Write what :func:`read_memory` reads, for its owner only. Returns the error if that fails."""
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         with replacing(path) as file:
@@ -540,24 +544,24 @@ def replace_patiently(source: Path | str, target: Path | str) -> None:
 
 
 def remove_patiently(path: Path | str) -> None:
-    """Delete a file, which on Windows waits for a program that has it open; none there is fine. OSError."""
+    """Delete a file; on Windows wait for a program that has it open. No file is fine. Raises OSError."""
     patiently(lambda: Path(path).unlink(missing_ok=True))
 
 
 def private_folder(path: Path | str) -> None:
-    """Make a folder for its owner only, and close one that is there to others. Raises OSError."""
+    """Make a folder that only its owner can read, or close an existing one to others. Raises OSError."""
     os.makedirs(path, mode=0o700, exist_ok=True)
     _close_to_others(path)
 
 
 def private_file(path: Path | str) -> None:
-    """Make a file for its owner only, or close the one that is there to others. Raises OSError."""
+    """Make a file that only its owner can read, or close an existing one to others. Raises OSError."""
     os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
     _close_to_others(path)
 
 
 def stamp_of(path: Path | str | int) -> Stamp | None:
-    """Return the stamp of a file, by its path or as an open one; None if there is no file."""
+    """Return the stamp of a file, given by its path or its descriptor; None if there is no file."""
     try:
         status = os.stat(path)
     except OSError:
@@ -591,17 +595,19 @@ class Spelling:
     def __init__(self) -> None:
         self._folders: dict[str, tuple[str, str]] = {}
         self._canonical: dict[str, str] = {}
-        self._exact: set[str] = set()  # folders that find a name in its own spelling only
+        self._exact: set[str] = set()  # folders that find a name only in its own spelling
         self._listings: dict[str, dict[str, list[tuple[str, int]]]] = {}
 
     def real(self, path: str) -> str:
-        """Return ``os.path.realpath`` with each name as its folder lists it; also for paths that are not
-        there.
+        """Return ``os.path.realpath`` with each name as its folder lists it; also for paths where
+        nothing is.
         """
         return self.look(os.path.abspath(path)).path
 
     def look(self, path: str) -> Spelt:
-        """Return the same for an absolute path, with what was asked for and whether anything is there."""
+        """Do the same for an absolute path; also return the path before respelling, and if anything is
+        there.
+        """
         folder, name = os.path.split(path)
         if not name:
             real = os.path.realpath(path)
@@ -622,14 +628,14 @@ class Spelling:
         return Spelt(os.path.join(real_folder, listed), os.path.join(plain, name), True)
 
     def is_plain(self, path: str) -> bool:
-        """Return True if what is known to lie there, and to be no symlink, has no other path."""
+        """Return True if this path, which exists and is no symlink, is its own only spelling."""
         folder, _, name = path.rpartition(os.sep)
         if name.isascii() and folder in self._exact and self._folders.get(folder) == (folder, folder):
             return True
         return self.look(path).path == path
 
     def _as_listed(self, real: str) -> str:
-        """Return a path without symlinks, each name as its folder lists it."""
+        """Spell each name in a path without symlinks as its folder lists it."""
         text = self._canonical.get(real)
         if text is None:
             folder, name = os.path.split(real)
@@ -663,7 +669,7 @@ class Spelling:
         return next((other for other, number in listed if number == status.st_ino), listed[0][0])
 
     def _listing(self, folder: str) -> dict[str, list[tuple[str, int]]]:
-        """Return names and inode numbers of a folder's entries, by :func:`folded` name."""
+        """List names and inode numbers of a folder's entries, by :func:`folded` name."""
         listing = self._listings.get(folder)
         if listing is None:
             listing = self._listings[folder] = {}
@@ -677,10 +683,10 @@ class Spelling:
 
 
 def one_path(path: str) -> str:
-    """Return :meth:`Spelling.real` for a single look."""
+    """Do what :meth:`Spelling.real` does, for a single path."""
     return Spelling().real(path)
 
 
 def folded(name: str) -> str:
-    """Return a text that is equal for names that differ in case or normal form only."""
+    """Return a text that is equal for names that differ only in case or normal form."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFD", name).casefold())

@@ -82,11 +82,11 @@ class Stored:
     lines: list[dict[str, Any]] = field(default_factory=list)
 
     def search_text(self) -> str:
-        """Return what a search looks into: number, name, and the hashes of its files."""
+        """Return the text in which a search looks: number, name, and the hashes of its files."""
         return "\n".join((self.item.part_number, self.item.name, *self.hashes())).casefold()
 
     def hashes(self) -> list[str]:
-        """Return the SHA-256 of its files, as far as they are known."""
+        """Return the known SHA-256 of its files."""
         checksums = [self.item.properties.get("file_sha256"), *(r.file_checksum for r in self.revisions)]
         return [str(checksum).removeprefix("sha256:") for checksum in checksums if checksum]
 
@@ -136,7 +136,7 @@ class FakeStore:
         self._news = threading.Condition(self._lock)
 
     def _earlier(self, subject: str, key: str | None, request: Any) -> Any:
-        """Return the answer to the same request of before; ConflictError for another one with its key."""
+        """Return the answer to the same earlier request; ConflictError if another request had its key."""
         asked, answer = self.answers.get((subject, key or ""), (request, None))
         if asked != request:
             raise ConflictError(f"{key!r} was used before for another request")
@@ -168,7 +168,7 @@ class FakeStore:
             if stored.item.id.lower() == uuid:
                 return stored
         if make and uuid not in self.documents:
-            # It has no item; what it has of one is a place for its revisions.
+            # It has no item; this is only a place for its revisions.
             self.documents[uuid] = Stored(Item(id=uuid, part_number=f"document {uuid}"))
         if uuid not in self.documents:
             raise NotFoundError(f"{self.base_url} has no document {uuid}")
@@ -316,7 +316,7 @@ Bom = Callable[[str], Sequence[BomLine]]
 
 
 def entries_of(request: MergeRequest, numbers: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Return the request's entries under the server's own numbers (``known``: case-folded → number).
+    """Return the request's entries under the server's own numbers (``numbers``: case-folded → number).
 
     Raises :class:`RejectedError` with all unknown children at once, each with its index.
     """
@@ -340,21 +340,21 @@ def entries_of(request: MergeRequest, numbers: Mapping[str, str]) -> list[dict[s
 
 
 def missing_of(request: MergeRequest) -> list[tuple[str, str]]:
-    """Return the components that the assembly has lost."""
+    """Return the components that are missing in the assembly."""
     return [(part.file, part.object) for part in request.left_out or () if part.reason == Reason.MISSING]
 
 
 def with_components(
     lines: Sequence[Mapping[str, Any]], entries: Iterable[Mapping[str, Any]], kept: Iterable[str]
 ) -> list[dict[str, Any]]:
-    """Return the lines, each with what it is in the CAD model."""
+    """Add to each line its components in the CAD model."""
     before = {line["child_part_number"]: line.get("components", []) for line in lines}
     after = remembered(before, entries, kept)
     return [{**line, "components": after.get(line["child_part_number"], [])} for line in lines]
 
 
 def check_cycle(bom: Bom, parent: str, children: Sequence[str]) -> None:
-    """Raise :class:`CycleError` where one of the children contains the parent."""
+    """Raise :class:`CycleError` if one of the children contains the parent."""
     for child in children:
         path = _path_to(bom, child, parent, (parent,))
         if path is not None:
@@ -366,9 +366,9 @@ def _path_to(bom: Bom, here: str, goal: str, path: tuple[str, ...]) -> tuple[str
     if here == goal:
         return path
     for line in bom(here):
-        result = _path_to(bom, line.child_part_number, goal, path)
-        if result is not None:
-            return result
+        found = _path_to(bom, line.child_part_number, goal, path)
+        if found is not None:
+            return found
     return None
 
 
@@ -400,7 +400,7 @@ class FakeSilo(FakeStore):
             self._announce(STATE, {"mode": mode})
 
     def open_events(self, last_event_id: str | None = None) -> FakeStream:
-        """Return the events after ``last_event_id``; None = only what is new."""
+        """Open the stream of events after ``last_event_id``; None: only new ones."""
         self.before("open_events")
         with self._lock:
             start = len(self.log) if last_event_id is None else min(int(last_event_id), len(self.log))
@@ -467,8 +467,8 @@ class FakeSilo(FakeStore):
         values = {"schema": schema, "category": category, "item_type": item_type, **texts}
         body(ItemBody, values, "an item")
         with self._changing("create_item"):
-            said = (values, description, name, properties)
-            made = self._earlier("item", idempotency_key, said)
+            request = (values, description, name, properties)
+            made = self._earlier("item", idempotency_key, request)
             if made is not None:
                 return self.get_items_by_uuid([made])[made]
             if idempotency_key and self.get_item_by_uuid(idempotency_key) is not None:
@@ -489,7 +489,7 @@ class FakeSilo(FakeStore):
             if properties:
                 self._revise(stored, "created", properties)
             self._announce("item.created", {"part_number": item.part_number, "item_type": item_type})
-            self._keep("item", idempotency_key, said, item.id)
+            self._keep("item", idempotency_key, request, item.id)
             return stored.item
 
     def archive_item(self, part_number: str, /) -> None:
@@ -564,7 +564,7 @@ class FakeSilo(FakeStore):
             stored, before = self._stored(part_number), self._find_line(part_number, child)
             after = {**before, **given}
             if after["quantity"] != before["quantity"] or not counts_pieces(after.get("unit")):
-                # A person's quantity or unit is a person's line; a merge reports it as a conflict.
+                # If a person sets quantity or unit, the line is theirs; a merge reports it as a conflict.
                 after |= {"source": "manual", "unreferenced_since": None}
             lines = [after if line is before else line for line in stored.lines]
             self._write(stored, lines, "bom.updated", {"item": stored.item.part_number})
@@ -723,15 +723,15 @@ class FakeSilo(FakeStore):
             raise RejectedError(f"sha256: {part_number}: another content arrived than was sent")
         with self._changing("upload_file"):
             stored = self._stored(part_number, make=True)
-            said = (content, comment, properties, file_name or Path(path).name, origin)
-            made: Revision | None = self._earlier(f"upload {stored.item.id}", idempotency_key, said)
+            request = (content, comment, properties, file_name or Path(path).name, origin)
+            made: Revision | None = self._earlier(f"upload {stored.item.id}", idempotency_key, request)
             if made is not None:
                 return made
             check_base(stored, origin.base_revision if origin else None, hashlib.sha256(content).hexdigest())
             revision = self._revise(
                 stored, comment, properties, content, file_name or Path(path).name, origin
             )
-            self._keep(f"upload {stored.item.id}", idempotency_key, said, revision)
+            self._keep(f"upload {stored.item.id}", idempotency_key, request, revision)
             return revision
 
     def attach_file(

@@ -31,8 +31,9 @@ MAX_UNPACKED, MOST_CELLS = 128 * 1024 * 1024, 500_000
 
 
 def unicode_name(data: bytes) -> str | None:
-    """Return the encoding that the mark or the zeros of a file show; None for UTF-8 without a mark, and for
-    code pages."""
+    """Detect the Unicode encoding of a file by its mark or its zeros; None for UTF-8 without a mark, and for
+    code pages.
+    """
     if data.startswith(b"\xef\xbb\xbf"):
         return "utf-8-sig"
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -84,14 +85,14 @@ class Grid:
     merged: list[tuple[int, int, int, int]] = field(default_factory=list)
 
     def put(self, row: int, column: int, cell: Cell) -> None:
-        """Set a cell that says something. InputError if the sheet has more cells than a BOM can have."""
+        """Set a cell that is not empty. InputError if the sheet has more cells than a BOM can have."""
         if cell.text:
             self.cells[row, column] = cell._replace(text=" ".join(cell.text.splitlines()))
             if len(self.cells) > MOST_CELLS:
                 raise InputError(f"sheet “{self.name}” has more than {MOST_CELLS} cells, too many for a BOM")
 
     def covered(self) -> set[tuple[int, int]]:
-        """Return the cells that say something under a merged cell, where no program shows it."""
+        """Return the cells with text under a merged cell, where no program shows it."""
         covered_cells: set[tuple[int, int]] = set()
         effort = 0
         for top, left, bottom, right in self.merged:
@@ -106,7 +107,7 @@ class Grid:
         return covered_cells & self.cells.keys()
 
     def rows(self) -> list[SheetRow]:
-        """Return the rows that say something, each up to its last such cell."""
+        """Return the rows that are not empty, each up to its last cell with text."""
         by_row: dict[int, dict[int, str]] = {}
         covered = self.covered()
         for (row, column), cell in sorted(self.cells.items()):
@@ -128,7 +129,7 @@ def read_workbook(data: bytes, source: str) -> list[Grid]:
         raise InputError(f"{source}: {error}") from error
     except ImportError as error:
         raise InputError(f"{source}: this is a workbook; export it as CSV, or install xlrd") from error
-    except Exception as error:  # whatever a broken file leads a reader to
+    except Exception as error:  # any error that a broken file causes in a reader
         raise InputError(
             f"{source}: the workbook cannot be read ({error or type(error).__name__})"
         ) from error
@@ -174,9 +175,9 @@ _START, _START_1904 = datetime(1899, 12, 30), datetime(1904, 1, 1)
 
 
 def _formatted(value: float, code: str, start: datetime = _START) -> str:
-    """Return a number in full, with what its format writes before and behind it.
+    """Write a number in full, with the text that its format puts before and behind it.
 
-    A format with one more digit group, such as a fraction or a telephone number, is left out: "12".
+    A format with a second group of digits, such as a fraction or a telephone number, is ignored: "12".
     """
     before, digits, behind, percent = "", "", "", False
     for token in _TOKEN.finditer(_section(value, code.replace("General", "#"))):
@@ -201,7 +202,7 @@ def _formatted(value: float, code: str, start: datetime = _START) -> str:
 
 
 def _section(value: float, code: str) -> str:
-    """Return the part of a format that is for this value: by its conditions, else by the sign."""
+    """Choose the part of a format for this value: by its conditions, or else by the sign."""
     free: list[str] = []
     for section in (sections := _SECTION.findall(code)):
         condition = _CONDITION.search(section)
@@ -262,7 +263,7 @@ def _xlsx(read: _Read) -> Iterator[Grid]:
 
 
 def _links(read: _Read, path: str) -> dict[str, str]:
-    """Return the paths that a part of the package refers to, by their ids and by their kinds."""
+    """Read the paths to which a part of the package refers, by their ids and by their kinds."""
     folder, name = posixpath.split(path)
     links: dict[str, str] = {}
     for link in read(posixpath.join(folder, "_rels", f"{name}.rels")):
@@ -276,7 +277,7 @@ def _is_on(element: Element | None, name: str, default: str = "0") -> bool:
 
 
 def _string(item: Element) -> Cell:
-    """Return a text with all of its runs, but without phonetic hints."""
+    """Join all runs of a text, without phonetic hints."""
     text, struck = "", False
     for part in item:
         kind = part.tag.rpartition("}")[2]
@@ -306,7 +307,7 @@ def _xlsx_styles(sheet: Element) -> Iterator[_Style]:
 
 
 def _place(reference: str) -> tuple[int, int]:
-    """Return row and column of "D3"."""
+    """Return row and column of a cell such as "D3"."""
     match = re.fullmatch("([A-Z]{1,3})([1-9][0-9]{0,6})", reference.upper())
     if match is None:
         raise InputError(f"a cell stands at “{reference[:20]}”, which no sheet has")
@@ -391,7 +392,7 @@ def _ods_style(style: Element, styles: dict[tuple[str, str], Element], above: _S
 
 
 def _code(style: Element | None, styles: dict[tuple[str, str], Element]) -> str:
-    """Return a data style as the format code that Excel has for it."""
+    """Translate a data style into the format code of Excel."""
     if style is None:
         return ""
     sections = [
@@ -432,21 +433,21 @@ def _fill_ods(grid: Grid, table: Element, look: Callable[[str, str | None], _Sty
             default = row.get(f"{_TABLE}default-cell-style-name") or next(
                 iter(defaults[columns.start :][:1]), None
             )
-            said = _ods_cell(cell, cell.get(f"{_TABLE}style-name") or default, look)
+            content = _ods_cell(cell, cell.get(f"{_TABLE}style-name") or default, look)
             down, across = (_count(cell, f"number-{axis}-spanned") for axis in ("rows", "columns"))
             if down * across > 1:
                 grid.merged.append(
                     (lines.start, columns.start, lines.start + down - 1, columns.start + across - 1)
                 )
-            if said.text:
+            if content.text:
                 grid.hidden_rows.update(lines if hidden else ())
                 for here in lines:
                     for place in columns:
-                        grid.put(here, place, said)
+                        grid.put(here, place, content)
 
 
 def _ods_lines(parent: Element, kind: str, hidden: bool = False) -> Iterator[tuple[Element, bool]]:
-    """Yield the rows or columns in all groups, and whether each is hidden, filtered or collapsed."""
+    """Yield the rows or columns in all groups, each with True if it is hidden, filtered or collapsed."""
     for child in parent:
         name = child.tag.removeprefix(_TABLE)
         if name == f"table-{kind}":
@@ -488,17 +489,17 @@ def _ods_cell(cell: Element, style: str | None, look: Callable[[str, str | None]
 
 
 def _ods_text(element: Element) -> str:
-    said = re.sub(r"\s+", " ", element.text or "")
+    text = re.sub(r"\s+", " ", element.text or "")
     for child in element:
         kind = child.tag.removeprefix(_TEXT)
         if kind == "s":
-            said += " " * min(int(child.get(f"{_TEXT}c", 1)), 1000)
+            text += " " * min(int(child.get(f"{_TEXT}c", 1)), 1000)
         elif kind in ("tab", "line-break"):
-            said += " "
+            text += " "
         elif kind != "ruby-text":
-            said += _ods_text(child)
-        said += re.sub(r"\s+", " ", child.tail or "")
-    return said
+            text += _ods_text(child)
+        text += re.sub(r"\s+", " ", child.tail or "")
+    return text
 
 
 # XLS (BIFF)
@@ -549,10 +550,10 @@ def _xls(data: bytes) -> Iterator[Grid]:
 
 
 def _xls_uncalculated(stream: bytes, starts: list[int]) -> set[tuple[int, int, int]]:
-    """Return where formulas stand (sheet, row, column), if no program has calculated a single one: each is 0
-    or an empty text. ``starts``: where the sheets' records begin.
+    """Find the formulas (sheet, row, column) if no program has calculated a single one: each is 0 or an empty
+    text. ``starts``: where the sheets' records begin.
 
-    A formula has a value always, in this format; libraries that cannot calculate write one of those two.
+    In this format a formula always has a value; libraries that cannot calculate write one of these two.
     """
     places: set[tuple[int, int, int]] = set()
     at = sheet = 0

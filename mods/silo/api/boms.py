@@ -58,20 +58,20 @@ NOT_ATOMIC = "not_atomic"
 
 
 def unusual(result: MergeResult | None) -> list[str]:
-    """Return what a person must know about a merge that was not a usual one, in sentences."""
+    """List, in sentences, what a person must know about a merge that was not a usual one."""
     warnings = result.warnings if result is not None else ()
     return [warning.message for warning in warnings if warning.type in (UNCLEAR, NOT_ATOMIC)]
 
 
 def merge_result(reply: Reply) -> MergeResult | None:
-    """Return the answer to a merge, read strictly: only what says what it did counts as success.
+    """Read the answer to a merge strictly: only an answer that states what was done counts as success.
 
-    None: neither success nor failure can be read from it. Raises :class:`ServerFaultError` for an answer
-    that is a failure by its own words, whatever its status.
+    None: neither success nor failure can be read from it. Raises :class:`ServerFaultError` for an answer that
+    reports a failure, whatever its status.
     """
     if reply.is_html:
         return None
-    said = complaint(reply)
+    failure = complaint(reply)
     try:
         data = json.loads(reply.content)
     except (ValueError, RecursionError):
@@ -82,7 +82,7 @@ def merge_result(reply: Reply) -> MergeResult | None:
     if data.get("error") or data.get("success") is False or data.get("ok") is False or word in _FAILED:
         raise ServerFaultError(
             f"{reply.where.asked}: the server answered {reply.status} but reports a failure"
-            f"{': ' + said.text if said.text else ''}"
+            f"{': ' + failure.text if failure.text else ''}"
         )
     diff = data.get("diff")
     if not isinstance(diff, dict) or not _LISTS.intersection(diff) or (word and word not in _DONE):
@@ -99,13 +99,15 @@ _LISTS = {"added", "removed", "quantity_changed", "unchanged"}
 
 
 def result_of(diff: BomDiff, part_number: str, request: MergeRequest) -> MergeResult:
-    """Return the answer of spec §5 for a planned merge."""
+    """Make the answer of spec §5 for a planned merge."""
     left_out = [part.model_dump() for part in request.left_out or ()]
     return MergeResult.model_validate(answer_of(diff, part_number, request.sync_id, left_out))
 
 
 def read_back(api: BomCalls, part_number: str, request: MergeRequest, host: str) -> MergeResult:
-    """Return the result of a merge whose answer says neither success nor failure, as the BOM shows it."""
+    """Read the BOM again after a merge whose answer says neither success nor failure, and make the result
+    from it. Raises :class:`ServerFaultError` if the BOM does not show the merge.
+    """
     sent = f"{host}: the BOM of {part_number} was sent, but the answer was not understood"
     if request.dry_run:
         raise ServerFaultError(f"{sent}; nothing was to be changed")
@@ -133,16 +135,16 @@ def read_back(api: BomCalls, part_number: str, request: MergeRequest, host: str)
 def without_manual(
     api: BomCalls, part_number: str, request: MergeRequest, merge: Callable[[MergeRequest], MergeResult]
 ) -> MergeResult | None:
-    """Merge all but the children that people own; None where there are none. For a server that answers 409.
+    """Merge all children but those that people own; None if people own none. For a server that answers 409.
 
-    Those are reported as conflicts where the quantities differ.
+    The children of people are reported as conflicts if the quantities differ.
     """
     manual = {line.child_part_number.casefold(): line for line in api.get_bom(part_number) if is_manual(line)}
-    left = [entry for entry in request.entries if _key(entry) in manual]
-    if not left:
+    manual_entries = [entry for entry in request.entries if _key(entry) in manual]
+    if not manual_entries:
         return None
-    rest = [entry for entry in request.entries if _key(entry) not in manual]
-    result = merge(request.model_copy(update={"entries": rest}))
+    others = [entry for entry in request.entries if _key(entry) not in manual]
+    result = merge(request.model_copy(update={"entries": others}))
     marked = {warning.part_number.casefold() for warning in result.warnings if warning.type == "conflict"}
     warnings = [
         MergeWarning.model_validate(
@@ -150,7 +152,7 @@ def without_manual(
                 QuantityChange(entry.child_part_number, entry.quantity, line.quantity, line.unit or "")
             )
         )
-        for entry in left
+        for entry in manual_entries
         if not says_the_same(entry.quantity, (line := manual[_key(entry)]).quantity, line.unit)
         and _key(entry) not in marked
     ]
@@ -160,9 +162,9 @@ def without_manual(
 def merge_by_lines(
     api: BomCalls, part_number: str, request: MergeRequest, host: str, *, cancelled: Cancel | None = None
 ) -> MergeResult:
-    """Return the merge as single calls. Raises :class:`RejectedError` with all children that were refused.
+    """Merge with one call for each line. Raises :class:`RejectedError` with all children that were refused.
 
-    Raises :class:`RouteMissingError` where the server has no calls for single lines either.
+    Raises :class:`RouteMissingError` if the server has no calls for single lines either.
     """
     lines = api.get_bom(part_number)
     plan = plan_merge([entry.model_dump() for entry in request.entries], lines)
@@ -192,7 +194,9 @@ def merge_by_lines(
 
 
 def _try(refused: list[str], child: str, call: Callable[[], object]) -> None:
-    """Collect what concerns this line alone; all else ends the run, and the next one continues from there."""
+    """Collect an error that concerns this line alone; any other error ends the run, and the next run
+    continues there.
+    """
     try:
         call()
     except (CycleError, RouteMissingError):
@@ -242,9 +246,9 @@ class BomCalls(Caller):
     def get_boms(
         self, part_numbers: Iterable[str], /, *, cancelled: Cancel | None = None
     ) -> dict[str, list[BomLine]]:
-        """Return the BOM lines directly below each of these items; items that are not known are left out.
+        """Return the BOM lines directly below each of these items; unknown items are left out.
 
-        One request per 1000 where the server offers that, else one each.
+        Sends one request per 1000 items if the server offers that, else one for each.
         """
 
         def batch(some: Sequence[str]) -> dict[str, list[BomLine]]:
@@ -264,7 +268,7 @@ class BomCalls(Caller):
         return self._many("boms", part_numbers, batch, single, cancelled)
 
     def get_summary(self, part_number: str, /) -> ProductSummary | None:
-        """Return what the server keeps of a product over all levels; None from a server that keeps nothing.
+        """Return the summary that the server keeps of a product over all levels; None if it keeps none.
 
         Raises :class:`BusyError` while the server sums up a very large product.
         """
@@ -276,7 +280,7 @@ class BomCalls(Caller):
 
     def get_changes(self, part_number: str, since: str, until: str = "", /) -> ProductChanges:
         """Return what changed in a product over all levels between two points: days, times, ``r3`` or
-        released revisions; ``until`` "": now. Raises :class:`RouteMissingError` from a server that compares
+        released revisions; ``until`` "" means now. Raises :class:`RouteMissingError` if the server compares
         nothing.
         """
         query = {"from": since, **({"to": until} if until else {})}
@@ -284,7 +288,8 @@ class BomCalls(Caller):
         return self._get(*where, params=query).model(ProductChanges)
 
     def get_order(self, part_number: str, /, **asked: str | int) -> OrderList:
-        """Return what to order for so many ``pieces``; with ``spares``, of a ``release``, only the ``rest``.
+        """Return what to order for a number of ``pieces``. Options: ``spares``, a ``release``, only the
+        ``rest``.
 
         Raises :class:`RouteMissingError` from a server without order lists.
         """
@@ -292,12 +297,14 @@ class BomCalls(Caller):
         return self._get(*where, params=asked).model(OrderList)
 
     def get_order_table(self, part_number: str, end: str, /, **asked: str | int) -> bytes:
-        """Return the same as a table, ``csv`` or ``xlsx``: the parts of a ``kind``, or of a ``supplier``."""
+        """Return the order list as a file, ``csv`` or ``xlsx``: the parts of a ``kind``, or of a
+        ``supplier``.
+        """
         where = (f"the order list of {part_number}", "items", part_number, f"order.{end}")
         return self._get(*where, params=asked).content
 
     def get_bom_version(self, part_number: str, /) -> str | None:
-        """Return the version of the BOM as it is now, for ``if_match``; None if the server keeps none."""
+        """Return the present version of the BOM, for ``if_match``; None if the server keeps none."""
         return self._get(f"the BOM of {part_number}", *_bom(part_number)).version()
 
     def merge_bom(
@@ -311,15 +318,16 @@ class BomCalls(Caller):
     ) -> MergeResult:
         """Merge an assembly's direct children into its BOM (spec §5).
 
-        With a ``sync_id`` the request is repeated when the way breaks: the server gives its first answer.
+        With a ``sync_id`` the request is repeated if the connection breaks; the server then repeats its first
+        answer.
 
-        A server without merge gets the plan as single calls (:mod:`silo.api.boms`); one that refuses lines
-        of people gets the others.
+        A server without merge gets the plan as single calls (:mod:`silo.api.boms`). A server that refuses
+        lines of people gets only the others.
 
-        Raises :class:`NotFoundError` for an unknown assembly but :class:`RouteMissingError` for a server
-        that knows neither merge nor single lines, :class:`RejectedError` with all bad entries,
+        Raises :class:`NotFoundError` for an unknown assembly but :class:`RouteMissingError` for a server that
+        knows neither merge nor single lines, :class:`RejectedError` with all bad entries,
         :class:`CycleError`, :class:`ServerFaultError` for an answer that reports a failure or that the BOM
-        does not bear out, :class:`VersionConflictError` for ``if_match``, :class:`NewerRevisionError` and
+        contradicts, :class:`VersionConflictError` for ``if_match``, :class:`NewerRevisionError` and
         :class:`MissingRevisionError` for a ``document`` that is not the newest file or not there,
         :class:`ReadOnlyError`.
         """
@@ -399,7 +407,7 @@ class BomCalls(Caller):
         return self._change("PUT", subject, *_bom(part_number), child, body=line).model(BomLine)
 
     def remove_bom_line(self, part_number: str, child: str, /) -> None:
-        """Remove a line: what a person decides, a merge never does."""
+        """Remove a line. A person decides this; a merge never removes one."""
         self._delete(f"{child} on the BOM of {part_number}", *_bom(part_number), child)
 
     def _what_is_missing(self, part_number: str, error: NotFoundError) -> NotFoundError:
@@ -415,7 +423,7 @@ class BomCalls(Caller):
 
 
 def _checked(part_number: str, lines: list[BomLine]) -> list[BomLine]:
-    """Return the lines; :class:`ServerFaultError` if they say that they are another item's."""
+    """Return the lines. Raises :class:`ServerFaultError` if they belong to another item."""
     for line in lines:
         if line.parent_part_number and line.parent_part_number.casefold() != part_number.strip().casefold():
             raise ServerFaultError(

@@ -141,20 +141,22 @@ class ItemCalls(FileCalls):
     def get_items_by_uuid(
         self, uuids: Iterable[str], /, *, cancelled: Cancel | None = None
     ) -> dict[str, Item]:
-        """Return the items of these identities, by the identity as it was given; unknown ones are left out.
+        """Return the items of these identities, each under the identity as it was given; unknown ones are
+        left out.
 
-        One request per 1000 where the server offers the batch look-up, else a bounded pool of single ones.
+        Sends one request per 1000 items if the server offers the batch look-up, else single ones from a
+        bounded pool.
         """
 
         def batch(some: Sequence[str]) -> dict[str, Item]:
             where = (f"{len(some)} items", "items", "by-uuid")
             reply = self._ask(*where, uuids=list(some), cancelled=cancelled)
             if reply.is_null(*LISTS):
-                # Go's empty list, or no answer. Read as "not registered" it would have all registered again.
+                # Go's empty list, or no answer. As "not registered", it would make people register again.
                 raise RejectedError(f"{len(some)} items: the answer is null")
             models = {_written(item.id): item for item in reply.models(Item, *LISTS)}
             if reply.next or reply.total > len(models):
-                # Read as "not registered", the items of the other pages would be made once more.
+                # Taken as "not registered", the items of the other pages would be made once more.
                 raise RejectedError(f"{len(some)} items: the answer has {len(models)}, and is not the whole")
             return {uuid: models[_written(uuid)] for uuid in some if _written(uuid) in models}
 
@@ -175,7 +177,7 @@ class ItemCalls(FileCalls):
         return self._get(f"item {part_number}", "items", part_number).model(Item)
 
     def thumbnail(self, part_number: str, /) -> bytes | None:
-        """Return the picture of an item as PNG; None if there is none, or the server keeps none."""
+        """Return the picture of an item as PNG; None if the item has none or the server keeps none."""
         try:
             return self._get(f"the picture of {part_number}", "items", part_number, "thumbnail").content
         except (NotFoundError, RejectedError, ServerFaultError):
@@ -184,7 +186,7 @@ class ItemCalls(FileCalls):
     def search_items(
         self, query: str = "", *, item_type: str | None = None, limit: int = 50, offset: int = 0
     ) -> list[Item]:
-        """Return items that fit the words; without words all, page by page."""
+        """Return the items that fit the words, page by page; all items if there are no words."""
         params: dict[str, str | int] = {"limit": limit, "offset": offset}
         if item_type:
             params["item_type"] = item_type
@@ -217,7 +219,8 @@ class ItemCalls(FileCalls):
         texts
             the fields of :class:`silo.api.wire.ItemTexts`.
 
-        ``idempotency_key``, a new UUID, makes a repeat give the first one's item where the server honours it.
+        ``idempotency_key``, a new UUID, makes a repeated request return the item of the first, if the server
+        supports it.
         """
         values = {
             "schema": schema,
@@ -246,21 +249,22 @@ class ItemCalls(FileCalls):
         return item
 
     def _made(self, reply: Reply) -> Item:
-        """Return the item of an answer to its creation, bare or wrapped; else asked for by its number."""
-        said = reply.data()
+        """Read the new item from the answer to its creation, bare or wrapped; if it is not there, get it by
+        its number.
+        """
+        data = reply.data()
         for wrapped in ("item", "data", "result"):
-            if isinstance(said, dict) and "id" not in said and isinstance(said.get(wrapped), dict):
-                said = said[wrapped]
-        if isinstance(said, dict) and isinstance(said.get("part_number"), str) and "id" not in said:
-            return self.get_item(said["part_number"])
+            if isinstance(data, dict) and "id" not in data and isinstance(data.get(wrapped), dict):
+                data = data[wrapped]
+        if isinstance(data, dict) and isinstance(data.get("part_number"), str) and "id" not in data:
+            return self.get_item(data["part_number"])
         with translated(reply.where):
-            return Item.model_validate(said)
+            return Item.model_validate(data)
 
     def get_properties(self, part_number: str, /) -> dict[str, Any]:
-        """Return all properties of an item, from its newest revision where the item's own answer carries
-        none.
+        """Return all properties of an item; those of its newest revision if the item's own answer has none.
 
-        Raises :class:`silo.bom.errors.ServerFaultError` where they cannot be read: no answer is not "none".
+        Raises :class:`silo.bom.errors.ServerFaultError` if they cannot be read: no answer is not "none".
         """
         item = self.get_item(part_number)
         if item.properties:
@@ -298,11 +302,11 @@ class ItemCalls(FileCalls):
         return reply.model(Item)
 
     def archive_item(self, part_number: str, /) -> None:
-        """Put an item out of use; the server keeps it, and what names it."""
+        """Archive an item; the server keeps it, and everything that refers to it."""
         self._delete(f"item {part_number}", "items", part_number)
 
     def generate_part_number(self, schema: str, category: str) -> str:
-        """Return the number that the next item of this category would get: a preview, nothing is reserved."""
+        """Return the number that the next item of this category would get. Reserves nothing."""
         wanted = {"schema": schema, "category": category}
         reply = self._change("POST", f"a number in {category}", "generate-part-number", body=wanted)
         return reply.model(NumberAnswer).part_number
@@ -312,9 +316,9 @@ class ItemCalls(FileCalls):
         return self._get(f"schema {name}", "schemas", name).mapping()
 
     def find_schema(self, wanted: str = "kindred-rd") -> str:
-        """Return the name of the part-number schema to use: the wanted one, else the server's only one.
+        """Find the name of the part-number schema to use: the wanted one, else the server's only one.
 
-        Raises :class:`InputError` that lists the schemas where there are several others, or none.
+        Raises :class:`InputError` that lists the schemas if there are several others, or none.
         """
         if wanted in self.abilities.schemas:
             return self.abilities.schemas[wanted]
@@ -330,10 +334,10 @@ class ItemCalls(FileCalls):
 
     def _only_schema(self, wanted: str, missing: NotFoundError) -> str:
         try:
-            said = self._get("its schemas", "schemas").data()
+            data = self._get("its schemas", "schemas").data()
         except NotFoundError:
             raise missing from None
-        names = schema_names(said)
+        names = schema_names(data)
         if len(names) == 1:
             return names[0]
         host = self._address.host
@@ -345,7 +349,7 @@ class ItemCalls(FileCalls):
         ) from missing
 
     def categories(self, name: str = "kindred-rd") -> Categories:
-        """Return the categories of a schema: code → description, in the schema's order, with the site's
+        """Return the categories of a schema (code → description, in the schema's order) with the site's
         rules.
         """
         schema = self.get_schema(name)
@@ -355,9 +359,9 @@ class ItemCalls(FileCalls):
     def find_look_alikes(
         self, wanted: Iterable[tuple[str, str]], /, *, cancelled: Cancel | None = None
     ) -> dict[tuple[str, str], list[LookAlike]]:
-        """Return the items that have a component's name or its file, by (name, SHA-256 of the file or "").
+        """Find the items with a component's name or file, by (name, SHA-256 of the file or "").
 
-        One request per 1000 where the server offers that, else searches for each.
+        Sends one request per 1000 components if the server offers that, else searches for each.
         """
 
         def batch(some: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[LookAlike]]:
@@ -373,7 +377,7 @@ class ItemCalls(FileCalls):
 
     def _look_alikes(self, wanted: tuple[str, str]) -> list[LookAlike]:
         name, digest = wanted
-        # A server that does not search by content finds nothing; what has the name is compared anyway.
+        # A server that does not search by content finds nothing; items with the name are compared anyway.
         with_file = self.search_items(digest, limit=4) if digest else []
         matches = []
         for item in {part.id: part for part in (*with_file, *self.search_items(name, limit=8))}.values():
@@ -459,7 +463,7 @@ class SiloClient(ItemCalls, BomCalls):
         self.close()
 
     def close(self) -> None:
-        """Give the connections back, and keep what was learned about the server."""
+        """Close the connections, and save what was learned about the server."""
         if self._memory is not None and self.abilities != self._known_before:
             save_abilities(self._memory, self.base_url, self.abilities)
         self._transport.close()
@@ -470,19 +474,20 @@ class SiloClient(ItemCalls, BomCalls):
         return self._address.web_root
 
     def web_url(self, path: str, /) -> str:
-        """Return the full address of a page such as ``resolve_url``; :class:`InputError` for another
-        server's.
+        """Return the full address of a page such as ``resolve_url``. :class:`InputError` for a page of
+        another server.
         """
         return self._address.web(path)
 
     def whoami(self) -> User:
-        """Return who the token belongs to; raises :class:`silo.bom.errors.AuthError` if it is not
-        accepted.
+        """Return the user to whom the token belongs; raises :class:`silo.bom.errors.AuthError` if the server
+        does not accept it.
         """
         return self._get("who we are", "auth", "me").model(User)
 
     def begin_login(self, program: str) -> BrowserLogin | None:
-        """Return what lets this program in by the browser; None if the server has no page for it.
+        """Make a secret and the page on which a person lets this program in; None if the server has no such
+        page.
 
         The page shows the program and this computer. The program makes the secret itself, and the browser
         carries only its SHA-256.
@@ -497,8 +502,8 @@ class SiloClient(ItemCalls, BomCalls):
 
     @property
     def keeps_item_ids(self) -> bool:
-        """Return True if the server says that a new item gets the UUID that we propose, or was seen to do
-        it.
+        """Return True if the server says, or has shown, that a new item gets the UUID that we propose. Asks
+        once.
         """
         if not self.abilities.keeps_item_ids and not self._asked_for_item_ids:
             self._asked_for_item_ids = True
@@ -507,7 +512,7 @@ class SiloClient(ItemCalls, BomCalls):
         return self.abilities.keeps_item_ids
 
     def ready(self) -> ServerState:
-        """Return whether the server takes changes: ``normal``, ``read-only`` or ``degraded``."""
+        """Ask if the server takes changes: ``normal``, ``read-only`` or ``degraded``."""
         call = ApiCall("GET", f"{self._address.web_root}/ready", "/ready", repeatable=False)
         with self._transport.opened(call) as response:
             reply = self._transport.reply(response, call)
@@ -516,8 +521,8 @@ class SiloClient(ItemCalls, BomCalls):
 
     def modules(self) -> list[str]:
         """Return the names of the server's modules that are on."""
-        said = self._get("its modules", "modules").mapping()
-        data = said.get("modules", said)
+        answer = self._get("its modules", "modules").mapping()
+        data = answer.get("modules", answer)
         if isinstance(data, dict):
             return [name for name, on in data.items() if not isinstance(on, dict) or on.get("enabled", True)]
         return [
@@ -532,10 +537,10 @@ class SiloClient(ItemCalls, BomCalls):
     def events(
         self, last_event_id: str | None = None, *, cancelled: Cancel | None = None
     ) -> Iterator[ServerEvent]:
-        """Yield the events from one connection, heartbeats included, until the server ends it.
+        """Yield the events of one connection, heartbeats included, until the server ends it.
 
-        ``last_event_id`` replays what came after. ``cancelled`` is looked at with each event.
-        Raises :class:`silo.bom.errors.UnreachableError` when the stream falls silent or breaks.
+        ``last_event_id``: the server sends the events after it again. ``cancelled`` is checked at each event.
+        Raises :class:`silo.bom.errors.UnreachableError` if the stream stops or breaks.
         """
         with closing(self.open_events(last_event_id)) as stream:
             for event in stream:

@@ -41,28 +41,27 @@ Origin = tuple[str, str, int]
 
 
 def origin_of(url: str) -> Origin:
-    """Return (scheme, host, port) of an absolute URL, lower case, the port always given.
+    """Return (scheme, host, port) of an absolute URL, in lower case, always with the port.
 
-    Raises :class:`ConfigError` where it is no http(s) URL.
+    Raises :class:`ConfigError` if it is no http(s) URL.
     """
     parts = _http(url)
     return (parts.scheme, parts.hostname or "", parts.port or _DEFAULT_PORTS[parts.scheme])
 
 
 def may_carry_token(sender: Origin, receiver: Origin) -> bool:
-    """Return True if a redirect from one to the other may take the token along.
+    """Return True if a redirect from ``sender`` to ``receiver`` may take the token along.
 
-    Only the same server, or its own http → https upgrade on the standard ports.
+    True only for the same server, and for its own http → https upgrade on the standard ports.
     """
     upgrade = sender[0] == "http" and sender[2] == 80 and receiver == ("https", sender[1], 443)
     return sender == receiver or upgrade
 
 
 def canonical(url: str) -> str:
-    """Return one spelling for all addresses of one server: what waits for it is found again under any of
-    them.
+    """Return the one spelling of all addresses of a server, by which the outbox finds what waits for it.
 
-    Text that is no address is given back as it is.
+    A text that is no address is returned unchanged.
     """
     try:
         address = ServerAddress.parse(url)
@@ -84,11 +83,11 @@ class ServerAddress:
     def parse(cls, text: str) -> ServerAddress:
         """Read an address as a person writes it; raises :class:`ConfigError` with what to write instead.
 
-        All spellings of one address give the same: capitals in the host, the scheme's own port, slashes at
-        the end or doubled. What waits for a server is found by this form.
+        All spellings of one address give the same value: capitals in the host, the scheme's own port, slashes
+        at the end or doubled. The outbox finds what waits for a server by this form.
         """
         text = text.strip()
-        # So people type the server on their own computer; elsewhere a scheme is not guessed.
+        # People type a server on their own computer without a scheme; for any other it is not guessed.
         here = re.match(r"(localhost|127\.[\d.]+|\[::1\])(:\d+)?(/|$)", text, re.IGNORECASE)
         text = f"http://{text}" if here else text
         parts = _http(text)
@@ -114,12 +113,12 @@ class ServerAddress:
 
     @property
     def is_loopback(self) -> bool:
-        """Return True for this computer itself."""
+        """Return True if the address is this computer."""
         name = self.origin[1]
         return name in _LOOPBACK or name.startswith("127.")
 
     def api(self, *segments: str) -> str:
-        """Return the URL of an API path; each segment is quoted whole, also a part number with a slash."""
+        """Return the URL of an API path; each segment is quoted, also the slash in a part number."""
         for text in segments:
             # Every HTTP library resolves "." and "..": such a part number would ask for something else.
             if not text.strip(".") or not text.strip():
@@ -129,8 +128,8 @@ class ServerAddress:
         return "/".join((self.api_root, *(quote(text, safe="") for text in segments)))
 
     def web(self, path: str) -> str:
-        """Return the full URL of a page such as ``resolve_url``; raises :class:`InputError` for another
-        server's.
+        """Return the full URL of a page such as ``resolve_url``. Raises :class:`InputError` for a page of
+        another server.
         """
         url = urljoin(self.web_root + "/", path) if path.startswith(("http:", "https:", "//")) else None
         if url is None:
@@ -141,7 +140,7 @@ class ServerAddress:
 
 
 def _http(url: str) -> SplitResult:
-    """Return the parts of any http(s) URL."""
+    """Split an http(s) URL. Raises ConfigError if it is none, or if it holds a user name."""
     try:
         parts = urlsplit(url)
         port_is_valid = parts.port is None or parts.port > 0
@@ -194,10 +193,10 @@ def resolve_server(
     env: Mapping[str, str] = os.environ,
     path: Path | None = None,
 ) -> ServerSettings:
-    """Find server and token; raises :class:`ConfigError` that says how to get one where there is none.
+    """Find server and token; raises :class:`ConfigError` that says how to get one if there is none.
 
-    A token in the file belongs to the server in the file: it is not sent to another one that an option or the
-    environment names.
+    A token in the file belongs to the server in the file: it is not sent to another server that an option or
+    the environment names.
     """
     path = path or config_path(env)
     for option, given in (("--server", server), ("--token", token)):
@@ -221,7 +220,7 @@ def resolve_server(
 
 
 def load_config(path: Path) -> dict[str, Any]:
-    """Return the whole file as TOML tables; empty where there is none."""
+    """Read the whole file as TOML tables; {} if there is no file."""
     try:
         with path.open("rb") as file:
             if MODES_COUNT and os.fstat(file.fileno()).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
@@ -241,7 +240,7 @@ def save_config(
     path: Path | None = None,
     env: Mapping[str, str] = os.environ,
 ) -> Path:
-    """Remember server and token. Gives the file's path (mode 0600).
+    """Save server and token in the file (mode 0600), and return its path.
 
     Raises :class:`ConfigError` for a file that holds anything else, which stays as it is.
     """
@@ -254,7 +253,7 @@ def save_config(
     text = "\n".join(["[server]", *lines, ""]).replace("\x7f", "\\u007f")
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        # The new file is its owner's alone before a byte of the token is in it.
+        # Only its owner can read the new file before a byte of the token is in it.
         with replacing(path) as file:
             file.write(text.encode())
     except OSError as error:
@@ -265,7 +264,9 @@ def save_config(
 
 
 def checked_config(path: Path) -> dict[str, Any]:
-    """Return the file's tables; ConfigError, with the lines, where a key or a table means nothing to us."""
+    """Read the file's tables. ConfigError lists, with their lines, all keys and tables that we do not
+    know.
+    """
     config = load_config(path)
     problems = []
     for name, value in config.items():
@@ -291,7 +292,7 @@ def _hint(name: str, names: Sequence[str]) -> str:
 
 
 def _line(path: Path, name: str) -> int:
-    """Return where a key or a table is first named; TOML's reader does not say."""
+    """Return the line that first names a key or a table; TOML's reader does not tell it."""
     begins = re.compile(rf"""\s*\[*\s*["']?{re.escape(name)}["']?\s*[.=\]]""")
     lines = path.read_text(encoding="utf-8").splitlines()
     return next((number for number, line in enumerate(lines, start=1) if begins.match(line)), 1)
@@ -307,25 +308,25 @@ def _text(table: Mapping[str, Any], key: str, path: Path) -> str | None:
 def first_of(
     *candidates: tuple[Source, str | Callable[[], str | None] | None],
 ) -> tuple[str | None, Source | None]:
-    """Return the first setting that says anything, and who said so; a callable is asked when its turn
-    comes.
+    """Return the first setting that is not empty, and its source. Calls a callable only if nothing before it
+    is set.
     """
     for source, value in candidates:
-        said = value() if callable(value) else value
-        if said is not None and said.strip():
-            return said.strip(), source
+        setting = value() if callable(value) else value
+        if setting is not None and setting.strip():
+            return setting.strip(), source
     return None, None
 
 
 def same_server(url: str, other: str | None) -> bool:
-    """Return True if two addresses, as people write them, mean one server: a token for one is for the
+    """Return True if two addresses, as people write them, are one server; a token for one is valid for the
     other.
     """
     if not url or not other:
         return False
     try:
         return ServerAddress.parse(url).origin == ServerAddress.parse(other).origin
-    except InputError:  # an address that is none has no token
+    except InputError:  # a text that is no address has no token
         return False
 
 
@@ -339,9 +340,9 @@ def _verify(option: bool | str | None, variable: str | None, stored: Any, path: 
 
 
 def verify_of(source: str, text: str) -> bool | str:
-    """Return how certificates are checked: yes, no, or the path of a file. ConfigError, naming ``source``."""
-    if (said := yes_or_no(text)) is not None:
-        return said
+    """Return how to check certificates: yes, no, or the path of a file. ConfigError names ``source``."""
+    if (checked := yes_or_no(text)) is not None:
+        return checked
     if not Path(text).expanduser().exists():
         raise ConfigError(
             f"{source}: wanted true, false or a file with certificate authorities; {text} is not a file"
@@ -374,7 +375,7 @@ class Pause:
     told: bool = False
 
     def left(self, now: float) -> float:
-        """Return seconds that are left, 0 if it is over."""
-        # One that is longer than any that we make was noted before the clock was set back.
+        """Return how many seconds of the pause remain; 0 if it is over."""
+        # A pause that is longer than any of ours was noted before the clock was set back.
         left = self.until - now
         return left if 0 < left <= LONGEST_TOLD or math.isinf(left) else 0.0

@@ -120,7 +120,7 @@ class SseParser:
         self.last_event_id: str | None = None
 
     def feed(self, chunk: bytes) -> list[ServerEvent]:
-        """Return the events that this piece completes."""
+        """Take a piece of the stream, and return the events that it completes."""
         searched = max(0, len(self._buffer) - 1)
         self._buffer += self._normal(self._without_mark(chunk))
         events: list[ServerEvent] = []
@@ -149,7 +149,7 @@ class SseParser:
         return chunk
 
     def _normal(self, chunk: bytes) -> bytes:
-        # A CR ends its line at once; a LF right after it, be it in the next piece, belongs to it.
+        # A CR ends its line at once; a LF directly after it belongs to it, even if it is in the next piece.
         if not chunk:
             return b""  # An empty piece says nothing of what follows the CR.
         if self._after_cr:
@@ -159,7 +159,7 @@ class SseParser:
 
 
 def read_block(block: bytes) -> ServerEvent | None:
-    """Return the event of one block of lines; None for a comment or a block without data."""
+    """Read the event in one block of lines; None for a comment or a block without data."""
     name, lines = "", list[str]()
     for line in block.decode("utf-8", "replace").split("\n"):
         field_, _, value = line.partition(":")
@@ -237,7 +237,9 @@ class HttpEventStream:
 
     @property
     def last_event_id(self) -> str | None:
-        """Return the id to resume from: of the last event, or of a bare mark that the server set."""
+        """Return the id from which to resume: that of the last event, or of a mark that the server sent
+        alone.
+        """
         return self._parser.last_event_id
 
     def __iter__(self) -> Iterator[ServerEvent]:
@@ -323,7 +325,7 @@ _Told = TypeVar("_Told")
 
 
 def _number(marker: str | None) -> int:
-    # Servers count; where one does not, its markers have no order and none is "before" another.
+    # Servers count; if one does not, its markers have no order and none is "before" another.
     number = whole_number(marker or "", 29)
     return -1 if number is None else number
 
@@ -348,7 +350,7 @@ class EventSource(Protocol):
 
 
 def _kind(pause: Pause) -> Connection:
-    """Return the state of the connection in a pause."""
+    """Return the state that the connection has during a pause."""
     return {AuthError.code: Connection.REFUSED, ConfigError.code: Connection.REFUSED}.get(
         pause.code, Connection.OFFLINE
     )
@@ -414,14 +416,14 @@ class EventListener:
 
     @property
     def last_event_id(self) -> str | None:
-        """Return where the next connection resumes."""
+        """Return the id from which the next connection resumes."""
         return self._last_id
 
     def start(self) -> None:
-        """Begin; also after :meth:`stop`. Does nothing while it runs."""
+        """Start listening; also after :meth:`stop`. Does nothing while it runs."""
         if self._thread is not None and self._thread.is_alive() and not self._stop.is_set():
             return
-        # A thread that is still on its way out keeps the old flags, and can call nobody any more.
+        # A thread that is about to end keeps the old flags, and can no longer call anybody.
         flags = self._stop, self._wake = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, args=flags, name="silo-events", daemon=True)
         self._thread.start()
@@ -431,7 +433,9 @@ class EventListener:
         self._wake.set()
 
     def stop(self, timeout: float = 2.0) -> None:
-        """End. Returns within ``timeout`` seconds even where a connection hangs; no callback comes after."""
+        """Stop listening. Returns within ``timeout`` seconds even if a connection hangs; no callback comes
+        after.
+        """
         self._stop.set()
         self._wake.set()
         with self._lock:
@@ -460,7 +464,7 @@ class EventListener:
                 self._listen(stop, heard)
                 reason = "the server ended the connection"
             except RejectedError as error:
-                # The mark is another server's; without it there is a gap, which a reset says.
+                # The mark is another server's; without it there is a gap, which a reset reports.
                 reason = str(error)
                 self._forget_mark(stop)
             except SiloError as error:
@@ -475,12 +479,12 @@ class EventListener:
                     self._rest(stop, wake, _kind(waited), waited.reason, round(waited.until - now, 3))
                     continue
                 reason, answer = str(error), told_wait(error)
-                # A proxy answers with a page of its own while the server behind it starts.
+                # A proxy answers with its own page while the server behind it starts.
                 if isinstance(error, RouteMissingError) and not isinstance(error, WebPageError):
                     kind, answer = Connection.UNSUPPORTED, SELDOM
                 elif isinstance(error, AuthError):
                     kind, answer = Connection.REFUSED, SELDOM
-            # Only what was really received counts as success: a server that greets and drops us is not up.
+            # Only received events count as success: a server that greets us and then drops us is not up.
             failures = 1 if heard.anything else failures + 1
             self._rest(stop, wake, kind, reason, self._backoff.pause(failures, self._chance(), answer))
 
@@ -520,7 +524,7 @@ class EventListener:
             self._adopt(stop, stream.last_event_id)
 
     def _go_well(self) -> None:
-        """End the pause when the server answers, unless it named the time or takes no changes."""
+        """End the pause when the server answers, unless the server named its end or takes no changes."""
         pause = self._pauses.get()
         if pause is not None and not pause.told and self.state.kind is not Connection.READ_ONLY:
             self._pauses.set(None)
@@ -529,7 +533,7 @@ class EventListener:
         try:
             return _MODES.get(self._api.ready().mode, Connection.ONLINE)
         except SiloError:
-            # The stream stands, so the server is there; that is enough to say so.
+            # The stream is open, so the server is there.
             return Connection.ONLINE
 
     def _take(self, stop: threading.Event, event: ServerEvent) -> None:
@@ -572,5 +576,5 @@ class EventListener:
             try:
                 callback(value)
             except Exception:
-                # Whatever a callback does, the connection must live on.
+                # The connection must go on, whatever a callback does.
                 log.exception("an error in the receiver of server events; the connection stays open")

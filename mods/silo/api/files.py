@@ -72,11 +72,11 @@ class Standing:
 
     @property
     def base_number(self) -> int:
-        """Return the base's number; -1 where it is not known, so that any revision is newer."""
+        """Return the base's number; -1 if it is not known, so that any revision is newer."""
         return self.base.revision_number if self.base is not None else -1
 
     def check(self, part_number: str) -> None:
-        """Raise NewerRevisionError where committing the file would undo a newer revision."""
+        """Raise NewerRevisionError if committing the file would undo a newer revision."""
         if (newest := self.newer) is None:
             return
         made = (
@@ -92,18 +92,18 @@ class Standing:
 
 
 def has_file(revision: Revision) -> bool:
-    """Return True for a revision with a file; the others only change properties."""
+    """Return True if the revision has a file; a revision without one only changes properties."""
     return bool(revision.file_checksum or revision.file_name or revision.file_key or revision.file_size)
 
 
 def standing(
-    revisions: Iterable[Revision], origin: str, checksum: int | None = None, seen: str = ""
+    revisions: Iterable[Revision], origin: str, known: int | None = None, seen: str = ""
 ) -> Standing:
-    """Return how a file that was made from ``origin`` (a SHA-256) stands.
+    """Compare a file that was made from ``origin`` (a SHA-256) with the revisions of its item.
 
     known
-        the number of that revision, for a server that keeps no checksums. Else the checksum decides: a server
-        that was restored from a backup gives the same numbers to other files.
+        the number of that revision, for a server that keeps no checksums. Otherwise the checksum decides,
+        since a server that was restored from a backup gives the same numbers to other files.
     seen
         the newest revision that a person has seen and decided about: its number and its checksum.
     """
@@ -112,7 +112,7 @@ def standing(
         r
         for r in files
         if seen == seen_as(r.revision_number, r.file_checksum)
-        or (checksum_of(r) == origin if checksum_of(r) else r.revision_number == checksum)
+        or (checksum_of(r) == origin if checksum_of(r) else r.revision_number == known)
     ]
     base = max(mine, key=lambda r: r.revision_number, default=None)
     return Standing(base, files[-1] if files else None)
@@ -124,15 +124,15 @@ def newest_number(revisions: Iterable[Revision]) -> int:
 
 
 def is_newest(sha256: str, revisions: Iterable[Revision]) -> bool:
-    """Return True if the newest revision is this very file. An older one does not count: a person may go
-    back.
+    """Return True if the newest revision is this very file. An older one does not count: a person may go back
+    to it.
     """
     newest = max(revisions, key=lambda revision: revision.revision_number, default=None)
     return newest is not None and checksum_of(newest) == sha256
 
 
 def other_name(path: str, revisions: Iterable[Revision]) -> str:
-    """Return the name of the item's newest file, where this one is called otherwise; "" if it is not.
+    """Return the name of the item's newest file if ``path`` has another name; "" if it has the same.
 
     "Save As" copies the identity along.
     """
@@ -150,7 +150,7 @@ REPACKED = (".kc",)
 
 
 def is_there(revisions: Iterable[Revision], file_name: str, sha256: str, number: int | None) -> bool:
-    """Return True if a file that became revision ``number`` is among these. The checksum decides where it is
+    """Return True if a file that became revision ``number`` is among these. The checksum decides if it is
     that of the file as it was sent; a revision without a file decides nothing.
     """
     by_number = Path(file_name).suffix.lower() in REPACKED
@@ -171,10 +171,10 @@ def download_revision(
     *,
     cancelled: Cancel | None = None,
 ) -> str:
-    """Fetch a revision's file to ``path``; gives its SHA-256.
+    """Download a revision's file to ``path``; returns its SHA-256.
 
-    Raises ServerFaultError where it is not the file that was committed (``checksum``; "" where the server
-    names none): it was damaged in the store or on the way.
+    Raises ServerFaultError if it is not the file that was committed (``checksum``; "" if the server names
+    none): it was damaged in the store or on the way.
     """
     result = client.download_file(part_number, path, revision, cancelled=cancelled)
     if checksum and result != checksum:
@@ -217,10 +217,11 @@ def find_arrived(
     *,
     cancelled: Cancel | None = None,
 ) -> Revision | None:
-    """Return the revision that holds the file already; None if there is none, so that it may be sent.
+    """Find the revision that holds the file already; None if there is none, so that the file may be sent.
 
-    By the server's checksum; where it keeps none, by size, then by reading the revision's file. Raises
-    :class:`MayHaveArrivedError` where even that says nothing: a person looks before it is sent a second time.
+    Compares the server's checksum; if it keeps none, the size, and then the content of the revision's file.
+    Raises :class:`MayHaveArrivedError` if even that decides nothing: a person looks before it is sent a
+    second time.
     """
     doubtful: list[Revision] = []
     for revision in sorted(revisions, key=lambda other: other.revision_number):
@@ -248,7 +249,9 @@ def checksum_of(revision: Revision) -> str:
 def _same_content(
     client: SiloClient, part_number: str, revision: Revision, sent: SentFile, cancelled: Cancel | None
 ) -> bool | None:
-    """Return None if nothing shows it."""
+    """Return True or False if the server shows whether the revision holds the file; None if nothing
+    shows it.
+    """
     repacked = Path(sent.file_name).suffix.lower() in REPACKED
     if revision.file_size is not None and revision.file_size != sent.size and not repacked:
         return False
@@ -303,9 +306,9 @@ class FileCalls(Caller):
     """Revisions of items and documents, and their files; a document is named by its :class:`DocumentId`."""
 
     def lacking_models(self, sha256: Iterable[str], /) -> set[str]:
-        """Return which of these contents are files of revisions whose model the server does not have yet.
+        """Return which of these contents are files of revisions without a model on the server.
 
-        Raises RouteMissingError where the server keeps no models.
+        Raises RouteMissingError if the server keeps no models.
         """
         wanted, lacking = sorted(set(sha256)), set[str]()
         for at in range(0, len(wanted), _PAGE):
@@ -314,7 +317,7 @@ class FileCalls(Caller):
         return lacking & set(wanted)
 
     def put_model(self, sha256: str, part: str, body: bytes, /) -> None:
-        """Send ``geometry`` or ``structure`` of a content, packed with gzip."""
+        """Send ``geometry`` or ``structure`` of a file's content, packed with gzip."""
         kind = "model/gltf-binary" if part == "geometry" else "application/json"
         headers = {"Accept": "application/json", "Content-Type": kind, "Content-Encoding": "gzip"}
         url = self._address.api("models", sha256, part)
@@ -324,23 +327,24 @@ class FileCalls(Caller):
         self._transport.send(call)
 
     def get_scene(self, part_number: str, revision: int, /) -> Scene:
-        """Return where each part of a product stands, as a revision recorded its files.
+        """Return where each part of a product is placed, as a revision recorded its files.
 
-        Raises RouteMissingError where the server keeps no models.
+        Raises RouteMissingError if the server keeps no models.
         """
         asked: Params = {"revision": revision}
         subject = f"the model of {part_number}"
         return self._get(subject, *_path_of(part_number), "scene", params=asked).model(Scene)
 
     def get_geometry(self, sha256: str, /) -> bytes:
-        """Return the GLB of a content."""
+        """Return the model (GLB) of a file's content."""
         body = self._get("the geometry of a file", "models", sha256, "geometry").content
         return gzip.decompress(body) if body.startswith(b"\x1f\x8b") else body
 
     def get_documents(self, uuids: Iterable[str], /) -> dict[str, Document]:
-        """Return the documents with these UUIDs, in lower case, as they are now; unknown ones are left out.
+        """Return the present documents with these UUIDs, by the UUID in lower case; unknown ones are left
+        out.
 
-        Raises RouteMissingError where the server knows no documents.
+        Raises RouteMissingError if the server knows no documents.
         """
         documents: dict[str, Document] = {}
         wanted = sorted({uuid.lower() for uuid in uuids if uuid})
@@ -350,26 +354,27 @@ class FileCalls(Caller):
         return documents
 
     def get_document(self, uuid: str, /) -> Document:
-        """Return one document, with what it links to and what links to it."""
+        """Return a document, with the documents that it links to and those that link to it."""
         return self._get(f"the document {uuid}", "documents", uuid).model(Document)
 
     def documents_of(self, part_number: str, /) -> list[Document]:
-        """Return the documents that hold an item, its own first."""
+        """Return the documents that hold an item; its own comes first."""
         where = (f"the files of {part_number}", "items", part_number, "documents")
         return [document for page, _ in self._all(Document, *where, keys=("documents",)) for document in page]
 
     def get_release(self, part_number: str, label: str, /) -> Release:
-        """Return a released revision of a product, or one in review, with all files as they were frozen.
+        """Return a revision of a product that is released or in review, with all its files as they were
+        frozen.
 
-        Raises NotFoundError, RouteMissingError where the server knows no releases.
+        Raises NotFoundError, RouteMissingError if the server knows no releases.
         """
         subject = f"revision {label} of {part_number}"
         return self._get(subject, "items", part_number, "releases", label).model(Release)
 
     def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
-        """Return the revisions of an item, newest first; those above the number ``after``.
+        """Return the revisions of an item that are newer than number ``after``, newest first.
 
-        ``newest``: only so many. A server that knows neither sends all, in whatever order and pages.
+        ``newest``: at most so many. A server that knows neither option sends all, in any order and pages.
         """
 
         def read(limit: int) -> Iterator[tuple[list[Revision], int]]:
@@ -392,7 +397,7 @@ class FileCalls(Caller):
         return [by_number[number] for number in sorted(by_number, reverse=True)][:newest]
 
     def get_revision(self, part_number: str, number: int, /) -> Revision:
-        """Return one revision, with the files that its file links to."""
+        """Return a revision, with the files that its file links to."""
         subject = f"revision {number} of {part_number}"
         return self._get(subject, *_path_of(part_number), "revisions", str(number)).model(Revision)
 
@@ -410,13 +415,13 @@ class FileCalls(Caller):
         origin: Origin | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision:
-        """Send a file as a new revision, streamed; never repeated by itself (see :mod:`silo.outbox`).
+        """Send a file as a new revision, as a stream. Never repeats that itself (see :mod:`silo.outbox`).
 
         ``sha256`` is what must arrive: a server that knows the field makes no revision of anything else.
-        ``origin`` says what the file was made from: :class:`silo.bom.errors.NewerRevisionError` where a newer
-        one is there. A server that does not know this takes the file; one that takes no form gets the file in
-        two steps. Raises :class:`silo.bom.errors.DocumentError` for a file that cannot be read, ConflictError
-        where the server's checksum is another one.
+        ``origin`` says what the file was made from: :class:`silo.bom.errors.NewerRevisionError` if there is a
+        newer revision. A server that does not know this field takes the file; a server that takes no form
+        gets the file in two steps. Raises :class:`silo.bom.errors.DocumentError` for a file that cannot be
+        read, ConflictError if the server reports another checksum.
         """
         path = Path(path)
         name = file_name or path.name
@@ -438,7 +443,7 @@ class FileCalls(Caller):
                 about = {"comment": comment, **({"properties": dict(properties)} if properties else {})}
                 revision, sent = _in_two_steps(self._transport, call, path, name, about, on_progress)
         if (checksum_of(revision) or sent) != sent:
-            # Sending it again by itself would make a revision each time.
+            # Sending it again automatically would make a revision each time.
             raise ConflictError(
                 f"{self._address.host} stored other content than was sent for {subject} "
                 f"(revision {revision.revision_number}); look at that revision, then send the file again"
@@ -466,10 +471,11 @@ class FileCalls(Caller):
         *,
         cancelled: Cancel | None = None,
     ) -> str:
-        """Fetch the latest file of an item, or that of a revision, to ``path``; gives its SHA-256 in hex.
+        """Download the latest file of an item, or that of a revision, to ``path``; returns its SHA-256 in
+        hex.
 
-        ``path`` appears whole or not at all; what was there before is replaced only then. The bytes may
-        differ from those uploaded: a server re-packs some formats.
+        ``path`` is written completely or not at all; only then is an old file replaced. The bytes may differ
+        from those uploaded: a server re-packs some formats.
         """
         segments = (*_path_of(part_number), "file", *(() if revision is None else (str(revision),)))
         call = ApiCall(
@@ -492,8 +498,8 @@ class FileCalls(Caller):
 def _upload_fields(
     comment: str, properties: Mapping[str, object] | None, sha256: str | None, origin: Origin | None
 ) -> dict[str, str]:
-    """Return the text parts of an upload: comment, properties, what must arrive, and where the file came
-    from.
+    """Make the text parts of an upload: comment, properties, the hash that must arrive, and where the file
+    came from.
 
     A server that does not know the last two ignores them.
     """
@@ -520,7 +526,7 @@ def _in_two_steps(
     call: ApiCall,
     path: Path,
     name: str,
-    said: Mapping[str, Any],
+    fields: Mapping[str, Any],
     on_progress: Progress | None,
 ) -> tuple[Revision, str]:
     """Send the bytes to the server's store first, then the revision (silo-contract §1.4, "presign").
@@ -554,7 +560,7 @@ def _in_two_steps(
         )
         transport.send(put)
         sha256 = content.sha256
-    final = as_json({**about, "object_key": key, **said, "file_checksum": sha256})
+    final = as_json({**about, "object_key": key, **fields, "file_checksum": sha256})
     return transport.send(replace(call, body=lambda: final, headers=headers)).model(Revision), sha256
 
 
@@ -621,18 +627,20 @@ class FileForm:
 
     @property
     def sha256(self) -> str:
-        """Return the hash of the bytes read so far; of the file, once the form was read to its end."""
+        """Return the hash of the bytes of the file that were read so far; it is the file's when the form is
+        read to its end.
+        """
         return self._hash.hexdigest()
 
     def rewound(self) -> Self:
-        """Return the form from its beginning: a redirect wants it once more."""
+        """Go back to the beginning of the form, for a redirect, and return it."""
         self._head, self._tail, self._left = self._begin, self._end, self.file_size
         self._hash = hashlib.sha256()
         self._file.seek(0)
         return self
 
     def read(self, size: int = -1) -> bytes:
-        """Return the next bytes of the form."""
+        """Read the next bytes of the form."""
         stop_if(self._cancelled)
         if self._head:
             size = len(self._head) if size < 0 else size

@@ -107,7 +107,7 @@ class Where:
 
     @property
     def asked(self) -> str:
-        """Return ``host`` or ``host (the BOM of ASM-001)``."""
+        """Return ``host``, or with the subject ``host (the BOM of ASM-001)``."""
         return f"{self.host} ({self.subject})" if self.subject else self.host
 
 
@@ -204,12 +204,12 @@ TABLE |= {
     OSError: _BROKEN,
 }
 
-# Wrappers whose reason says more than they do.
+# Wrappers that say less than the error inside them.
 _WRAPPERS = (rq.ConnectionError, rq.ChunkedEncodingError, u3.MaxRetryError, u3.ProtocolError)
 
 
 def translate(error: Exception, where: Where) -> SiloError:
-    """Return our error for a foreign one, in plain words; never quotes a header."""
+    """Turn an error of another library into one of ours, in plain words. It never quotes a header."""
     exception = _innermost(error)
     kind, text = next((TABLE[cause] for cause in type(exception).__mro__ if cause in TABLE), _GARBLED)
     return kind(text.format(host=where.host, asked=where.asked, connect=where.connect, read=where.read))
@@ -217,20 +217,22 @@ def translate(error: Exception, where: Where) -> SiloError:
 
 @contextmanager
 def translated(where: Where) -> Iterator[None]:
-    """Turn foreign errors of the block into ours."""
+    """Turn errors of other libraries inside the block into ours."""
     try:
         yield
     except SiloError:
         raise
     except FOREIGN as error:
         if isinstance(error, requests.RequestException):
-            # They carry the whole request, the token in its headers included; nobody needs that further up.
+            # They hold the whole request, including the token in its headers; no caller needs that.
             error.request = error.response = None
         raise translate(error, where) from error
 
 
 def _innermost(error: Exception) -> Exception:
-    """Follow the wrappers down: "max retries exceeded" is only the outside of "connection refused"."""
+    """Follow wrapped errors to the innermost: "max retries exceeded" is only the outside of "connection
+    refused".
+    """
     for _ in range(8):
         inner = getattr(error, "reason", None) or next(iter(error.args), None)
         if type(error) not in _WRAPPERS or not isinstance(inner, Exception):
@@ -272,27 +274,27 @@ class Reply:
 
     @property
     def is_html(self) -> bool:
-        """Return True for a web page, which no route of the API answers."""
+        """Return True if the answer is a web page; no route of the API sends one."""
         kind = self.headers.get("Content-Type", "").lower()
         return "html" in kind or self.content[:200].lstrip()[:1] == b"<"
 
     @property
     def total(self) -> int:
         """Return how many things there are on all pages; 0 if the server does not say."""
-        said = self.data() if "X-Total-Count" not in self.headers else None
-        header = said.get("total") if isinstance(said, dict) else self.headers.get("X-Total-Count", "")
+        data = self.data() if "X-Total-Count" not in self.headers else None
+        header = data.get("total") if isinstance(data, dict) else self.headers.get("X-Total-Count", "")
         return whole_number(str(header)) or 0
 
     @property
     def next(self) -> dict[str, str]:
-        """Return the parameters of the page that the answer names as its next one; {} for none."""
-        said = self.data()
+        """Return the parameters of the next page that the answer names; {} if it names none."""
+        data = self.data()
         links = re.search(r'<([^>]*)>;[^,]*rel="?next\b', self.headers.get("Link", ""))
-        address = links[1] if links else said.get("next") if isinstance(said, dict) else None
+        address = links[1] if links else data.get("next") if isinstance(data, dict) else None
         return dict(parse_qsl(urlsplit(address).query)) if isinstance(address, str) else {}
 
     def data(self) -> Any:
-        """Return the JSON of a good answer; raises :class:`ServerFaultError` if it is none."""
+        """Read the JSON of a good answer. Raises :class:`ServerFaultError` if it is none."""
         if self.is_html:
             raise ServerFaultError(
                 f"{self.where.asked} answered with a web page instead of data{_titled(self)}; "
@@ -302,7 +304,7 @@ class Reply:
             return json.loads(self.content)
 
     def mapping(self, accept: Sequence[int] = ()) -> dict[str, Any]:
-        """Return the answer as a plain object; a bad status that is not in ``accept`` raises by
+        """Read the answer as a JSON object; a bad status that is not in ``accept`` raises the error of
         :func:`error_of`.
         """
         if not self.ok and (self.status not in accept or self.is_html):
@@ -313,23 +315,23 @@ class Reply:
         return data
 
     def version(self) -> str | None:
-        """Return the version that the answer bears: its ETag, else ``version`` in its body."""
+        """Return the version in the answer: its ETag, or ``version`` in its body; None if it has neither."""
         tag = self.headers.get("ETag", "").removeprefix("W/").strip('"')
         data = self.data() if not tag else None
         return tag or (str(data["version"]) if isinstance(data, dict) and "version" in data else None)
 
     def model(self, kind: type[Model]) -> Model:
-        """Return the answer as one of the wire models."""
+        """Read the answer as one of the wire models."""
         data = self.data()
         with translated(self.where):
             return kind.model_validate(data)
 
     def is_null(self, *keys: str) -> bool:
-        """Return True if null stands for the list, by itself or under one of ``keys``."""
+        """Return True if the answer has null in place of the list: as a whole, or under one of ``keys``."""
         return _under(self.data(), keys) is None
 
     def models(self, kind: type[Model], *keys: str) -> list[Model]:
-        """Return the answer as a list of models: a bare list, or an object that holds it under one of
+        """Read the answer as a list of models: a bare list, or an object that holds the list under one of
         ``keys``.
         """
         models_read = _under(self.data(), keys)
@@ -355,7 +357,7 @@ class Complaint:
 
 
 def complaint(reply: Reply) -> Complaint:
-    """Read an error body; never fails, whatever the bytes are."""
+    """Read the body of an error answer; never fails, whatever the bytes are."""
     if reply.is_html:
         return Complaint(text=_clean(_titled(reply).strip(" ()"), reply.secret))
     try:
@@ -379,11 +381,9 @@ def complaint(reply: Reply) -> Complaint:
 
 
 def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
-    """Return the error that a bad status stands for; 503 on ``writing`` is a read-only server, else no
-    server.
-    """
-    said = complaint(reply)
-    detail = f": {said.text}" if said.text else ""
+    """Return the error that a bad status means. A 503 while ``writing`` can mean a read-only server."""
+    reported = complaint(reply)
+    detail = f": {reported.text}" if reported.text else ""
     asked, host, status = reply.where.asked, reply.where.host, reply.status
     if status == 401 and not reply.secret:
         return AuthError(
@@ -401,18 +401,18 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         return WebPageError(
             f"{asked}: not found, says a web page{detail}; is this the address of a Silo server?"
         )
-    if status in (405, 501) or (status == 404 and _router_speaks(said)):
+    if status in (405, 501) or (status == 404 and _router_speaks(reported)):
         return RouteMissingError(f"{asked}: this server does not know the request ({status}){detail}")
     if status in (404, 410):
         return NotFoundError(f"{asked}: not found{detail}")
     if status == 409:
-        if said.code == NewerRevisionError.code and said.revision is not None:
-            return NewerRevisionError(f"{asked}{detail}", said.revision)
-        if said.code == MissingRevisionError.code:
+        if reported.code == NewerRevisionError.code and reported.revision is not None:
+            return NewerRevisionError(f"{asked}{detail}", reported.revision)
+        if reported.code == MissingRevisionError.code:
             return MissingRevisionError(f"{asked}{detail}")
-        cycle = len(said.path) > 1
+        cycle = len(reported.path) > 1
         return (
-            CycleError(said.path)
+            CycleError(reported.path)
             if cycle
             else ConflictError(f"{asked}: in conflict with the present data{detail}")
         )
@@ -421,9 +421,9 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
             f"{asked}: somebody changed it meanwhile{detail}. Read it again, then repeat"
         )
     later = retry_after(reply) if status in _LATER else None
-    if status == 503 and writing and not reply.is_html and _read_only(said, later):
+    if status == 503 and writing and not reply.is_html and _read_only(reported, later):
         closed = ReadOnlyError(f"{host} takes no changes now{detail}. Nothing is lost; it can be sent later")
-        closed.named = _names_read_only(said)
+        closed.named = _names_read_only(reported)
         return _put_off(closed, later)
     if status == 429 or (status == 503 and later is not None):
         when = f"in {duration(later)}" if later is not None else "later"
@@ -433,15 +433,15 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         gone.refused = status == 503
         return _put_off(gone, later)
     if 400 <= status < 500:
-        what = "; ".join(said.problems[:10]) or said.text or "no reason given"
-        rejected = RejectedError(f"{asked}: not accepted ({status}): {what}", said.problems)
+        what = "; ".join(reported.problems[:10]) or reported.text or "no reason given"
+        rejected = RejectedError(f"{asked}: not accepted ({status}): {what}", reported.problems)
         rejected.status = status
         return rejected
     return ServerFaultError(f"{asked}: the server failed ({status}){detail}")
 
 
 def retry_after(reply: Reply) -> float | None:
-    """Return the pause that the answer asks for, in seconds; None if it names none that can be read."""
+    """Return the pause, in seconds, that the answer asks for; None if it names none that can be read."""
     text = reply.headers.get("Retry-After", "").strip()
     if (seconds := whole_number(text, 300)) is not None:
         return float(seconds)
@@ -456,18 +456,18 @@ def _put_off(error: RemoteError, seconds: float | None) -> RemoteError:
     return error
 
 
-def _read_only(said: Complaint, later: float | None) -> bool:
+def _read_only(reported: Complaint, later: float | None) -> bool:
     # A server that names a time is busy, unless it says itself that it is read-only.
-    return _names_read_only(said) or (later is None and said.code not in _AWAY)
+    return _names_read_only(reported) or (later is None and reported.code not in _AWAY)
 
 
-def _names_read_only(said: Complaint) -> bool:
-    return _READ_ONLY.search(f"{said.code} {said.text}") is not None
+def _names_read_only(reported: Complaint) -> bool:
+    return _READ_ONLY.search(f"{reported.code} {reported.text}") is not None
 
 
-def _router_speaks(said: Complaint) -> bool:
-    named = said.code == RouteMissingError.code or said.text.startswith("Not Found: ")
-    return named or (not said.code and said.text in _ROUTER_SAYS)
+def _router_speaks(reported: Complaint) -> bool:
+    named = reported.code == RouteMissingError.code or reported.text.startswith("Not Found: ")
+    return named or (not reported.code and reported.text in _ROUTER_SAYS)
 
 
 def _under(data: Any, keys: Sequence[str]) -> Any:
@@ -504,7 +504,7 @@ def _clean(value: Any, secret: str | None) -> str:
 class ErrorScope(StrEnum):
     """What an error concerns."""
 
-    ENTRY = "entry"  # this item or entry; the others may fare better
+    ENTRY = "entry"  # this item or entry; others may succeed
     KIND = "kind"  # every request of this kind
     ALL = "all"  # everything for this server
 
@@ -512,7 +512,7 @@ class ErrorScope(StrEnum):
 class Then(StrEnum):
     """Who can mend it."""
 
-    RETRY = "retry"  # nobody need do anything: try again later
+    RETRY = "retry"  # nobody needs to do anything: try again later
     PERSON = "person"  # the answer stays the same until a person changes something
 
 
@@ -526,11 +526,11 @@ class Verdict:
 
 
 def judge(error: SiloError, alive: Callable[[], object] | None = None) -> Verdict:
-    """Return whom ``error`` concerns, and what helps.
+    """Decide whom ``error`` concerns, and what helps.
 
     alive
-        a plain question to the server, such as ``client.ready``; raises SiloError where it gets no answer.
-        Asked only where the error itself does not say whether it concerns one entry or all.
+        a plain question to the server, such as ``client.ready``; raises SiloError if it gets no answer. Asked
+        only if the error itself does not show whether it concerns one entry or all.
     """
     wait = told_wait(error)
     if isinstance(error, (BusyError, ReadOnlyError, CancelledError)):
@@ -557,7 +557,9 @@ def judge(error: SiloError, alive: Callable[[], object] | None = None) -> Verdic
 
 
 def is_certain(error: SiloError) -> bool:
-    """Return True if the server certainly did not do what was asked, and only that: the rest may be sent."""
+    """Return True if the server certainly did not do what was asked, and the error concerns only that: the
+    rest may be sent.
+    """
     if isinstance(error, ReadOnlyError):
         return not error.named
     if isinstance(error, UnreachableError):
@@ -567,10 +569,10 @@ def is_certain(error: SiloError) -> bool:
 
 
 def ends_run(error: SiloError, api: object = None) -> bool:
-    """Return True if a run over many items that sends one kind of request must not try the next one.
+    """Return True if a run that sends one kind of request for many items must not try the next item.
 
     api
-        the server's client; its ``ready`` says whether only this item had trouble.
+        the server's client; its ``ready`` shows if only this item had trouble.
     """
     return judge(error, getattr(api, "ready", None)).scope is not ErrorScope.ENTRY
 
@@ -582,13 +584,13 @@ def told_wait(error: SiloError) -> float | None:
 
 
 def may_repeat(error: SiloError, *, harmless: bool) -> bool:
-    """Return True if the same request may be sent again by itself.
+    """Return True if the same request may be sent again without a person.
 
     harmless
         the request may arrive twice: a question, or a change that names itself.
 
-    Any other change is repeated only where the server certainly did not process it: it never left this
-    computer, or the server put it off (429, 503 with Retry-After).
+    Any other change is repeated only if the server certainly did not process it: it never left this computer,
+    or the server asked to wait (429, 503 with Retry-After).
     """
     return isinstance(error, (NotSentError, BusyError)) or (harmless and isinstance(error, UnreachableError))
 
@@ -602,10 +604,10 @@ class Backoff:
     longest: float = 60.0
 
     def pause(self, attempt: int, chance: float, wanted_s: float | None = None) -> float:
-        """Return the pause after failed attempt ``attempt`` (from 1).
+        """Return the pause [s] after failed attempt ``attempt`` (from 1).
 
-        ``chance`` in [0, 1) takes off up to half, so that many clients do not return in one moment. ``told``
-        is the server's own wish: the pause is never shorter.
+        ``chance`` in [0, 1) takes off up to half, so that many clients do not return in one moment.
+        ``wanted_s`` is the server's own wish: the pause is never shorter.
         """
         full = min(self.longest, self.first * self.factor ** min(attempt - 1, 60))
         return max(full * (1.0 - chance / 2.0), wanted_s or 0.0)
@@ -614,9 +616,9 @@ class Backoff:
 def pause_after(
     error: SiloError, before: Pause | None, now: float, backoff: Backoff, chance: float, failures: int = 0
 ) -> Pause:
-    """Return the pause after an error; ``failures`` counts those in a row before it, as ``before`` does.
+    """Make the pause after an error; ``failures`` counts the errors in a row before it, as ``before`` does.
 
-    ``before``, the pause that is known, is kept if it ends later: another request was promised that time.
+    The known pause ``before`` is kept if it ends later, because another request was promised that time.
     """
     failures = max(failures, before.failures if before is not None else 0) + 1
     wait = told_wait(error)
@@ -647,8 +649,8 @@ class Retries:
     tell: Callable[[float, SiloError], object] = lambda _seconds, _error: None
 
     def pause(self, attempt: int, error: SiloError, *, harmless: bool) -> float | None:
-        """Return seconds to wait after failed attempt ``attempt`` (from 1); None: give up and report the
-        error.
+        """Return how many seconds to wait after failed attempt ``attempt`` (from 1); None: give up and report
+        the error.
         """
         value = getattr(error, "retry_after", None)
         tries = self.busy_tries if self.busy_tries and isinstance(error, BusyError) else self.tries

@@ -100,7 +100,7 @@ class ApiCall:
 
 class _Bearer(AuthBase):
     # Given as `auth` for every request, also without a token: otherwise requests would look into ~/.netrc and
-    # send whatever it finds there.
+    # send what it finds there.
     def __init__(self, token: str | None) -> None:
         self._token = token
 
@@ -143,14 +143,16 @@ class Transport:
         return self._token is not None
 
     def where(self, subject: str) -> Where:
-        """Return where an error came from, for messages about this server."""
+        """Describe where an error happened, for messages about this server."""
         return Where(self.address.host, subject, self.timeouts.connect, self.timeouts.read)
 
     def close(self) -> None:
         self._session.close()
 
     def send(self, call: ApiCall) -> Reply:
-        """Return the server's good answer; raises one of :mod:`silo.bom.errors` for everything else."""
+        """Send the request, again after a pause if it may be repeated. Returns the server's good answer;
+        raises one of :mod:`silo.bom.errors` for everything else.
+        """
         attempt = 0
         while True:
             attempt += 1
@@ -173,12 +175,14 @@ class Transport:
 
     @contextmanager
     def opened(self, call: ApiCall, read_timeout: float | None = None) -> Iterator[requests.Response]:
-        """Yield the response with its body still unread, redirects followed; closed at the end."""
+        """Send the request, follow redirects, and yield the response with its body unread. Closes it at the
+        end.
+        """
         with closing(self.open(call, read_timeout)) as response:
             yield response
 
     def open(self, call: ApiCall, read_timeout: float | None = None) -> requests.Response:
-        """Do as :meth:`opened`, for the caller to close."""
+        """Send the request as :meth:`opened` does; the caller closes the response."""
         url, params, home = call.url, dict(call.params), self.address.origin
         for _ in range(MAX_REDIRECTS + 1):
             carry = may_carry_token(home, origin_of(url))
@@ -198,7 +202,7 @@ class Transport:
     def _exchange(
         self, call: ApiCall, url: str, params: dict[str, Any], carry: bool, read_timeout: float | None
     ) -> requests.Response:
-        # A server on this computer is never behind a proxy, whatever the environment says of the others.
+        # A server on this computer is never behind a proxy, whatever the environment says.
         proxies = {"no_proxy": self.address.origin[1]} if self.address.is_loopback else None
         packing = "gzip, deflate" if _CAN_UNPACK else "identity"
         with translated(self.where(call.subject)):
@@ -217,12 +221,12 @@ class Transport:
             )
 
     def reply(self, response: requests.Response, call: ApiCall) -> Reply:
-        """Return the response, read whole within the call's bounds."""
+        """Read the whole response within the call's limits."""
         content = b"".join(self.pieces(response, call))
         return Reply(response.status_code, content, self.where(call.subject), response.headers, self._token)
 
     def pieces(self, response: requests.Response, call: ApiCall) -> Iterator[bytes]:
-        """Yield the body as it comes, each piece at once; ends by error when it is too much or takes too
+        """Yield the pieces of the body as they arrive. Raises an error if the body is too large or takes too
         long.
         """
         where = self.where(call.subject)
@@ -253,7 +257,7 @@ class Transport:
 
 
 def as_json(data: object) -> bytes:
-    """Return strict JSON; raises :class:`InputError` for what it cannot hold (NaN, bytes, a value in itself).
+    """Write the data as strict JSON. Raises :class:`InputError` for NaN, bytes, or a value that holds itself.
 
     A character that no server takes, as in the name of a file, becomes U+FFFD.
     """
@@ -275,8 +279,8 @@ def _sendable(value: Any) -> Any:
 
 
 def read_some(response: requests.Response) -> bytes:
-    """Return what has arrived, decoded; waits for the first byte only; empty at the end."""
-    # `iter_content` waits until a chunk is full, so a slow server could hold us up without end.
+    """Read and decode what has arrived. Waits only for the first byte; b"" at the end."""
+    # `iter_content` waits until a chunk is full, so a slow server could delay us without end.
     raw: Any = response.raw
     if hasattr(raw, "read1"):
         return bytes(raw.read1(_CHUNK, decode_content=True) or b"")
@@ -295,7 +299,7 @@ def _check_length(response: requests.Response, size: int, where: Where) -> None:
 
 
 def stop_if(cancelled: Cancel | None) -> None:
-    """Raise :class:`CancelledError` where the caller asked to stop."""
+    """Raise :class:`CancelledError` if the caller asked to stop."""
     if cancelled is not None and cancelled.is_set():
         raise CancelledError("stopped; what was sent before stays sent")
 
@@ -349,7 +353,9 @@ class _Adapter(HTTPAdapter):
 
 
 def _patient(pool: Any, patience: float) -> Any:
-    """Return the pool's class with connections that take ``patience`` once they are made."""
+    """Make a class of the pool whose connections wait ``patience`` seconds for data once they are
+    connected.
+    """
 
     class Connection(pool.ConnectionCls):  # type: ignore[misc]
         def connect(self) -> None:
@@ -409,12 +415,12 @@ class _KeptAbilities(Abilities):
 
 
 def abilities_path() -> Path:
-    """Return the user's file of what was learned about servers."""
+    """Return the file in which this user's programs keep what they learned about servers."""
     return cache_folder() / "servers.json"
 
 
 def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time.time) -> Abilities:
-    """Return what is known of a server; nothing where that is older than a day."""
+    """Read what is known of a server; nothing if that is older than a day."""
     try:
         memory = _KeptAbilities.model_validate(read_memory(path).get(server), strict=True)
     except ValidationError:
@@ -426,7 +432,7 @@ def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time
 def save_abilities(
     path: Path, server: str, abilities: Abilities, *, clock: Callable[[], float] = time.time
 ) -> None:
-    """Remember; what cannot be written is not remembered. One small JSON file for all servers.
+    """Write what is known of a server into one small JSON file for all servers. Ignores a failed write.
 
     It is only a memory: a file that is lost, old or damaged costs some requests, never an answer.
     """
@@ -466,7 +472,7 @@ class Caller:
     _refused: frozenset[str] = frozenset()  # batch requests, for this token and mode
 
     def _get(self, subject: str, *segments: str, params: Params | None = None) -> Reply:
-        """Ask; a question may be repeated freely."""
+        """Send a GET request, which may be repeated freely."""
         return self._transport.send(
             ApiCall(
                 "GET",
@@ -481,11 +487,10 @@ class Caller:
     def _all(
         self, kind: type[Body], subject: str, *segments: str, keys: Sequence[str] = (), **params: str | int
     ) -> Iterator[tuple[list[Body], int]]:
-        """Yield the rows of a list, page by page, each with how many there are in all (0: not known), to the
-        end.
+        """Yield the rows of a list to its end, page by page, each page with the total number of rows.
 
-        Raises :class:`ServerFaultError` where the server has more and does not show them: a list is whole, or
-        it is none.
+        Raises :class:`ServerFaultError` if the server has more rows and does not show them: an incomplete
+        list is no answer.
         """
         more, rows, last = dict(params), 0, list[Body]()
         while True:
@@ -505,7 +510,7 @@ class Caller:
             last, more = page, {**params, **(following or {"offset": rows})}
 
     def _ask(self, subject: str, *segments: str, cancelled: Cancel | None = None, **asked: Any) -> Reply:
-        """Ask what is too long for an address: a POST that may be repeated freely."""
+        """Ask a question that is too long for an address: a POST that may be repeated freely."""
         return self._change("POST", subject, *segments, body=asked, repeatable=True, cancelled=cancelled)
 
     def _change(
@@ -519,15 +524,15 @@ class Caller:
         cancelled: Cancel | None = None,
         extensions: Sequence[str] = (),
     ) -> Reply:
-        """Send a model, or what it would hold, as JSON.
+        """Send a model, or the values for one, as JSON.
 
         extensions
             keys that only our own server knows, also inside lists of objects. A strict server refuses them:
-            it is asked once more without them, and never sent any again.
+            it gets the request once more without them, and never gets any again.
         """
-        # Not pydantic's own JSON, which writes NaN as null: what cannot be said is an error, no gap.
-        said = body.model_dump(by_alias=True, exclude_none=True) if isinstance(body, BaseModel) else body
-        bare = _without(said, extensions)
+        # Not pydantic's own JSON, which writes NaN as null: a value that JSON lacks is an error, not a gap.
+        values = body.model_dump(by_alias=True, exclude_none=True) if isinstance(body, BaseModel) else body
+        bare = _without(values, extensions)
 
         def send(data: Any) -> Reply:
             content = as_json(data)
@@ -547,10 +552,10 @@ class Caller:
                 )
             )
 
-        if self.abilities.strict or bare == said:
+        if self.abilities.strict or bare == values:
             return send(bare)
         try:
-            return send(said)
+            return send(values)
         except RejectedError as error:
             if not _UNKNOWN_KEY.search(f"{error} {' '.join(error.problems)}"):
                 raise
@@ -566,13 +571,14 @@ class Caller:
         single: Callable[[K], T | None],
         cancelled: Cancel | None = None,
     ) -> dict[K, T]:
-        """Ask about many things, in few requests where the server can, else in a bounded pool of single ones.
+        """Ask about many things: in few requests if the server can answer these, else one by one in a bounded
+        pool.
 
         ability
-            the field of :class:`Abilities` that says whether the server has such a request.
+            the field of :class:`Abilities` that says if the server has such a request.
         """
         wanted = list(dict.fromkeys(keys))
-        result: dict[K, T] = {}
+        answers: dict[K, T] = {}
         chunks = [wanted[start : start + MAX_IN_BATCH] for start in range(0, len(wanted), MAX_IN_BATCH)]
         while chunks:
             stop_if(cancelled)
@@ -593,16 +599,15 @@ class Caller:
                         half = len(chunk) // 2
                         chunks[:0] = [chunk[:half], chunk[half:]]
                         continue
-            result.update(_one_by_one(chunk, single, cancelled) if answer is None else answer)
-        return result
+            answers.update(_one_by_one(chunk, single, cancelled) if answer is None else answer)
+        return answers
 
     def _delete(self, subject: str, *segments: str) -> None:
-        """Remove."""
         self._transport.send(ApiCall("DELETE", self._address.api(*segments), subject))
 
 
 def body(kind: type[Body], values: Mapping[str, Any], thing: str) -> Body:
-    """Return the values as a request; raises :class:`InputError` with all that does not fit at once."""
+    """Make a request from the values. :class:`InputError` lists all values that do not fit."""
     unknown = sorted(set(values) - set(kind.model_fields) - {"schema"})
     if unknown:
         text = ", ".join(kind.model_fields)
@@ -623,16 +628,14 @@ def _one_by_one(keys: Sequence[K], single: Callable[[K], T | None], cancelled: C
         try:
             results = list(pool.map(one, keys))
         except BaseException:
-            # One failed, so the rest is not wanted any more.
+            # One failed, so the rest is no longer needed.
             pool.shutdown(wait=False, cancel_futures=True)
             raise
     return {key: value for key, value in zip(keys, results, strict=True) if value is not None}
 
 
 def _without(data: Any, keys: Sequence[str]) -> Any:
-    """Return the data without these keys, here and in lists of objects; what a user put into a value
-    stays.
-    """
+    """Return the data without these keys, here and in lists of objects; other values stay as they are."""
     if not keys or not isinstance(data, dict):
         return data
     return {

@@ -70,7 +70,7 @@ class Record(Answer, Mapping[str, Any]):
 
 
 def _known_source(value: Any) -> Any:
-    # A source we do not know is somebody's: only lines that say "assembly" may be changed by a merge.
+    # A line with an unknown source belongs to somebody: a merge may only change lines of an assembly.
     if isinstance(value, str):
         word = value.strip().lower() or "assembly"
         return word if word == "assembly" else "manual"
@@ -86,7 +86,7 @@ _Shortest = PlainSerializer(plain, return_type=int | float)
 
 
 def _time_or_none(value: Any, read: ValidatorFunctionWrapHandler) -> Any:
-    # A time stamp is for people to see; one that cannot be read must not cost the whole answer.
+    # A time stamp is only shown to people; an unreadable one must not spoil the whole answer.
     try:
         return read(value)
     except ValueError:
@@ -338,7 +338,7 @@ class MergeRequest(Wire):
 
     @model_serializer(mode="wrap")
     def _as_the_spec(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # `dry_run` is ours; where it says nothing, the request is exactly the spec's.
+        # `dry_run` is ours; without it, the request is exactly the spec's.
         data: dict[str, Any] = write(self)
         return data if self.dry_run else {key: value for key, value in data.items() if key != "dry_run"}
 
@@ -749,5 +749,5 @@ class ServerState(Record):
 
 
 def login_code(proof: str) -> str:
-    """Return what a program and the page that lets it in both show, so that a person can compare."""
+    """Return the code that a program and the page that lets it in both show, so that a person can compare."""
     return f"{proof[:4]}-{proof[4:8]}".upper()

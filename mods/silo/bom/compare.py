@@ -64,7 +64,7 @@ class _Line:
 
 
 def as_number(value: object) -> float | None:
-    """Return a quantity as a number: int, float, Decimal or a numeral; None if there is none."""
+    """Read a quantity as a number: int, float, Decimal or a numeral; None if it is none."""
     if value is None or isinstance(value, bool):
         return None
     try:
@@ -75,7 +75,7 @@ def as_number(value: object) -> float | None:
 
 
 def same_quantity(a: object, b: object) -> bool:
-    """Return true if both are the same number."""
+    """Return True if both are the same number, or if neither is one."""
     x, y = as_number(a), as_number(b)
     if x is None or y is None:
         return x is y
@@ -83,7 +83,7 @@ def same_quantity(a: object, b: object) -> bool:
 
 
 def says_the_same(cad_quantity: object, quantity: object, unit: str | None) -> bool:
-    """Return true if a line has as many pieces as CAD."""
+    """Return True if a line has as many pieces as CAD."""
     return counts_pieces(unit) and same_quantity(cad_quantity, quantity)
 
 
@@ -91,7 +91,7 @@ def _local(entry: Any) -> _Line | None:
     if isinstance(entry, Mapping):
         number = entry.get("child_part_number") or entry.get("part_number")
         quantity = as_number(entry.get("quantity"))
-    else:  # a BomEntry, or whatever names these two as it does
+    else:  # a BomEntry, or any other value with these two names
         number, quantity = entry.part_number, as_number(entry.quantity)
     return _Line(number, quantity or 0.0) if number else None
 
@@ -108,21 +108,21 @@ def _summed(lines: Iterable[_Line]) -> dict[str, float | None]:
 
 
 def local_quantities(entries: Iterable[BomEntry | Mapping[str, Any]]) -> dict[str, float | None]:
-    """Return the assembly's direct children by part number, summed; entries without a number are left out."""
+    """Sum the assembly's direct children by part number; entries without a number are left out."""
     return _summed(line for entry in entries if (line := _local(entry)) is not None)
 
 
 def is_manual(line: Mapping[str, Any]) -> bool:
-    """Return true if a line belongs to people: no component, not counted in pieces, or not from an assembly.
+    """Return True if a line belongs to people: no component, not counted in pieces, or not from an assembly.
 
-    A source that we do not know is somebody's; only what assemblies wrote may be rewritten by one.
+    A line with an unknown source belongs to somebody; an assembly may only change what assemblies wrote.
     """
     from_cad = (line.get("source") or "assembly") == "assembly" and counts_pieces(line.get("unit"))
     return not is_component(line) or not from_cad
 
 
 def is_component(line: Mapping[str, Any]) -> bool:
-    """Return True for a line that counts parts; ``alternate`` and ``reference`` lines do not."""
+    """Return True if a line counts parts; ``alternate`` and ``reference`` lines do not."""
     return (line.get("rel_type") or "component") == "component"
 
 
@@ -172,9 +172,9 @@ def lines_of_missing(
 ) -> frozenset[str]:
     """Return the part numbers of the lines that stand for missing components.
 
-    Those that stood for one of them in the last sync. Where a missing component stood for no line (a server
-    that does not keep that, lines of an old version), any line that the assembly does not have now may be its
-    own, so all lines whose components are not known stay.
+    They are the lines that stood for such a component in the last sync. If a missing component stood for no
+    line (the server does not keep that, or the lines are of an old version), any line that the assembly does
+    not have now may be its line, so all lines without known components stay.
 
     local
         the part numbers that the assembly has now.
@@ -256,7 +256,7 @@ class MergePlan:
 
     @property
     def news(self) -> bool:
-        """Return True if the server learns anything from this merge: else it need not be sent."""
+        """Return True if the server learns anything from this merge; if not, it need not be sent."""
         return self.writes or bool(self.tell)
 
 
@@ -271,8 +271,9 @@ def plan_merge(
         as in :func:`silo.bom.compare.diff_bom`.
     lines
         the server's lines; ``unreferenced_since`` (any true value) marks those flagged before.
-        ``assembly_told`` says whether the server heard of the assembly's quantity for a line that people own,
-        ``assembly_quantity`` which; a server that says neither is not sent conflicts alone.
+        ``assembly_told`` says if the server knows the assembly's quantity for a line that people own,
+        ``assembly_quantity`` which it is. A server that has neither gets no merge that only reports
+        conflicts.
     missing
         as in :func:`silo.bom.compare.diff_bom`: the lines of these components stay as they are.
     """
@@ -303,7 +304,7 @@ def _untold(
         number, components = line["child_part_number"], line.get("assembly_told")
         if components is None or not is_manual(line) or not is_component(line):
             continue
-        # An override of a line that the assembly once owned is in conflict too when the assembly drops it.
+        # An override of a line that the assembly once owned is in conflict too if the assembly drops it.
         now = local.get(number, 0.0)
         dropped = number not in local and bool(line.get("override"))
         changed = components and not same_quantity(line.get("assembly_quantity"), now)
@@ -313,10 +314,10 @@ def _untold(
 
 
 def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) -> list[dict[str, Any]]:
-    """Return the lines after the merge: what people wrote on a line stays, nothing is deleted.
+    """Apply a merge to copies of the lines: what people wrote on a line stays, and no line is deleted.
 
-    ``lines`` has at most one assembly line per number, as every server's key demands. ``when`` is the time
-    stamp written on newly unreferenced lines.
+    ``lines`` has at most one assembly line per number, as the key of every server demands. ``when`` is the
+    time stamp written on newly unreferenced lines.
     """
     quantities = {change.part_number: change.local_quantity for change in plan.diff.quantity_changed}
     flag, unflag = set(plan.flag), set(plan.unflag)
@@ -345,7 +346,7 @@ def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) 
 
 
 def summary(diff: BomDiff) -> str:
-    """Return the sentence of the spec's event: ``BOM updated: 1 added, 1 quantity changed, 1
+    """Write the sentence of the spec's event: ``BOM updated: 1 added, 1 quantity changed, 1
     unreferenced``.
     """
     parts = [
@@ -359,14 +360,14 @@ def summary(diff: BomDiff) -> str:
 
 
 def resolve_url(part_number: str) -> str:
-    """Return where a person decides on what a merge left open."""
+    """Return the page where a person decides about what a merge left open."""
     return f"/items/{quote(part_number, safe='')}/bom"
 
 
 def answer_of(
     diff: BomDiff, part_number: str, sync_id: str | None = None, left_out: Sequence[Mapping[str, Any]] = ()
 ) -> dict[str, Any]:
-    """Return the answer to a merge (spec §5); ``sync_id`` and ``left_out`` only where there are such."""
+    """Make the answer to a merge (spec §5), with ``sync_id`` and ``left_out`` only if they are not empty."""
 
     def lines(changes: Iterable[BomChange]) -> list[dict[str, Any]]:
         return [
@@ -405,7 +406,7 @@ def answer_of(
 
 
 def conflict_warning(change: QuantityChange) -> dict[str, Any]:
-    """Return the warning of a line that a person gave another quantity than the assembly has."""
+    """Make the warning about a line whose quantity a person set, and which differs from the assembly's."""
     cad, ours = plain(change.local_quantity), plain(change.remote_quantity)
     kept = change.on_server(str(ours))
     return {
@@ -431,9 +432,9 @@ def would_undo(newest: FileRevision | None, base: int | None, sha256: str | None
     """Return True if a file that was made from revision ``base`` would undo the newest one.
 
     newest
-        the item's newest revision with a file; the very file with this ``sha256`` is nobody else's.
+        the item's newest revision with a file; if that file has this ``sha256``, nothing is undone.
     base
-        None where nobody says what the file was made from.
+        None if it is not known what the file was made from.
     """
     if base is None or newest is None:
         return False
@@ -441,16 +442,16 @@ def would_undo(newest: FileRevision | None, base: int | None, sha256: str | None
 
 
 def base_of(revision: int | None, sha256: str | None, same: int | None) -> int | None:
-    """Return the revision that a merge's document is, or was made from; None if nobody knows.
+    """Return the revision that a merge's document is, or was made from; None if it is not known.
 
     revision, sha256
-        what the request says: a revision, and the SHA-256 of its file. Without a revision ``sha256`` is that
-        of the document, which may be edited, and then is no revision.
+        from the request: a revision, and the SHA-256 of its file. Without a revision, ``sha256`` is that of
+        the document, which is no revision if it was edited.
     same
-        the newest revision whose file has this ``sha256``; None where none has.
+        the newest revision whose file has this ``sha256``; None if none has.
 
-    Raises :class:`MissingRevisionError` for a revision that the server does not have: it was restored from a
-    backup since, and the number may by now be that of another file.
+    Raises :class:`MissingRevisionError` for a revision that the server does not have: the server was restored
+    from a backup, and another file may have the number by now.
     """
     if revision is None:
         return same
@@ -467,7 +468,7 @@ T = TypeVar("T")
 
 
 def _first(*states: T | None) -> T:
-    """Return the first state there is; one of them always is."""
+    """Return the first state that is not None; one of them never is."""
     return next(state for state in states if state is not None)
 
 
@@ -488,13 +489,13 @@ class LineChange:
 
     @property
     def entry(self) -> BomEntry:
-        """Return the component as it is now, or as it was last."""
+        """Return the component as it is now; if it is removed, as it was."""
         return _first(self.new, self.old)
 
     @property
     def kind(self) -> str:
-        """Return ``added``, ``removed``, ``quantity_changed`` or ``moved`` (another file or object, same
-        part).
+        """Return ``added``, ``removed``, ``quantity_changed`` or ``moved`` (same part, other file or
+        object).
         """
         if self.old is None:
             return "added"
@@ -513,14 +514,12 @@ class AssemblyChange:
 
     @property
     def head(self) -> BomEntry:
-        """Return the assembly as it is now, or as it was last."""
+        """Return the assembly as it is now; if it is removed, as it was."""
         return _first(self.new, self.old).head
 
     @property
     def kind(self) -> str:
-        """Return ``added``, ``removed``, ``changed``, or ``moved`` where only its file or object is
-        another.
-        """
+        """Return ``added``, ``removed``, ``changed``, or ``moved`` if only its file or object is another."""
         if self.old is None:
             return "added"
         if self.new is None:
@@ -531,7 +530,9 @@ class AssemblyChange:
 def compare_assemblies(
     old: Sequence[ComparedAssembly], new: Sequence[ComparedAssembly]
 ) -> tuple[AssemblyChange, ...]:
-    """Return every assembly whose lines or place differ, in the order of the new state, removed ones last."""
+    """Return every assembly whose lines or place differ, in the order of the new state; removed ones come
+    last.
+    """
     match = _Match(old, new)
     before = {match.of_old(assembly.head): assembly for assembly in old}
     changes = []
@@ -560,37 +561,38 @@ class ThreeLines:
 
     @property
     def entry(self) -> BomEntry:
-        """Return the component, by the newest state that has it."""
+        """Return the component as I have it; if I do not, as they have it, or as the base has it."""
         return _first(self.mine, self.theirs, self.base)
 
     @property
     def quantities(self) -> tuple[float, float, float]:
-        """Return the quantities in (base, theirs, mine); 0 = no line."""
+        """Return the quantities in (base, theirs, mine); 0 means no line."""
         base, theirs, mine = (entry.quantity if entry else 0 for entry in (self.base, self.theirs, self.mine))
         return base, theirs, mine
 
     @property
     def by_them(self) -> bool:
-        """Return True if they changed it."""
+        """Return True if they changed the quantity."""
         return self.quantities[1] != self.quantities[0]
 
     @property
     def by_me(self) -> bool:
-        """Return True if I changed it."""
+        """Return True if I changed the quantity."""
         return self.quantities[2] != self.quantities[0]
 
     @property
     def undoes(self) -> bool:
-        """Return True if mine in the place of theirs would undo what they did."""
+        """Return True if mine, in place of theirs, would undo their change."""
         return self.by_them and self.quantities[1] != self.quantities[2]
 
 
 def compare_three(
     base: ComparedAssembly | None, theirs: ComparedAssembly, mine: ComparedAssembly
 ) -> tuple[ThreeLines, ...]:
-    """Return every line of an assembly that one of two people changed; what would be undone comes first.
+    """Return every line of an assembly that one of two people changed; first those whose change would be
+    undone.
 
-    Without ``base``, every line in which the two differ; who changed it is then not known.
+    Without ``base``, returns every line in which the two differ; who changed it is then not known.
     """
     common = base or ComparedAssembly(mine.head)
     to_theirs, to_mine = _Match([common], [theirs]), _Match([common], [mine])
@@ -631,11 +633,11 @@ class _Match:
                 self._new_key[key] = key
 
     def of_old(self, entry: BomEntry) -> Key:
-        """Return the new key of an old component; one that no new component has where it is gone."""
+        """Return the new key of an old component; a key that no new component has if the old one is gone."""
         return self._new_key.get(entry.key, ("\0gone", "\0".join(entry.key)))
 
     def lines(self, old: Iterable[BomEntry], new: Iterable[BomEntry]) -> tuple[LineChange, ...]:
-        """Return the lines of one assembly that differ."""
+        """Return the lines that differ between two states of one assembly."""
         before = {self.of_old(entry): entry for entry in old}
         changes = []
         for entry in new:
@@ -662,7 +664,7 @@ def _by_identity(components: Mapping[Key, BomEntry]) -> dict[str, Key]:
 
 
 def changes_json(changes: Iterable[AssemblyChange]) -> list[dict[str, Any]]:
-    """Return the comparison for machines."""
+    """Return the comparison as JSON values."""
     return [
         {
             **_entry(change.head),

@@ -70,17 +70,16 @@ class DocumentRoot:
 
 
 def saved_by(program: str | None) -> tuple[int, ...]:
-    """Return the version of the FreeCAD that saved a file, such as (1, 0), by its ``ProgramVersion``; () for
-    none.
+    """Return the version of FreeCAD in a file's ``ProgramVersion``, such as (1, 0); () if it has none.
 
-    The numbers of realthunder's branch are dates (2022.111), and say nothing about FreeCAD's.
+    The numbers of realthunder's branch are dates (2022.111), not versions of FreeCAD.
     """
     match = re.match(r"(\d{1,3})\.(\d+)", program or "")
     return tuple(map(int, match.groups())) if match else ()
 
 
 def derived(obj: Any, type_name: str) -> bool:
-    """Return True if ``obj`` says it is of (a type derived from) ``type_name``."""
+    """Return True if ``obj`` says that its type is ``type_name``, or is derived from it."""
     try:
         return bool(obj.isDerivedFrom(type_name))
     except (AttributeError, TypeError):  # a plain object that says nothing of its type
@@ -88,12 +87,12 @@ def derived(obj: Any, type_name: str) -> bool:
 
 
 def own(obj: object, name: str, default: Any = None) -> Any:
-    """Return the object's own property ``name``; never that of a link's target."""
+    """Return the object's own property ``name``, never that of a link's target."""
     if (ask := getattr(type(obj), "own_property", None)) is not None:
         return ask(obj, name, default)
     value = getattr(obj, name, default)
     # Most optional properties are unset on most objects; only a value that matters is worth asking the
-    # (much dearer) list of the object's own properties.
+    # list of the object's own properties, which takes much longer.
     if not value or value is default:
         return value
     names: Sequence[str] | None = getattr(obj, "PropertiesList", None)
@@ -101,13 +100,13 @@ def own(obj: object, name: str, default: Any = None) -> Any:
 
 
 def property_names(obj: object) -> frozenset[str] | tuple[str, ...] | None:
-    """Return the names of the object's own properties, to be used as a key; None if it does not say."""
+    """Return the names of the object's own properties, usable as a key; None if it does not list them."""
     names: Sequence[str] | frozenset[str] | None = getattr(obj, "PropertiesList", None)
     return names if names is None or isinstance(names, tuple | frozenset) else tuple(names)
 
 
 def first_of(linked: Any) -> Any:
-    """Return the object of a ``LinkedObject``, which is a tuple (object, sub-name) where there is a
+    """Return the object of a ``LinkedObject``, which is a tuple (object, sub-name) if the link has a
     sub-name.
     """
     return linked[0] if isinstance(linked, tuple) else linked
@@ -127,7 +126,7 @@ NAMELESS = "object-"
 
 
 def object_name(obj: object) -> str:
-    """Return the object's ``Name``; for an object that has none, something unique to it."""
+    """Return the object's ``Name``; if it has none, a text that is unique to it."""
     name = getattr(obj, "Name", None)
     if isinstance(name, str) and (name or getattr(obj, "is_document_root", False)):
         return name
@@ -139,7 +138,7 @@ _LONGEST_LABEL = 300
 
 
 def label_of(obj: object) -> str:
-    """Return the object's ``Label``, for people only; its ``Name`` where it has none that can be read."""
+    """Return the object's ``Label``, for people only; its ``Name`` if it has no label that can be read."""
     for name in ("Label", "Name"):
         try:
             text = getattr(obj, name, None)
@@ -151,7 +150,7 @@ def label_of(obj: object) -> str:
 
 
 def document_property(doc: object, name: str) -> Any:
-    """Return a property of the document, None if there is none (FreeCAD 0.20 has no such properties at
+    """Return a property of the document; None if there is none (FreeCAD 0.20 has no such properties at
     all).
     """
     ask = getattr(doc, "getPropertyByName", None)
@@ -190,9 +189,9 @@ _ABSOLUTE = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://|[A-Za-z]:[\\/]|\\\\|//")
 
 
 def located(recorded: str, owner: str) -> str:
-    """Return the path that a link records, relative to its owner's folder, in full; one spelling per file.
+    """Return in full the path that a link records relative to its owner's folder; one spelling per file.
 
-    Paths that stand for themselves (absolute ones, ``https://…``), and those of unsaved documents, stay.
+    Complete paths (absolute ones, ``https://…``) and those of unsaved documents stay unchanged.
     """
     if _ABSOLUTE.match(recorded) or not owner:
         return recorded
@@ -200,8 +199,8 @@ def located(recorded: str, owner: str) -> str:
 
 
 def relative(path: str, base: str, rules: ModuleType = os.path) -> str:
-    """Return ``path`` as seen from the folder ``base``, with ``/``; whole where it lies on another Windows
-    drive.
+    """Return ``path`` as seen from the folder ``base``, with ``/``; the whole path if it is on another
+    Windows drive.
 
     ``rules``: ``ntpath`` or ``posixpath``, whatever the platform.
     """
@@ -213,16 +212,16 @@ def relative(path: str, base: str, rules: ModuleType = os.path) -> str:
 
 
 def is_element_name(name: str) -> bool:
-    """Return True for geometry (``Face1``), false for what may be an object's name."""
+    """Return True for geometry (``Face1``), False for a name that an object may have."""
     return bool(_ELEMENT.fullmatch(name)) or name.startswith(_MAPPED)
 
 
 def split_sub_name(sub: Any) -> tuple[list[str], str]:
-    """Return the objects that a sub-name passes through, and the geometry it ends at ("" for the whole
+    """Split a sub-name into the objects that it passes through and the geometry at its end ("": the whole
     object).
 
-    Object names end in a dot, geometry names do not: ``"Sub.Bolt."``, ``"Inner.Face1"``. Of several sub-names
-    the first counts; FreeCAD links one object only, so all of them share the way to it.
+    Object names end in a dot, geometry names do not: ``"Sub.Bolt."``, ``"Inner.Face1"``. Only the first of
+    several sub-names counts: FreeCAD links only one object, so all of them lead to it in the same way.
     """
     first = sub if isinstance(sub, str) else next((str(part) for part in sub or ()), "")
     parts = first.split(".")

@@ -54,14 +54,14 @@ class Exit(IntEnum):
 
 
 def exit_of(error: BaseException) -> Exit:
-    """Return whose fault an error is, as an exit code."""
+    """Return the exit code of an error; it says whose fault the error is."""
     if isinstance(error, KeyboardInterrupt | CancelledError):
         return Exit.CANCELLED
     return Exit.REMOTE if isinstance(error, RemoteError | ConflictError) else Exit.BAD_INPUT
 
 
 def did_you_mean(given: str, candidates: Iterable[str]) -> str:
-    """Return the end of a sentence about an unknown name: the known ones that look like it; "" if none
+    """Write the end of a sentence about an unknown name: the known names that look like it; "" if none
     does.
     """
     near = difflib.get_close_matches(given, list(candidates), 2, 0.7)
@@ -69,7 +69,7 @@ def did_you_mean(given: str, candidates: Iterable[str]) -> str:
 
 
 def counted(number: int, singular: str, many: str = "") -> str:
-    """Return "1 item" or "2 items"; ``many`` if the plural is not ``one`` with an s."""
+    """Return "1 item" or "2 items"; ``many`` if the plural is not ``singular`` with an s."""
     return f"{number} {singular if number == 1 else many or singular + 's'}"
 
 
@@ -78,12 +78,12 @@ Translate = Callable[[str, str], str]
 
 
 def english(_context: str, text: str) -> str:
-    """Return the text as it stands."""
+    """Return the text unchanged."""
     return text
 
 
 def duration(seconds: float) -> str:
-    """Return a span of time as people say it: 40 s, 10 min, 26 hours, 27000 days."""
+    """Write a span of time for people: 40 s, 10 min, 26 hours, 27000 days."""
     for size, unit in ((86400.0, "days"), (3600.0, "hours"), (60.0, "min")):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"
@@ -91,7 +91,7 @@ def duration(seconds: float) -> str:
 
 
 def listed(names: Sequence[str], most: int = 5) -> str:
-    """Return the first ``most`` names, and how many more there are: a, b and 3 more."""
+    """List the first ``most`` names, and how many more there are: a, b and 3 more."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 
@@ -122,7 +122,7 @@ class Sentences:
         self._known: Callable[[str, bool], str] = lru_cache(4096)(self._said)
 
     def __call__(self, text: str, whole: bool = True) -> str:
-        """Say ``text``; of a part of a sentence, single words stay: they may be somebody's names."""
+        """Translate ``text``. A single word stays in a part of a sentence: it may be somebody's name."""
         if "\n" in text:
             return "\n".join(self(line, whole) for line in text.split("\n"))
         return (self._known if len(text) <= self.LONGEST else self._said)(text, whole)

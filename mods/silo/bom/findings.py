@@ -19,7 +19,7 @@ class Severity(StrEnum):
 
     INFO = "info"  # for completeness: this is how it was counted
     WARNING = "warning"  # counted, or left out, in a way a person should look at
-    ERROR = "error"  # the BOM cannot be trusted as it stands; it is not synced without consent
+    ERROR = "error"  # the BOM cannot be trusted; it is not synced without consent
 
 
 _E, _W, _I = Severity.ERROR, Severity.WARNING, Severity.INFO
@@ -378,10 +378,12 @@ class Finding:
 
     @property
     def blocks(self) -> bool:
-        """Return True if the BOM is not to be synced unless the user says so."""
+        """Return True if the BOM is not synced until the user says so."""
         return self.severity is Severity.ERROR
 
 
 def respelt_findings(notes: Iterable[str], top: str) -> tuple[Finding, ...]:
-    """Return what was taken though it is recorded in other case: right here, missing on another system."""
+    """Make the findings about files that were found by another spelling: another system does not find
+    them.
+    """
     return tuple(Finding(FindingCode.RESPELT, Severity.WARNING, f"{note}.", (Place(top),)) for note in notes)

@@ -138,7 +138,7 @@ BRACKET = re.compile(r"[\(\[（【<]\s*([^)\]）】>]*)\s*[\)\]）】>]")
 
 
 def normal(header: str) -> str:
-    """Return a header without case, punctuation, what stands in brackets, and double spaces."""
+    """Return a header in lower case, without punctuation, text in brackets and double spaces."""
     text = unicodedata.normalize("NFKC", header).casefold()
     text = BRACKET.sub(" ", text)
     return " ".join(re.sub(r"[\W_]+", " ", text).split())
@@ -152,12 +152,14 @@ _ROLE_OF: dict[str, tuple[Heading, int]] = {
 
 
 def alias(text: str) -> tuple[Heading, int] | None:
-    """Return role of a :func:`normal` header, and how well it fits: 0 is best ("Name" beats "Component")."""
+    """Return the role of a :func:`normal` header, and how well it fits: 0 is best ("Name" beats
+    "Component").
+    """
     return _ROLE_OF.get(text)
 
 
 def find_roles(header: Sequence[str], roles: Collection[Heading]) -> dict[Heading, int]:
-    """Return column index of each role. Of two columns the one whose name fits better, then the first."""
+    """Find the column index of each role. If two columns fit, the better name wins, then the first."""
     best: dict[Heading, tuple[int, int]] = {}
     for index, cell in enumerate(header):
         role_of_cell = alias(normal(cell))
@@ -171,7 +173,7 @@ def find_roles(header: Sequence[str], roles: Collection[Heading]) -> dict[Headin
 def second_columns(
     header: Sequence[str], roles: Collection[Heading], at: Mapping[Heading, int]
 ) -> list[tuple[Heading, int]]:
-    """Return the columns that mean what another one is used for (``at``)."""
+    """Return the columns that have the same role as a used column (``at``)."""
     columns_by_role = ((alias(normal(cell)), index) for index, cell in enumerate(header))
     return [(of[0], i) for of, i in columns_by_role if of and of[0] in roles and at.get(of[0], i) != i]
 
@@ -195,7 +197,7 @@ def find_clashes(
     seconds: Iterable[tuple[Heading, int]],
     is_empty: Callable[[str], bool] = lambda text: not text,
 ) -> list[Clash]:
-    """Return one for each of the ``seconds`` that says something else than the used column (``at``)."""
+    """Make a clash for each of the ``seconds`` that differs from the used column (``at``)."""
     return [
         Clash(role, header[at[role]].strip(), header[index].strip(), number, used, unused)
         for role, index in seconds
@@ -206,7 +208,7 @@ def find_clashes(
 def _differences(
     rows: Sequence[Sequence[str]], used: int, other: int, is_empty: Callable[[str], bool]
 ) -> list[tuple[int, str, str]]:
-    """Return the first row in which the columns differ, if any."""
+    """Return the first row in which the columns differ; [] if none does."""
     for number, cells in enumerate(rows):
         ours, theirs = (plain_cell(cells[i].strip()) if i < len(cells) else "" for i in (used, other))
         if not is_empty(theirs) and theirs != ours:
@@ -215,7 +217,7 @@ def _differences(
 
 
 def missing_columns(header: Sequence[str], at: Mapping[Heading, int], needed: Sequence[Heading]) -> str:
-    """Return which of the ``needed`` columns a header lacks, and what was seen; "" if none is missing."""
+    """Say which of the ``needed`` columns a header lacks, and which it has; "" if it lacks none."""
     lacking = [role for role in needed if role not in at]
     if not lacking:
         return ""
@@ -234,18 +236,20 @@ def _others(role: Heading) -> str:
 
 
 def designators(cell: str) -> tuple[str, ...]:
-    """Return ``R1, R2 R3`` as three reference designators."""
+    """Split ``R1, R2 R3`` into three reference designators."""
     return tuple(cell.replace(",", " ").split())
 
 
 def safe_cell(value: Any) -> Any:
-    """Return a cell for CSV: what would be run as a formula is made text; numbers stay numbers."""
+    """Return a cell for CSV: a text that a program would run as a formula gets a mark; numbers stay
+    numbers.
+    """
     if isinstance(value, str) and value.lstrip("'").startswith(FORMULA_STARTS):
         return "'" + value
     return value
 
 
 def plain_cell(text: str) -> str:
-    """Return what :func:`safe_cell` was given."""
+    """Return the text from which :func:`safe_cell` made a cell."""
     made_text = text.startswith("'") and text.lstrip("'").startswith(FORMULA_STARTS)
     return text[1:] if made_text else text

@@ -56,8 +56,8 @@ def extract_bom_links(assembly_obj: Any, level: int = 1) -> list[BomEntry]:
 def file_bom(
     document: Any, hint: Any = None, walk: Callable[[Any], Extraction] | None = None
 ) -> tuple[str | None, Extraction | None]:
-    """Return the item whose revisions are those of a file, and the BOM of its assembly; None for each that
-    there is not.
+    """Return the item to which a file's revisions belong, and the BOM of its assembly; None for each that
+    does not exist.
 
     hint
         the container to take if the document holds several assemblies.
@@ -83,9 +83,9 @@ def file_bom(
 
 
 def file_item(document: Any, hint: Any = None) -> str | None:
-    """Return the item that a file belongs to, as :func:`file_bom`; mostly without a look for the assembly."""
-    if result := sole_identity(document):
-        return result
+    """Return the same item as :func:`file_bom`, mostly without looking for the assembly."""
+    if identity := sole_identity(document):
+        return identity
     try:
         return identity_of(choose_assembly(document))
     except SeveralAssembliesError:
@@ -108,14 +108,14 @@ def extract(
         says what is wrong with a live object (see :func:`silo.bom.targets.resolve_target`); links read
         from FCStd files know it themselves.
     canonical
-        makes one path of the several that may name one file (``os.path.realpath`` for live documents).
+        makes one path of the several paths that a file may have (``os.path.realpath`` for live documents).
     whole
-        gives a document with all its objects for one that FreeCAD loaded in part.
+        returns a document with all its objects for one that FreeCAD loaded in part.
     hardware
         False leaves standard parts out.
     below
-        False reads this one assembly only. ``is_assembly`` then says of each entry whether it may be one;
-        nothing is reported of what needs the whole tree (rings, shared identities).
+        False reads this one assembly only. ``is_assembly`` then says for each entry if it may be one; nothing
+        is reported that needs the whole tree (rings, shared identities).
     """
     walker = _Walker(inspect, canonical, whole, hardware, below)
     top = assembly_obj
@@ -154,7 +154,7 @@ def why(
     whole: Whole = as_it_is,
     hardware: bool = True,
 ) -> list[str]:
-    """Say why the assembly itself has so many of a part: the number, then each chain of links.
+    """Say why the assembly itself has this quantity of a part: the number, then each chain of links to it.
 
     parts
         the keys of the lines, or a name, a label or a designation.
@@ -163,11 +163,11 @@ def why(
     """
     walker = _Walker(inspect, canonical, whole, hardware, below=False)
     contents = walker.reader.contents(assembly_obj)
-    total, line_number, lines = 0, set[str](), list[str]()
+    total, all_names, lines = 0, set[str](), list[str]()
     for count in (*contents.counts, *contents.own):
         entry = walker.entry_for(count.target)
         names = (entry.object_name, entry.label, entry.document_label, entry.standard or "")
-        line_number.update(names)
+        all_names.update(names)
         if not (meant := [piece for piece in (entry.key, *names) if piece in parts]):
             continue
         part = meant[0] if isinstance(meant[0], str) else entry.standard or display_name(entry)
@@ -177,7 +177,7 @@ def why(
             lines.append(" → ".join(["beside the assembly"] * count.beside + steps))
     if not lines:
         wanted = next((piece for piece in parts if isinstance(piece, str)), "This line")
-        meant_by = did_you_mean(wanted, sorted(line_number - {""})) or "."
+        meant_by = did_you_mean(wanted, sorted(all_names - {""})) or "."
         raise InputError(f"{wanted!r} is not a part of {label_of(assembly_obj)} itself{meant_by}")
     return [f"{total} × {part} in {label_of(assembly_obj)}:", *lines]
 
@@ -200,9 +200,9 @@ class _Walker:
         below: bool,
     ) -> None:
         self._goes_below = below
-        # Nothing here refers back to the walker: what a walk made goes with it, at once.
+        # Nothing here refers back to the walker, so all values of a walk are freed with it, at once.
         self._files = files = Files(canonical)
-        # For a look at what is not counted, which is nobody's business twice.
+        # For what is not counted; its findings would only repeat others.
         self.silent = silent_reader(files, inspect=inspect, hardware=hardware)
         self.reader = silent_reader(
             files, inspect=inspect, hardware=hardware, counts_beside=hardware, whole=whole
@@ -218,10 +218,10 @@ class _Walker:
         self._held: dict[Key, set[str]] = {}
 
     def component(self, obj: Any) -> Key:
-        """Return what a component is; the same as its key where it has a name.
+        """Return the identity of a component; it is its key if it has a name.
 
-        Nameless ones are distinguished by the order in which their document showed them, so that two
-        documents made of one file agree.
+        Components without a name are distinguished by their order in the document, so that two documents of
+        one file agree.
         """
         if isinstance(obj, Lost):
             return (self._files.canonical(obj.file), obj.name)
@@ -242,7 +242,7 @@ class _Walker:
         return (path, f"{NAMELESS}{place + 1}" if place else "")
 
     def entry_for(self, obj: Any) -> BomEntry:
-        """Return what an object says of itself, wherever it is used."""
+        """Make the entry of an object from what it says of itself, wherever it is used."""
         path, name = key = self.component(obj)
         if isinstance(obj, Lost):
             stem = os.path.splitext(os.path.basename(path.replace("\\", "/")))[0]
@@ -295,14 +295,14 @@ class _Walker:
         return self._containers[key]
 
     def _assembly(self, container: Any, level: int, depth: int, entry: Key) -> tuple[BomEntry, ...]:
-        """Return the direct children of an assembly, put together once per nesting level at which it occurs.
+        """Make the entries of an assembly's direct children, once per nesting level at which it occurs.
 
         entry
-            where the walk came into the ring that the assembly is in; itself where it is in none.
+            where the walk entered the assembly's ring; the assembly itself if it is in none.
         """
         key = self.component(container)
-        if (bom_entries := self._memo.get((key, level, entry))) is not None:
-            return bom_entries
+        if (known := self._memo.get((key, level, entry))) is not None:
+            return known
         contents = self.reader.contents(container)
         lines: dict[Key, list[Count]] = {}
         for count in contents.counts:
@@ -331,7 +331,9 @@ class _Walker:
         return self._assembly(target, level, depth, entry)
 
     def look_beside(self, top: Any, *, empty: bool) -> None:
-        """Report what lies beside the top, and objects without a role: nobody knows what those are."""
+        """Report objects beside the top that hold components, and objects without a role, whose meaning is
+        unknown.
+        """
         roles = fates(top, self.reader.contents(top), self.silent)
         for name, role in roles.items():
             if role is None:
@@ -339,7 +341,7 @@ class _Walker:
         self.notes.beside(beside(top, roles), empty=empty)
 
     def own_lines(self, container: Any, level: int) -> tuple[BomEntry, ...]:
-        """Return what an assembly shows of its own file and is no item yet."""
+        """Make entries of the parts of its own file that an assembly shows and that are no items yet."""
         contents = self.reader.contents(container)
         if not contents.is_assembly(container):
             return ()
@@ -351,7 +353,7 @@ class _Walker:
         return tuple(entries)
 
     def _free(self, links: list[Count], container: Any) -> list[Count]:
-        """Return the links that no joint holds, so that an array would do."""
+        """Return the links that no joint holds, which an array could replace."""
         if len(links) < 2:
             return []
         if (key := self.component(container)) not in self._held:
@@ -388,7 +390,7 @@ class _Walker:
         return not self._goes_below or self.reader.contents(target).holds_components
 
     def holds(self, top: Any) -> bool:
-        """Return True if the top holds components, also such as do not count."""
+        """Return True if the top holds components, even if they do not count."""
         return self.reader.contents(top).holds_components
 
 
@@ -414,7 +416,7 @@ class Rings:
         return other in self._members.get(key, ())
 
     def closes(self, entry: Key, here: Key, there: Key) -> bool:
-        """Return True if the link from ``here`` to ``there`` is cut, in a ring that was entered at
+        """Return True if the walk cuts the link from ``here`` to ``there``, in a ring that it entered at
         ``entry``.
         """
         if not self.same_ring(here, there):
@@ -423,7 +425,7 @@ class Rings:
         return ways[there][1] <= ways[here][1]
 
     def example(self, node: Key) -> tuple[Key, ...]:
-        """Return a ring to report: the shortest through the first of those in a ring with ``node``."""
+        """Return a ring for the report: the shortest through the first of those in a ring with ``node``."""
         first = min(self._members[node])
         ways = self._outwards(first)
         ring = [next(reached for reached in ways if first in self._graph[reached])]
@@ -432,7 +434,9 @@ class Rings:
         return tuple(reversed(ring))
 
     def _outwards(self, entry: Key) -> dict[Key, tuple[Key, int]]:
-        """Return all in a ring with the entry, nearest first: the assembly before each, and the distance."""
+        """Return the assemblies in a ring with the entry, nearest first: the assembly before each, and the
+        distance.
+        """
         if entry not in self._ways:
             ways, further = {entry: (entry, 0)}, [entry]
             for node in further:
@@ -448,9 +452,9 @@ def strongly_connected(graph: Graph) -> list[frozenset[Key]]:
     """Return the strongly connected parts of a graph (Gabow's algorithm, without recursion)."""
     at: dict[Key, int] = {}
     path, starts, parts = list[Key](), list[int](), list[frozenset[Key]]()
-    left = [(node, False) for node in graph]
-    while left:
-        node, is_done = left.pop()
+    waiting = [(node, False) for node in graph]
+    while waiting:
+        node, is_done = waiting.pop()
         if is_done:
             if starts[-1] == at[node]:
                 parts.append(frozenset(path[starts.pop() :]))
@@ -460,7 +464,7 @@ def strongly_connected(graph: Graph) -> list[frozenset[Key]]:
             at[node] = len(path)
             starts.append(len(path))
             path.append(node)
-            left += [(node, True), *((target, False) for target in graph[node] if target in graph)]
+            waiting += [(node, True), *((target, False) for target in graph[node] if target in graph)]
         else:
             while starts and starts[-1] > at[node]:
                 starts.pop()

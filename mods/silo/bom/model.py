@@ -57,7 +57,7 @@ class Frozen(tuple[T, ...]):
 
 
 def _freeze(value: object, *names: str) -> None:
-    """Make tuples of the fields: a caller may hand over any iterable, a frozen value holds a tuple."""
+    """Turn these fields into tuples: a caller may give any iterable, but a frozen value holds a tuple."""
     for name in names:
         if type(given := getattr(value, name)) is not Frozen:
             object.__setattr__(value, name, Frozen(given))
@@ -131,7 +131,7 @@ class BomEntry:
 
     @property
     def key(self) -> tuple[str, str]:
-        """Return what a component is: (file, object), or the designation of a standard part. Never a
+        """Return the key of a component: (file, object), or the designation of a standard part. Never a
         label.
         """
         if self.is_standard:
@@ -140,9 +140,9 @@ class BomEntry:
 
     @property
     def is_standard(self) -> bool:
-        """Return True for an article that its designation identifies; no file is stamped for it.
+        """Return True if its designation identifies the article; no file gets its identity.
 
-        False for a fastener that somebody registered as an item of its own: its object carries that identity.
+        False for a fastener that somebody registered as an item of its own; its object has the identity.
         """
         return self.standard is not None and self.silo_uuid == standard_uuid(self.standard)
 
@@ -217,7 +217,7 @@ class QuantityChange(Row):
         return hash((self.part_number, self.local_quantity, self.remote_quantity))
 
     def on_server(self, written: str) -> str:
-        """Return the server's quantity, as the caller writes numbers, with its unit."""
+        """Return the server's quantity, as the caller writes it, with its unit."""
         return f"{written} {self.unit}".rstrip()
 
 
@@ -247,12 +247,12 @@ class BomDiff:
 
     @property
     def drifted(self) -> bool:
-        """Return True if CAD and server differ in any way a check should report."""
+        """Return True if CAD and server differ in a way that a check reports."""
         return bool(self.added or self.removed or self.quantity_changed or self.conflicts)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Return what the comparison leaves to a person; :meth:`findings_at` adds the place."""
+        """Make findings of what the comparison leaves to a person; :meth:`findings_at` adds the place."""
         return self.findings_at()
 
     def findings_at(self, parent: BomEntry | None = None) -> tuple[Finding, ...]:
@@ -280,7 +280,7 @@ class BomDiff:
 
 
 def rows_as_dicts(rows: Iterable[Row]) -> list[dict[str, Any]]:
-    """Return plain dicts, for JSON."""
+    """Return dicts of plain values, for JSON."""
     return [dict(row) for row in rows]
 
 
@@ -288,7 +288,7 @@ META_KEY = "SiloUUID"
 
 
 def meta_key(obj_name: str = "") -> str:
-    """Return the key in ``Meta`` for the whole document, or for one of its objects."""
+    """Return the key in ``Meta`` for the identity of the whole document, or of one of its objects."""
     return f"{META_KEY}/{obj_name}" if obj_name else META_KEY
 
 
@@ -304,7 +304,9 @@ def identity_of(obj: object) -> str | None:
 
 
 def as_uuid(text: str) -> str:
-    """Return a UUID in its one written form; "" for what is none. Files hold it in capitals, in braces."""
+    """Return a UUID in its one written form; "" if the text is none. Files have it in capitals, or in
+    braces.
+    """
     try:
         return str(UUID(text))
     except ValueError:
@@ -312,23 +314,23 @@ def as_uuid(text: str) -> str:
 
 
 def own_identity(obj: object) -> str | None:
-    """Return the identity that is written for this very object, not for its document."""
+    """Return the identity that is written for this very object, not that of its document."""
     for name in ("SiloItemId", "SiloUUID"):
-        if result := _text(own(obj, name)):
-            return result
+        if identity := _text(own(obj, name)):
+            return identity
     name = object_name(obj)
     return _text(_meta(getattr(obj, "Document", None)).get(meta_key(name))) if name else None
 
 
 def document_identity(doc: object) -> str | None:
-    """Return the identity that is written for a whole document."""
+    """Return the identity that is written for the whole document."""
     if doc is None:
         return None
     return _text(document_property(doc, "SiloUUID")) or _text(_meta(doc).get(META_KEY))
 
 
 def held_items(doc: object) -> tuple[tuple[str, str], ...]:
-    """Return what a document says of the items in it: (identity, object), in document order.
+    """Return the items that a document says it holds: (identity, object), in document order.
 
     The object is "" for the identity of the file as a whole, which comes first.
     """
@@ -338,7 +340,7 @@ def held_items(doc: object) -> tuple[tuple[str, str], ...]:
 
 
 def sole_identity(doc: object) -> str | None:
-    """Return the item that a file without an assembly belongs to; None for several or none."""
+    """Return the item to which a file without an assembly belongs; None if it has several or none."""
     if whole := document_identity(doc):
         return whole
     items = {identity for identity, _ in held_items(doc)}
@@ -353,8 +355,8 @@ def _meta(doc: object) -> Mapping[str, str]:
 def walk_entries(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:
     """Yield every distinct component below, each once, parents before children.
 
-    What lies below is looked at for each distinct value of a component: where a walk was cut (a ring, too
-    deep), one component may have fewer children in one place than in another.
+    Looks below each distinct value of a component: if a walk was cut (a ring, too deep), a component may have
+    fewer children in one place than in another.
     """
     yielded: set[tuple[str, str]] = set()
     seen: dict[int, BomEntry] = {}  # nested assemblies share their values; kept, so that ids stay theirs
@@ -371,7 +373,7 @@ def walk_entries(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:
 
 
 def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
-    """Return one UUID in two files ("copied identity"), or on two parts of one file ("shared identity")."""
+    """Find one UUID in two files ("copied identity"), or on two parts of one file ("shared identity")."""
     users: dict[str, dict[tuple[str, str], BomEntry]] = {}
     for entry in sorted(walk_entries(entries), key=lambda entry: entry.key):
         if entry.silo_uuid:
@@ -448,7 +450,7 @@ class Notes:
         self._notes: dict[_Slot, _Note] = {}
 
     def findings(self) -> tuple[Finding, ...]:
-        """Return all findings, in the order in which they were first met."""
+        """Return all findings, in the order in which they were first noted."""
         return tuple(note.finding(code) for (code, _), note in self._notes.items())
 
     def any_blocking(self) -> bool:
@@ -456,7 +458,7 @@ class Notes:
         return any(note.severity is Severity.ERROR for note in self._notes.values())
 
     def place(self, obj: Any) -> Place:
-        """Return where an object is."""
+        """Return the place of an object: its file and its name."""
         return Place(self._path_of(obj) or self.reading, object_name(obj))
 
     def add(
@@ -470,10 +472,11 @@ class Notes:
         tail: str | None = None,
         **values: Any,
     ) -> _Note:
-        """Note a finding of an object in the words of its code; ``values``: what its sentence names.
+        """Note a finding about an object in the words of its code; ``values`` fill in its sentence.
 
         about
-            findings of one code about the same become one, which names all objects; None: the object itself.
+            findings of one code about the same thing become one, which names all objects; None: the object
+            itself.
         severity, sentence, tail
             in place of those of the code.
         """
@@ -514,7 +517,7 @@ class Notes:
             note.file = problem.file
 
     def unreadable(self, obj: Any, error: DocumentError) -> None:
-        """Report that the file of ``obj`` is damaged at this very place."""
+        """Report that the file of ``obj`` is damaged at exactly this place."""
         text, tail = "The file {file} cannot be read in full ({reason})", "not counted: {users}"
         self.add(
             FindingCode.UNREADABLE_FILE,
@@ -578,7 +581,7 @@ class Notes:
         self.add(FindingCode.STALE_ASSEMBLY_LINK, link, target=target, parts="; ".join(parts))
 
     def own_parts(self, container: Any, lines: Sequence[BomEntry]) -> None:
-        """Report, once per assembly, what it shows of its own file and is no item yet."""
+        """Report, once per assembly, the parts of its own file that it shows and that are no items yet."""
         if not lines:
             return
         self.add(
@@ -596,10 +599,10 @@ class Notes:
         self._notes[FindingCode.EMPTY_BOM, ""] = note
 
     def beside(self, objects: Sequence[Any], *, empty: bool = False) -> None:
-        """Report what lies in the top document, but not in the assembly, and holds components.
+        """Report objects in the top document that hold components but are not part of the assembly.
 
         empty
-            the assembly holds none at all, so it may be the wrong one.
+            the assembly holds no components at all, so it may be the wrong one.
         """
         code = FindingCode.BESIDE_ASSEMBLY
         more = ", which holds none; move them into it, or name the right assembly" if empty else ""

@@ -49,7 +49,7 @@ class Mark(StrEnum):
 
     @property
     def other(self) -> Mark:
-        """Return the mark that groups thousands where this one is the decimal mark."""
+        """Return the other mark: it groups thousands if this one is the decimal mark."""
         return Mark.COMMA if self is Mark.POINT else Mark.POINT
 
 
@@ -74,17 +74,19 @@ class Number:
 
     @property
     def value(self) -> float:
-        """Return the value as a float; infinite where no float is as large."""
+        """Return the value as a float; infinity if it is too large for one."""
         return float(self.exact)
 
     @property
     def step(self) -> float:
-        """Return the weight of the last written digit; the number is rounded to ± step / 2."""
+        """Return the weight of the last written digit; the rounding error is at most step / 2."""
         return float(f"1e{self.places}")
 
     @property
     def ambiguous(self) -> bool:
-        """Return True if the text can be read two ways: as one thousand and more, or as one and a bit."""
+        """Return True if the text can be read in two ways: as a thousand or more, or as a number with a
+        fraction.
+        """
         return self.other is not None
 
 
@@ -105,9 +107,10 @@ _COUNT_WORD = re.compile(rf"(?P<number>.*?[0-9¼-¾⅐-⅞.,])\s*(?:x|×|{_PIECE
 
 
 def parse_number(text: str, mark: Mark | None = None) -> Number | None:
-    """Return ``text`` as a number; None if it is none. ``mark`` decides what is ambiguous.
+    """Read ``text`` as a number; None if it is none. ``mark`` decides if it is ambiguous.
 
-    A mark that contradicts the text ("1,234.5" under COMMA) gives None: it is not the number it seems.
+    A mark that contradicts the text ("1,234.5" under COMMA) gives None, since it is not the number that it
+    seems to be.
     """
     bare = plain_text(text)
     if len(bare) > LONGEST:
@@ -129,7 +132,8 @@ def parse_number(text: str, mark: Mark | None = None) -> Number | None:
 
 
 def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
-    """Return ``text`` as a number for somebody who can be asked: refused where it is none, or is ambiguous.
+    """Read ``text`` as a number; refuses, in words, a text that is none or that is ambiguous, so that a
+    person corrects it.
 
     points_are_decimal
         for files and requests that programs write: "1.234" is 1.234. "1,234" stays ambiguous.
@@ -148,20 +152,18 @@ def read_number(text: str, mark: Mark | None = None, *, points_are_decimal: bool
 
 
 def read_count(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
-    """Read a number as :func:`read_number` does; the text may name what it counts: "4 pcs", "4x", "4
-    Stk.".
-    """
+    """Read a number as :func:`read_number` does; the text may name the unit: "4 pcs", "4x", "4 Stk."."""
     counted = _COUNT_WORD.fullmatch(text.strip())
     return read_number(counted["number"] if counted else text, mark, points_are_decimal=points_are_decimal)
 
 
 def counts_pieces(unit: str | None) -> bool:
-    """Return true for no unit and for "pcs" or the like: what a CAD quantity is counted in."""
+    """Return True for no unit and for "pcs" or the like, in which CAD counts."""
     return not unit or not unit.strip() or _PIECE.fullmatch(unit.strip()) is not None
 
 
 def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
-    """Return the quantity of a BOM line: a count above 0 and at most 1e9."""
+    """Read the quantity of a BOM line: a number above 0 and at most 1e9."""
     reading = read_count(text, mark, points_are_decimal=points_are_decimal)
     if reading.value is not None and not 0 < reading.value <= Decimal(LARGEST_QUANTITY):
         return NumberReading(None, f"wanted a number above 0 and at most 1e9, got “{text.strip()[:LONGEST]}”")
@@ -169,14 +171,13 @@ def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bo
 
 
 def common_mark(marks: Iterable[Mark | None]) -> Mark | None:
-    """Return the decimal mark that the numbers of a column agree on; None if they show none, or both."""
+    """Return the decimal mark that the numbers of a column show; None if they show none, or both."""
     shown = {mark for mark in marks if mark is not None}
     return shown.pop() if len(shown) == 1 else None
 
 
 def plain_text(text: str) -> str:
-    """Return ``text``, stripped, with full-width letters as narrow ones and the digits of any script as 0 to
-    9.
+    """Strip ``text``, and write full-width letters as narrow ones and the digits of any script as 0 to 9.
 
     Superscripts, fractions and circled numbers stay what they are: "5²" is not 52, nor "1½" 11/2.
     """
@@ -203,12 +204,12 @@ def as_decimal(value: float | int | Decimal) -> Decimal:
 
 
 def exact_sum(values: Iterable[float | int | Decimal]) -> Decimal:
-    """Return the sum of what the values show: 0.1 + 0.2 is 0.3. Exact to 80 digits."""
+    """Sum the values as they are written: 0.1 + 0.2 is 0.3. Exact to 80 digits."""
     return reduce(_WIDE.add, map(as_decimal, values), Decimal(0))
 
 
 def exact_product(values: Iterable[float | int | Decimal]) -> Decimal:
-    """Return the product of what the values show: 3 × 0.1 is 0.3. Exact to 80 digits."""
+    """Multiply the values as they are written: 3 × 0.1 is 0.3. Exact to 80 digits."""
     return reduce(_WIDE.multiply, map(as_decimal, values), Decimal(1))
 
 
@@ -217,9 +218,7 @@ def plain(value: None) -> None: ...
 @overload
 def plain(value: float | Decimal) -> int | float: ...
 def plain(value: float | Decimal | None) -> int | float | None:
-    """Return ``value`` as JSON and people should see it: a count as a count (12, not 12.0); None stays
-    None.
-    """
+    """Return ``value`` as JSON and people have it: a count as a count (12, not 12.0); None stays None."""
     if isinstance(value, float):
         return int(value) if value.is_integer() and abs(value) < 1e16 else value
     if isinstance(value, Decimal):
@@ -228,7 +227,7 @@ def plain(value: float | Decimal | None) -> int | float | None:
 
 
 def whole_number(text: str, digits: int = 15) -> int | None:
-    """Return the whole number that a program wrote: so many ASCII digits at most; None for anything else.
+    """Read a whole number that a program wrote, of at most ``digits`` ASCII digits; None for anything else.
 
     For headers, form fields and addresses. ``str.isdigit`` alone is also true for "²", which ``int`` refuses.
     """
@@ -239,9 +238,7 @@ _YES, _NO = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
 
 
 def yes_or_no(text: str) -> bool | None:
-    """Return what a setting says: ``1``, ``true``, ``yes``, ``on`` or their opposites; None for anything
-    else.
-    """
+    """Read a setting: ``1``, ``true``, ``yes``, ``on`` or their opposites; None for anything else."""
     word = text.strip().lower()
     return True if word in _YES else False if word in _NO else None
 
@@ -254,7 +251,9 @@ class _Split(NamedTuple):
 
 
 def _split(body: str, mark: Mark | None) -> _Split | None:
-    """Return whole digits, fraction digits, and the mark this proves; None if it is no number."""
+    """Split a number into whole digits, fraction digits, and the mark that this proves; None if it is no
+    number.
+    """
     points, commas = body.count("."), body.count(",")
     if not points and not commas:
         return _Split(body, "", None)

@@ -30,14 +30,14 @@ class Kind(Enum):
     FOLDER = auto()  # a plain folder: its content is flattened into the parent's Group already
     ELEMENT = auto()  # one element of a link array that was put into a group
     DRAFT_ARRAY = auto()  # Count instances of Base
-    COMPOUND = auto()  # shows its Links, which stand for nothing of their own beside it
+    COMPOUND = auto()  # shows its Links, which do not count themselves
     COPY = auto()  # a clone or a mirror image: shows its originals once more
     STANDARD = auto()  # a standard part of the Fasteners workbench
     FOREIGN = auto()  # a part of another add-on, with its shape inside and no link
     LOCAL = auto()  # geometry modelled in this very file
     NOTHING = auto()  # joints, sheets, sketches, datums, variables
 
-    # Each is there once. Enum's own hash is written in Python, and a walk asks for it thousands of times.
+    # Each exists once. Enum's own hash is written in Python, and a walk needs it thousands of times.
     __hash__ = object.__hash__
 
 
@@ -95,13 +95,13 @@ _NO_COMPONENTS = {
 
 
 def has_own(obj: object, *names: str) -> bool:
-    """Return True if the object itself (no link target) has all these properties."""
+    """Return True if the object itself (not a link's target) has all these properties."""
     listed: Sequence[str] | None = getattr(obj, "PropertiesList", None)
     return all(name in listed if listed is not None else hasattr(obj, name) for name in names)
 
 
 def kind_of(obj: object) -> Kind:
-    """Return the role of a member of a container."""
+    """Return the kind of an object, as a member of a container."""
     ancestry = getattr(obj, "ancestry", None)
     if isinstance(ancestry, frozenset):
         kind = kind_by_type(ancestry)
@@ -116,7 +116,7 @@ def kind_of(obj: object) -> Kind:
 
 @lru_cache(maxsize=4096)
 def kind_by_type(ancestry: frozenset[str]) -> Kind | None:
-    """Return the role of an object of a type that is derived from these; None if its properties decide."""
+    """Return the kind of an object whose type is derived from these; None if its properties decide."""
     return _kind_by_type(ancestry.__contains__)
 
 
@@ -157,7 +157,7 @@ def _python_kind(obj: object) -> Kind:
 
 @lru_cache(maxsize=1024)
 def _kind_by_names(names: frozenset[str] | tuple[str, ...]) -> Kind | None:
-    """Return what a Python object with these properties is; None for one that they do not identify."""
+    """Return the kind of a Python object with these properties; None if they do not identify it."""
     has = frozenset(names).issuperset
     if has(("Base",)) and not frozenset(names).isdisjoint(_ARRAY_MARKS):
         return Kind.DRAFT_ARRAY
@@ -189,14 +189,14 @@ def sources(repeater: object) -> list[Any]:
 
 
 def is_assembly3(obj: object) -> bool:
-    """Return an Assembly3 container: ``Group`` = [constraints, elements, parts]; only its parts are
-    components.
+    """Return True for a container of Assembly3: ``Group`` = [constraints, elements, parts]; only its parts
+    are components.
     """
     return derived(obj, "Part::FeaturePython") and has_own(obj, *_ASSEMBLY3)
 
 
 def no_component(obj: object) -> str:
-    """Return what a link's target is instead of a component ("a spreadsheet"); "" if it may well be one."""
+    """Return what a link's target is if it is no component ("a spreadsheet"); "" if it may be one."""
     if derived(obj, "PartDesign::Body") or derived(obj, "App::Part"):  # most are, so no long list for them
         return ""
     if derived(obj, "Part::Feature") and not (
@@ -209,7 +209,7 @@ def no_component(obj: object) -> str:
 
 
 def members(container: object) -> Iterable[Any]:
-    """Return the objects that lie in a container, in document order."""
+    """Return the objects in a container, in document order."""
     if derived(container, "App::LinkGroup"):
         return getattr(container, "ElementList", None) or ()
     group: Sequence[Any] = getattr(container, "Group", None) or ()
@@ -223,25 +223,26 @@ _JOINED = ("Reference1", "Reference2", "ObjectToGround", "Part1", "Part2")
 
 
 def held_by_joints(holders: Iterable[Any]) -> set[str]:
-    """Return names of what the joints or constraints in some containers hold, each at a place of its own.
+    """Return the names of the objects that joints or constraints in these containers hold, each at its own
+    place.
 
     FreeCAD's joints name a part, or the assembly and a path to a part. Assembly3's constraints lead through
     elements; if there are any, all parts are held. Assembly4's links say so (:func:`is_attached`).
     """
-    result = set[str]()
+    names = set[str]()
     for holder in holders:
         if is_assembly3(holder) and any(own(member, "Group") for member in list(holder.Group)[:1]):
-            result.update(map(object_name, members(holder)))
+            names.update(map(object_name, members(holder)))
         for joint in own(holder, "Group") or () if derived(holder, "Assembly::JointGroup") else ():
             for value in (own(joint, name) for name in _JOINED):
                 target, subs = value if isinstance(value, tuple) else (value, ())
-                result.update(() if target is None else (object_name(target),))
-                result.update(step for sub in subs for step in str(sub).split(".")[:-1])
-    return result
+                names.update(() if target is None else (object_name(target),))
+                names.update(step for sub in subs for step in str(sub).split(".")[:-1])
+    return names
 
 
 def is_attached(link: object) -> bool:
-    """Return True for a link that Assembly4 holds at a place of its own."""
+    """Return True for a link that Assembly4 holds at its own place."""
     return bool(own(link, "AttachedTo"))
 
 
@@ -256,19 +257,19 @@ def left_out_by(obj: Any) -> str:
 
 
 def is_array(link: object) -> bool:
-    """Return True for a link array, also one with a single element."""
+    """Return True for a link array, even one with a single element."""
     count = own(link, "ElementCount", 0)
     return isinstance(count, int) and count > 0
 
 
 def elements(link: object) -> tuple[Any, ...]:
-    """Return the elements of a link array that has them as objects; none where the array only has a count."""
+    """Return the element objects of a link array; () if it only has a count."""
     return tuple(own(link, "ElementList") or ()) if is_array(link) else ()
 
 
 def array_count(link: object) -> int:
-    """Return instances of one link object: 1, or the elements of its array that are not left out one by
-    one.
+    """Count the instances of a link object: 1, or the elements of its array that are not excluded one
+    by one.
     """
     if not is_array(link):
         return 1
@@ -277,7 +278,7 @@ def array_count(link: object) -> int:
 
 
 def draft_count(array: object) -> int | None:
-    """Return instances of a Draft array; None if neither its count nor its pattern says."""
+    """Count the instances of a Draft array; None if neither its count nor its pattern gives the number."""
     count = own(array, "Count")
     if isinstance(count, int) and count > 0:
         return count
@@ -296,7 +297,7 @@ def _ortho(array: object) -> int | None:
     if any(number is None for number in numbers):
         return None
     x, y, z = (max(0, number or 0) for number in numbers)
-    # Draft draws the original also where the first number is 0.
+    # Draft draws the original even if the first number is 0.
     return x * max(1, y) * max(1, z) if x else 1
 
 
@@ -324,7 +325,7 @@ _BY_PYTHON = ("Tool", "Subtractions", "Sources", "Bodies", "Shape1", "Shape2", "
 
 
 def consumed(objects: Iterable[Any], key: Callable[[Any], T]) -> dict[T, Any]:
-    """Return what these features (of kind LOCAL) consume: key → the feature."""
+    """Map the key of each object that these features (of kind LOCAL) consume to the feature."""
     eaten: dict[T, Any] = {}
     for feature in _features(objects):
         for operand in _operands(feature):
@@ -342,7 +343,7 @@ def _features(objects: Iterable[Any]) -> Iterator[Any]:
 def _operands(feature: Any) -> Iterator[Any]:
     if derived(feature, "Part::FeaturePython"):
         names: tuple[str, ...] = _BY_PYTHON
-        # Fragments, slices and filters of compounds; what only draws others has neither.
+        # Fragments, slices and filters of compounds; objects that only draw others have neither.
         if own(feature, "Tool") is not None or own(feature, "FilterType") is not None:
             names = (*names, "Base")
         if own(feature, "Mode") is not None or own(feature, "Tolerance") is not None:
@@ -372,26 +373,26 @@ class Survey:
         self._objects = [(obj, kind_of(obj)) for obj in getattr(document, "Objects", None) or ()]
 
     def of(self, kinds: Set[Kind], but: Set[str] = frozenset()) -> list[tuple[Any, Kind]]:
-        """Return the objects of these kinds in document order, without those of these names."""
+        """Return the objects of these kinds in document order, but not those with the names in ``but``."""
         return [(obj, kind) for obj, kind in self._objects if kind in kinds and object_name(obj) not in but]
 
     def grouped(self, kinds: Set[Kind]) -> set[str]:
-        """Return names of what objects of these kinds list in their ``Group``."""
+        """Return the names of the objects in the ``Group`` of an object of these kinds."""
         return {object_name(member) for obj, _ in self.of(kinds) for member in own(obj, "Group") or ()}
 
     def has_python(self) -> bool:
-        """Return True if an object is of a Python type, as standard parts are."""
+        """Return True if the document has an object of a Python type, as standard parts are."""
         return any(getattr(obj, "TypeId", "").endswith("FeaturePython") for obj, _ in self._objects)
 
 
 def survey_of(document: Any) -> Survey:
-    """Return the survey of a document, its own where it has one."""
+    """Return the survey of a document; its own if it has one."""
     survey = getattr(document, "survey", None)
     return survey if isinstance(survey, Survey) else Survey(document)
 
 
 def is_container(obj: object) -> bool:
-    """Return True if an object (the real one, no link) may hold components."""
+    """Return True if an object (the real one, not a link) may hold components."""
     if derived(obj, "App::Part") or derived(obj, "App::LinkGroup") or is_assembly3(obj):
         return True
     if derived(obj, "Part::Feature") and kind_of(obj) in REPEATERS:
@@ -401,7 +402,7 @@ def is_container(obj: object) -> bool:
 
 
 def is_named_assembly(obj: object) -> bool:
-    """Return True if an object says of itself that it is an assembly, whatever it holds."""
+    """Return True if an object says that it is an assembly, whatever it holds."""
     if derived(obj, "Assembly::AssemblyObject") or is_assembly3(obj):
         return True
     return derived(obj, "App::Part") and own(obj, "Type") == "Assembly"
@@ -445,7 +446,7 @@ class Lost:
 
     @property
     def key(self) -> Key:
-        """Return the key that the component would have, were it there."""
+        """Return the key that the component would have if it were there."""
         return (self.file, self.name)
 
 
@@ -521,7 +522,9 @@ class Contents:
     tree: Tree | None = None
 
     def is_assembly(self, container: Any) -> bool:
-        """Return True if what it shows of its own file are parts of it: a part made of bodies has none."""
+        """Return True if the parts of its own file that it shows are parts of an assembly; the bodies of a
+        part are not.
+        """
         if self.is_part:
             return False
         if self.holds_components or is_named_assembly(container):
@@ -532,7 +535,7 @@ class Contents:
 
 
 def add(total: CountedObjects, more: CountedObjects, times: int = 1) -> None:
-    """Add what some objects bring, several times."""
+    """Add what several objects bring, each so many times."""
     for key, (target, count) in more.items():
         before = total.get(key)
         if times:
@@ -540,7 +543,7 @@ def add(total: CountedObjects, more: CountedObjects, times: int = 1) -> None:
 
 
 def climbed(start: T, above: Callable[[T], Iterable[T]]) -> Iterator[T]:
-    """Yield all that lies above something, at any distance, each once, the nearest first."""
+    """Yield everything above ``start``, at any distance, each once, the nearest first."""
     seen, further = {start}, [start]
     for key in further:
         for upper in above(key):
@@ -551,9 +554,9 @@ def climbed(start: T, above: Callable[[T], Iterable[T]]) -> Iterator[T]:
 
 
 def is_switched_on(obj: Any) -> bool:
-    """Return True for what its own ``Visibility`` does not hide, nor what lies in it.
+    """Return True if the object's own ``Visibility`` hides neither it nor its contents.
 
-    A plain folder hides nothing: FreeCAD's window hides each object in it, and each object keeps that.
+    A plain folder hides nothing: FreeCAD's window hides each object in it, and each object remembers that.
     """
     return own(obj, "Visibility") is not False or kind_of(obj) is Kind.FOLDER
 
@@ -609,27 +612,29 @@ class Tree:
         return (min([holder for holder in holders if holder not in around] or holders),)
 
     def above(self, name: Key) -> list[Key]:
-        """Return the containers around a member, the innermost first; of several link groups the first."""
+        """Return the containers around a member, the innermost first; only the first of several link
+        groups.
+        """
         if self.holders.get(name) == self._in_top:  # as most are
             return [self.top]
         return list(climbed(name, lambda key: self.holders.get(key, ())[:1]))
 
     def around(self, name: Key) -> list[Key]:
-        """Return the containers around a member but for the top."""
+        """Return the containers around a member, without the top."""
         if self.holders.get(name) == self._in_top:
             return []
         return [key for key in self.above(name) if key != self.top]
 
     def times(self, name: Key) -> int:
-        """Return how often the container shows a member; 0 for what is left out, or lies in what is."""
+        """Return how often the container shows a member; 0 if it, or a container around it, is left out."""
         return self._climbed(name, self._times, lambda obj, above: 0 if left_out_by(obj) else sum(above))
 
     def visible(self, name: Key) -> bool:
-        """Return True for what is visible and lies in visible containers."""
+        """Return True if a member is visible and lies in visible containers."""
         return self._climbed(name, self._visible, lambda obj, above: is_switched_on(obj) and any(above))
 
     def _climbed(self, name: Key, reached: dict[Key, T], of: Callable[[Any, list[T]], T]) -> T:
-        """Return a fact of a member that follows from the member and the containers around it; without
+        """Find a fact of a member that follows from the member and the containers around it, without
         recursion.
         """
         if name not in reached and self.holders[name] == self._in_top:
@@ -662,8 +667,8 @@ class Tree:
 
 
 def chains(count: Count, tree: Tree | None) -> Iterator[tuple[tuple[Any, int], ...]]:
-    """Yield each way from the assembly to the component: the objects on it, and how often each shows the
-    next.
+    """Yield each way from the assembly to the component: the objects on it, and how often each shows the next
+    one.
     """
     starts: Iterable[tuple[Any, ...]] = [()]
     if tree is not None and not count.beside:

@@ -40,9 +40,10 @@ MOST_LINES = 500_000
 
 
 def project_folder(path: str, top: str = "", rules: ModuleType = os.path) -> str:
-    """Return the folder of a file as people call it, the same on every machine: ``robot``, ``robot/arm``.
+    """Return a file's folder as people call it, the same on every machine: ``robot``, ``robot/arm``.
 
-    It begins with the folder of ``top``, the assembly of the whole run; elsewhere it is the file's own.
+    It begins with the folder of ``top``, the assembly of the whole run; for a file outside of that folder it
+    is the file's own folder.
     """
     base = rules.dirname(top or path)
     inner = relative(rules.dirname(path), base, rules)
@@ -55,12 +56,12 @@ def project_folder(path: str, top: str = "", rules: ModuleType = os.path) -> str
 
 
 def base_of(extraction: Extraction) -> str:
-    """Return the folder that printed paths are relative to: that of the top file."""
+    """Return the folder to which printed paths are relative: that of the top file."""
     return os.path.dirname(extraction.assembly.doc_path)
 
 
 def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
-    """Return one entry with its children; quantities per one parent."""
+    """Return an entry with its children as JSON values; quantities per one parent."""
     return {
         "doc_path": relative(entry.doc_path, base),
         "object": entry.object_name,
@@ -79,7 +80,8 @@ def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
 
 
 def finding_json(finding: Finding, base: str) -> dict[str, Any]:
-    """Return one finding; places are ``file`` and ``object``, files relative to the top file's folder.
+    """Return a finding as JSON values; places are ``file`` and ``object``, files relative to the top file's
+    folder.
 
     A broken link also has the ``file`` that it records, and the one that was probably meant, if there is one.
     """
@@ -94,16 +96,14 @@ def finding_json(finding: Finding, base: str) -> dict[str, Any]:
 
 
 def shorten(message: str, base: str) -> str:
-    """Return a message without the long folder that all its paths share."""
+    """Cut the folder ``base`` from the paths in a message."""
     folder = base.rstrip("/\\")
-    # The root of the disk is no folder that could be left out: all separators would go.
+    # The root of the disk cannot be left out: all separators would go.
     return message.replace(folder + os.sep, "") if folder else message
 
 
 def tree_size(entries: Iterable[BomEntry]) -> int:
-    """Return lines of the tree written out in full. Nested assemblies share their values, so it may be
-    huge.
-    """
+    """Count the lines of the tree written out in full. Nested assemblies share values, so it may be huge."""
     sizes: dict[int, int] = {}
 
     def size(entry: BomEntry) -> int:
@@ -125,9 +125,10 @@ def check_tree_size(extraction: Extraction, most: int = MOST_LINES) -> None:
 
 
 def bom_json(extraction: Extraction, base: str = "") -> dict[str, Any]:
-    """Return the whole BOM of an assembly. Raises InputError if the tree is too large to be written out.
+    """Return the whole BOM of an assembly as JSON values. Raises InputError if the tree is too large to be
+    written out.
 
-    Paths are relative to ``base``, else to the folder of the assembly's file.
+    Paths are relative to ``base``; without it, to the folder of the assembly's file.
     """
     check_tree_size(extraction)
     base = base or base_of(extraction)
@@ -148,13 +149,13 @@ def bom_json(extraction: Extraction, base: str = "") -> dict[str, Any]:
 
 
 def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
-    """Return instances of each component in the whole assembly, sub-assemblies included."""
+    """Count the instances of each component in the whole assembly, sub-assemblies included."""
     below: dict[int, dict[tuple[str, str], int]] = {}
 
     def subtree(entry: BomEntry) -> dict[tuple[str, str], int]:
         # Nested assemblies share their values; each distinct one is counted once.
-        if (result := below.get(id(entry))) is not None:
-            return result
+        if (known := below.get(id(entry))) is not None:
+            return known
         total = {entry.key: 1}
         for child in entry.children:
             for key, count in subtree(child).items():
@@ -170,17 +171,17 @@ def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
 
 
 def flat_lines(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, int]]:
-    """Return each component once, with its instances in the whole assembly."""
+    """Return each component once, with the number of its instances in the whole assembly."""
     direct = tuple(entries)
     bom_entries = {entry.key: entry for entry in walk_entries(direct)}
     return [(bom_entries[key], count) for key, count in flat_counts(direct).items()]
 
 
 def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
-    """Return each component once, with its total: what a purchaser orders from.
+    """Return each component once, with its total, as JSON values: what a purchaser orders from.
 
     ``part_number`` and ``name`` as far as they are known, ``quantity`` multiplied down the tree, ``unit``,
-    the ``standard`` or the file (``doc_path``, ``object``), and whether it is ``missing``.
+    the ``standard`` or the file (``doc_path``, ``object``), and if it is ``missing``.
     """
     base = base_of(extraction)
     return [
@@ -199,7 +200,7 @@ def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
 
 
 def diff_json(diff: BomDiff) -> dict[str, Any]:
-    """Return a comparison with the server."""
+    """Return a comparison with the server as JSON values."""
     return {field.name: rows_as_dicts(getattr(diff, field.name)) for field in fields(diff)}
 
 
@@ -233,12 +234,12 @@ FORMAT = 1
 
 _ELSEWHERE = frozenset({"children", "instances", "also", "unregistered", "own"})
 _PLAIN_FIELDS = tuple(f.name for f in fields(BomEntry) if f.name not in _ELSEWHERE)
-# What an entry usually says is left out: a vault has tens of thousands of them to read every night.
+# Usual values of an entry are left out: a vault has tens of thousands of entries to read every night.
 _USUAL = {f.name: f.default for f in fields(BomEntry) if f.name in _PLAIN_FIELDS and f.default is not MISSING}
 
 
 def to_plain(extraction: Extraction) -> dict[str, Any]:
-    """Return JSON-ready data that :func:`from_plain` makes an equal extraction of."""
+    """Write an extraction as JSON values, from which :func:`from_plain` makes an equal one."""
     table = _Table()
     return {
         "format": FORMAT,
@@ -250,7 +251,7 @@ def to_plain(extraction: Extraction) -> dict[str, Any]:
 
 
 def from_plain(data: Mapping[str, Any]) -> Extraction:
-    """Return the extraction that :func:`to_plain` wrote. Raises InputError for anything else."""
+    """Read the extraction that :func:`to_plain` wrote. Raises InputError for anything else."""
     if data.get("format") != FORMAT:
         raise InputError(f"expected a BOM snapshot of format {FORMAT}, got {data.get('format')!r}")
     try:
@@ -267,7 +268,7 @@ def from_plain(data: Mapping[str, Any]) -> Extraction:
 
 
 def whole_row(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a row of the table with all its plain fields, also those that are not written."""
+    """Fill in the plain fields of a table row that were not written because they have their usual value."""
     return {**_USUAL, **row}
 
 
@@ -349,12 +350,12 @@ class LeftOut:
     message: str = ""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON; only what is set."""
+        """Return the fields that are set, as JSON values."""
         return {key: value for key, value in asdict(self).items() if value}
 
 
 def components_of(entry: BomEntry, base: str) -> list[dict[str, str]]:
-    """Return the components of a line: what the server remembers it by. ``base``: the assembly's folder.
+    """Return the components of a line, by which the server remembers it. ``base``: the assembly's folder.
 
     Standard parts have no file of their own that could be missing.
     """
@@ -368,7 +369,7 @@ def components_of(entry: BomEntry, base: str) -> list[dict[str, str]]:
 def left_out_of(
     entries: Iterable[BomEntry], unregistered: Iterable[BomEntry], errors: Iterable[Finding], base: str
 ) -> tuple[LeftOut, ...]:
-    """Return all that a BOM of these direct children leaves out.
+    """List all that a BOM of these direct children leaves out.
 
     errors
         the findings that block this assembly. Those that missing entries explain are not repeated.
@@ -395,10 +396,10 @@ def remembered(
     entries: Iterable[Mapping[str, Any]],
     kept: Iterable[str],
 ) -> dict[str, list[dict[str, str]]]:
-    """Return part number → components, to be kept after a merge.
+    """Map each part number to the components that are kept for it after a merge.
 
-    Lines that were kept because a component is missing keep what they were known by, so that the component
-    is known again in the next sync.
+    Lines that were kept because a component is missing keep their components, so that the next sync knows the
+    component again.
     """
     fields_by_key: dict[str, list[dict[str, str]]] = {}
     for entry in entries:
@@ -411,8 +412,8 @@ def remembered(
     return {number: components for number, components in fields_by_key.items() if components}
 
 
-def in_words(left: Sequence[LeftOut] | Sequence[Mapping[str, Any]]) -> str:
-    """Return ``2 missing, 1 unregistered``; "" for nothing."""
-    reasons = Counter(str(out["reason"] if isinstance(out, Mapping) else out.reason) for out in left)
+def in_words(left_out: Sequence[LeftOut] | Sequence[Mapping[str, Any]]) -> str:
+    """Write ``2 missing, 1 unregistered``; "" if nothing is left out."""
+    reasons = Counter(str(out["reason"] if isinstance(out, Mapping) else out.reason) for out in left_out)
     parts = [f"{reasons.pop(reason)} {reason}" for reason in Reason if reason in reasons]
     return ", ".join([*parts, *(f"{count} {reason}" for reason, count in reasons.items())])

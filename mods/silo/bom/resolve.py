@@ -69,18 +69,18 @@ class Proposal:
 
     @property
     def supply(self) -> dict[str, str]:
-        """Return the properties of the new item that say where it is bought."""
+        """Return the properties of the new item that say where to buy it."""
         supply_facts = {"supplier": self.supplier, "supplier_part_number": self.supplier_part_number}
         return {name: text for name, text in supply_facts.items() if text}
 
 
 def is_generic(label: str) -> bool:
-    """Return True for a label that FreeCAD gave by itself, and for none."""
+    """Return True if FreeCAD gave the label by itself, or if it is empty."""
     return not label or _GENERIC.match(label) is not None
 
 
 def character_problem(text: str) -> str | None:
-    """Return what is wrong with the characters of a text, as a sentence; None if nothing is."""
+    """Say what is wrong with the characters of a text; None if nothing is."""
     refused = _REFUSED.search(text)
     if refused is None:
         return None
@@ -91,13 +91,13 @@ def character_problem(text: str) -> str | None:
 
 
 def with_allowed_characters(text: str, instead: str = "\ufffd") -> str:
-    """Return the text with ``instead`` for each character that :func:`character_problem` reports."""
+    """Write ``instead`` for each character that :func:`character_problem` reports."""
     return _REFUSED.sub(instead, text)
 
 
 def clean_name(text: str) -> str:
-    """Return a label as a name for people: no file suffix, no control characters, single spaces."""
-    # A label may be megabytes long, and no more than the beginning of it is used.
+    """Make a name for people from a label: no file suffix, no control characters, single spaces."""
+    # A label may be megabytes long, but only its beginning is used.
     text = _SUFFIX.sub("", unicodedata.normalize("NFC", with_allowed_characters(text[:_MOST_READ], " ")))
     printable = "".join(" " if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c for c in text)
     return " ".join(printable.replace("_", " ").split())[:200]
@@ -105,12 +105,12 @@ def clean_name(text: str) -> str:
 
 @cache
 def _unaccented(character: str) -> str:
-    # Asked once for each character: whole products are searched.
+    # Called once for each character: whole products are searched.
     return "" if unicodedata.combining(character) else character
 
 
 def folded(text: str) -> str:
-    """Return a text as searches compare it: without case and accents, and with one way to write a size.
+    """Return a text as searches compare it: without case and accents, and with one spelling of sizes.
 
     ``M3 × 6`` and ``M3x6``, ``2,5`` and ``2.5``, ``⌀`` and ``Ø`` are the same.
     """
@@ -122,26 +122,26 @@ def folded(text: str) -> str:
 
 
 def glued(text: str) -> str:
-    """Return a folded text in which a number belongs to the word before it: ``iso4762`` for ``iso 4762``."""
+    """Join each number in a folded text to the word before it: ``iso4762`` for ``iso 4762``."""
     return _GLUE.sub("", text)
 
 
 def name_key(text: str) -> str:
-    """Return what two names have in common that read as one: cleaned, folded, glued."""
+    """Return a text that is equal for two names that read as one: cleaned, folded, glued."""
     return glued(folded(clean_name(text)))
 
 
 def crowded_files(entries: Iterable[BomEntry]) -> frozenset[str]:
-    """Return files that give more than one component of this tree; standard parts need no place in a file."""
+    """Return the files that hold several components of this tree; standard parts do not count."""
     files = Counter(entry.doc_path for entry in walk_entries(entries) if not entry.is_standard)
     return frozenset(path for path, count in files.items() if count > 1)
 
 
 def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
-    """Return the document's label (spec §2), the object's where that says more, or the file's.
+    """Return the document's label (spec §2), the object's if it says more, or the file's name.
 
-    FreeCAD makes a document's label from its file's name; only one that a person chose (it differs) stands
-    before an object's own label. Where a file gives several components, the object's label decides.
+    FreeCAD makes a document's label from its file's name; only a label that a person chose (it differs) comes
+    before an object's own label. If a file gives several components, the object's label decides.
     """
     if entry.standard:
         return entry.standard
@@ -155,10 +155,9 @@ def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
 
 
 def display_name(entry: BomEntry) -> str:
-    """Return what to call a component before people: its own label, or its document's where that says
-    nothing.
+    """Return the name of a component for people: its own label, or its document's if that says nothing.
 
-    A standard part is called by its designation.
+    A standard part has its designation as its name.
     """
     if entry.standard:
         return entry.standard
@@ -167,7 +166,7 @@ def display_name(entry: BomEntry) -> str:
 
 
 def propose(entry: BomEntry, categories: Mapping[str, str], *, shares_file: bool = False) -> Proposal:
-    """Return type from the document, name from the label, category from the schema."""
+    """Propose the type by the document, the name by the label, and the category by the schema."""
     name = proposed_name(entry, shares_file=shares_file)
     guess = proposed_category(entry, name, categories)
     return Proposal(
@@ -184,8 +183,8 @@ def propose(entry: BomEntry, categories: Mapping[str, str], *, shares_file: bool
 def propose_all(
     entries: Iterable[BomEntry], tree: Iterable[BomEntry], categories: Mapping[str, str]
 ) -> list[Proposal]:
-    """Return a proposal for each; ``tree`` is all that the assembly holds, and says which files are
-    shared.
+    """Make a proposal for each entry; ``tree`` is the whole assembly, and shows which files hold several
+    components.
     """
     crowded = crowded_files(tree)
     return [propose(entry, categories, shares_file=entry.doc_path in crowded) for entry in entries]
@@ -256,7 +255,7 @@ class CategoryRule:
         return cls(category, words, _texts(raw, "without"))
 
     def fits(self, words: frozenset[str]) -> bool:
-        """Return True for the words of a name."""
+        """Return True if the rule applies to a name with these words."""
         return self.words <= words and not self.without & words
 
 
@@ -297,13 +296,13 @@ def categories_of(schema: Mapping[str, Any]) -> dict[str, str]:
     return {}
 
 
-def schema_names(said: Any) -> list[str]:
-    """Return the names in a list of schemas: objects or bare names, bare or under ``schemas``, or by name."""
-    if isinstance(said, Mapping):
-        said = said.get("schemas", said.get("items", said.get("data", said)))
-    if isinstance(said, Mapping):
-        return [str(name) for name, body in said.items() if isinstance(body, Mapping)]
-    names = [body.get("name") if isinstance(body, Mapping) else body for body in said or ()]
+def schema_names(answer: Any) -> list[str]:
+    """Read the names in a list of schemas: objects or bare names, bare or under ``schemas``, or by name."""
+    if isinstance(answer, Mapping):
+        answer = answer.get("schemas", answer.get("items", answer.get("data", answer)))
+    if isinstance(answer, Mapping):
+        return [str(name) for name, body in answer.items() if isinstance(body, Mapping)]
+    names = [body.get("name") if isinstance(body, Mapping) else body for body in answer or ()]
     return list(dict.fromkeys(name for name in names if isinstance(name, str) and name))
 
 
@@ -330,9 +329,9 @@ def _read(values: Any) -> Iterator[tuple[str, str]]:
 
 
 def rules_of(schema: Mapping[str, Any]) -> tuple[CategoryRule, ...]:
-    """Return the site's rules for categories (``category_rules``); a rule that cannot be read is left out.
+    """Read the site's rules for categories (``category_rules``); a rule that cannot be read is left out.
 
-    They only propose, so that a server with other rules, or none, costs a question and no more.
+    They only propose; a server with other rules, or none, only costs a question.
     """
     rules = []
     raw = schema.get("category_rules")
@@ -355,10 +354,10 @@ class Guess:
 
 
 def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str]) -> Guess:
-    """Return the category that fits best; the code is "" if there is none to choose from.
+    """Choose the category that fits best; its code is "" if there are no categories.
 
     categories
-        code → description, in the schema's order; :class:`Categories` brings rules along.
+        code → description, in the schema's order; :class:`Categories` also has the rules.
     """
     assemblies = assembly_categories(categories)
     fitting = [code for code in categories if (code in assemblies) == entry.is_assembly]
@@ -388,7 +387,7 @@ def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str])
 
 
 def standard_kind(designation: str) -> str:
-    """Return what a standard part is ("nut" for "ISO 4032 M4"); "" if it is not known."""
+    """Return the kind of a standard part ("nut" for "ISO 4032 M4"); "" if it is not known."""
     match = re.match(r"([A-Z]+) ([A-Z]?\d+(?:\.\d+)*|USS)", designation)
     if match is not None:
         number = match[2]
@@ -424,9 +423,9 @@ def _standard_category(designation: str, fitting: Mapping[str, str], categories:
 
 
 def assembly_categories(categories: Mapping[str, str]) -> frozenset[str]:
-    """Return the codes that are for assemblies: by their names, or because most of their group are.
+    """Return the codes for assemblies: "assembl" is in their text, or in that of most of their group.
 
-    A group is what begins with the same letter: "Top-level product" stands among the assemblies.
+    The codes of a group begin with the same letter: "Top-level product" is among the assemblies.
     """
     named = {code for code, text in categories.items() if "assembl" in text.casefold()}
     groups: dict[str, list[str]] = {}
@@ -437,7 +436,9 @@ def assembly_categories(categories: Mapping[str, str]) -> frozenset[str]:
 
 
 def _score(name: list[str], category: list[str]) -> float:
-    """Return how well a name fits a category: its last word counts, the others say what it is for."""
+    """Rate how well a name fits a category: its last word counts most, the others say what the part is
+    for.
+    """
     if not name:
         return 0.0
     common = len(set(name) & set(category)) / len(set(name))
@@ -445,7 +446,7 @@ def _score(name: list[str], category: list[str]) -> float:
 
 
 def stems(text: str) -> list[str]:
-    """Return the words of a name by which categories are found, without the plural's s."""
+    """Split a name into the words by which categories are found, without the plural's s."""
     return [_stem(word) for word in _WORD.findall(_HUMP.sub(" ", text))]
 
 
@@ -470,7 +471,7 @@ _UUID_KEYS = ("id", "uuid", "silo_uuid")
 
 
 def look_up(uuids: Iterable[str], api_client: ItemLookup) -> Known:
-    """Return the items of these UUIDs, each asked for once; None (or absent) where the server has none."""
+    """Look up the items of these UUIDs, each once; None (or absent) if the server has none."""
     wanted = list(dict.fromkeys(uuids))
     batch = getattr(api_client, "get_items_by_uuid", None)
     if callable(batch) and wanted:
@@ -491,17 +492,17 @@ def resolve_part_numbers(
 ) -> tuple[list[BomEntry], list[BomEntry]]:
     """Give each entry its part number and name.
 
-    Returns (resolved, unresolved): resolved entries in order, with resolved children, several with one part
-    number summed into one line; unresolved components of every level, each once. An unresolved sub-assembly
-    keeps its (resolved) children. Missing components stay in place without a number: nobody can look up what
-    they are, and they are not there to be registered.
+    Returns (resolved, unresolved): resolved entries in order, with resolved children, and one line for each
+    part number; unresolved components of every level, each once. An unresolved sub-assembly keeps its
+    (resolved) children. Missing components stay in place without a number: they cannot be looked up, and they
+    are not there to be registered.
     """
     items = look_up((e.silo_uuid for e in walk_entries(entries) if e.silo_uuid), api_client)
     return resolve_with(entries, items)
 
 
 def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEntry], list[BomEntry]]:
-    """Return :func:`resolve_part_numbers` against items fetched before; pure."""
+    """Do what :func:`resolve_part_numbers` does, with items that were fetched before; pure."""
     missing: dict[tuple[str, str], BomEntry] = {}
     done: dict[int, tuple[BomEntry, bool]] = {}
 
@@ -521,7 +522,7 @@ def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEnt
             entry,
             part_number=number or None,
             name=name,
-            children=tuple(several(entry.children)),
+            children=tuple(merged(entry.children)),
             unregistered=tuple(
                 child for child, children_resolved in map(one, entry.children) if not children_resolved
             ),
@@ -529,16 +530,16 @@ def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEnt
         done[id(entry)] = (bom_entry, bool(number))
         return done[id(entry)]
 
-    def several(group: Iterable[BomEntry]) -> list[BomEntry]:
+    def merged(group: Iterable[BomEntry]) -> list[BomEntry]:
         return merge_lines(entry for entry, group_resolved in map(one, group) if group_resolved)
 
-    resolved = several(entries)
+    resolved = merged(entries)
     unresolved = [one(entry)[0] for entry in missing.values()]
     return resolved, unresolved
 
 
 def numbered_findings(findings: Iterable[Finding], items: Known) -> tuple[Finding, ...]:
-    """Return the findings, those about an identity with the part number that people know it by."""
+    """Put part numbers into the findings about identities, since people know an item by its number."""
     numbers = {
         uuid: str(item["part_number"]) for uuid, item in items.items() if item and item.get("part_number")
     }
@@ -558,7 +559,7 @@ def _numbered(message: str, numbers: Mapping[str, str]) -> str:
 
 
 def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
-    """Return entries of one parent with one part number become one line with the summed quantity.
+    """Merge the entries of one parent with the same part number into one line, and sum their quantities.
 
     Entries without a number stay apart.
     """
@@ -584,7 +585,7 @@ def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
 
 
 def consolidation_message(entry: BomEntry) -> str:
-    """Return the spec's console warning (§6), with the count of individual links."""
+    """Write the spec's console warning (§6), with the count of individual links."""
     who = entry.part_number or display_name(entry) or entry.object_name or entry.doc_path
     count = entry.individual_links
     if count:
@@ -600,9 +601,7 @@ _ADVICE = ". Consider using a link array (ElementCount) for cleaner assembly man
 
 
 def one_hint_each(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings with one consolidation warning for each BOM, in the place of one for each of its
-    parts.
-    """
+    """Replace the consolidation warnings for the parts of a BOM by one warning for the BOM."""
     hints: dict[object, list[Finding]] = {}
     for finding in findings:
         hints.setdefault(
@@ -617,7 +616,7 @@ def _several_hints(hints: Sequence[Finding]) -> Finding:
 
 
 def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
-    """Return the consolidation warnings of a tree: of each assembly once, those of the top first.
+    """Make the consolidation warnings of a tree: once for each assembly, those of the top first.
 
     ``where`` names the component and, below the top, the assembly that links it several times.
     """
@@ -638,7 +637,7 @@ def _consolidation(entry: BomEntry, assembly: BomEntry | None = None) -> Finding
 
 
 def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]:
-    """Return components without a Silo part number: left out of the BOM, never in silence."""
+    """Make a finding for each component without a Silo part number: the BOM leaves it out, but says so."""
     return tuple(
         Finding(
             FindingCode.UNREGISTERED,

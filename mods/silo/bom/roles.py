@@ -64,7 +64,7 @@ from silo.bom.targets import (
     stale_copies,
 )
 
-# Groups that link to groups: a file does not need many of these, an attack does.
+# Groups that link to groups: no file needs many of these, but an attack does.
 _MAX_NESTING = 32
 # A link without a target, and one that leads back to itself, stand for no component.
 _NO_COMPONENT_LOST = (FindingCode.UNSET_LINK, FindingCode.CYCLE)
@@ -130,7 +130,7 @@ class Reader:
         self._eaten: dict[str, dict[Key, Any]] = {}
 
     def contents(self, container: Any) -> Contents:
-        """Return what an assembly holds; read once however often it is used."""
+        """Read what an assembly holds, once for all its uses."""
         key = self.key(container)
         if key not in self._known:
             self.notes.reading = key[0]
@@ -142,18 +142,18 @@ class Reader:
         return self._known[key]
 
     def brings(self, obj: Any) -> list[Any]:
-        """Return the components that one object shows, each once; no own parts."""
+        """Return the components that one object shows, each once; no own parts of the file."""
         try:
             return Reading(self, obj).brought_by(obj)
         except DocumentError:
             return []
 
     def resolve(self, link: Any) -> Target:
-        """Return the end of a link."""
+        """Follow a link to its end."""
         return resolve_target(link, self._inspect)
 
     def eaten(self, document: Any, features: Iterable[Any]) -> dict[Key, Any]:
-        """Return what the features of a document consume: key → the feature.
+        """Map the key of each object that the features of a document consume to the feature.
 
         features
             of a document that does not say which objects it has.
@@ -165,27 +165,26 @@ class Reader:
         return self._eaten[path]
 
     def no_component(self, key: Key, target: Any) -> str:
-        """Return what the target is instead of a component; "" if it may be one."""
+        """Return what the target is if it is no component; "" if it may be one."""
         if key not in self._not_components:
             self._not_components[key] = no_component(target)
         return self._not_components[key]
 
     def standard(self, obj: Any, key: Key | None = None) -> tuple[str, bool]:
-        """Return the designation of a standard part, "" for anything else; and whether it is an item of its
-        own.
+        """Return the designation of a standard part ("" for anything else), and if it has an item of its own.
 
-        It is where somebody registered that very object. What identifies the document it lies in is that of
-        the part beside it, except where there is none.
+        It has one if somebody registered this very object. The identity of its document is that of the part
+        beside it, unless there is none.
         """
         key = key or self.key(obj)
-        result = self._designations.get(key)
-        if result is None:
+        known = self._designations.get(key)
+        if known is None:
             text = designation(obj)
-            result = self._designations[key] = (text, bool(text) and _is_registered(obj))
-        return result
+            known = self._designations[key] = (text, bool(text) and _is_registered(obj))
+        return known
 
     def component(self, obj: Any) -> Key:
-        """Return what identifies a component: of standard parts their designation, of others the key."""
+        """Return the identity of a component: the designation of a standard part, the key of any other."""
         key = self.key(obj)
         text, registered = self.standard(obj, key)
         return (STANDARD_PARTS, text) if text and not registered else key
@@ -232,7 +231,7 @@ class Reading:
         self._rings: list[dict[Key, Any]] = []
 
     def contents(self, container: Any) -> Contents:
-        """Return the contents of an assembly."""
+        """Find what an assembly contains."""
         top, kind = self._key(container), kind_of(container)
         if kind in REPEATERS:
             node = self._node(top, container, kind)
@@ -271,8 +270,8 @@ class Reading:
         return Contents(counts, mine, self._roles, holds, is_part, self._hidden, tree)
 
     def _is_one_part(self, counts: list[Count]) -> bool:
-        """Return True for a file whose one component is its own only part: it is that part, no assembly of
-        it.
+        """Return True if the only component of a file is its only part: the file then is this part, and no
+        assembly of it.
         """
         only = counts[0] if len(counts) == 1 else None
         return (
@@ -283,7 +282,6 @@ class Reading:
         )
 
     def brought_by(self, obj: Any) -> list[Any]:
-        """Return the components that one object of the document shows."""
         node = self._node(self._key(obj), obj, kind_of(obj))
         return [count.target for count in self._split([(node, 1)])[0]] if node is not None else []
 
@@ -297,38 +295,38 @@ class Reading:
         return tree
 
     def _is_closed(self, obj: Any, kind: Kind) -> bool:
-        """Return True for an inline container that a person declared a component of its own."""
+        """Return True if a person declared the inline container a component of its own."""
         return kind in DECLARABLE and self._is_declared(obj)
 
     def _is_declared(self, obj: Any) -> bool:
-        """Return True for an object with an identity of its own."""
+        """Return True if an object has an identity of its own."""
         identity = own_identity(obj)
         return bool(identity) and identity is not None and identity.lower() != self._identity
 
     def _is_mine(self, target: Any) -> bool:
-        """Return True for an object of this file; FreeCAD makes two documents of one that it opened by two
-        paths.
+        """Return True if an object belongs to this file; FreeCAD makes two documents of a file that it opened
+        by two paths.
         """
         if isinstance(target, Lost):
             return False
         document = target.Document
-        is_mine = self._mine.get(id(document))
-        if is_mine is None or is_mine[0] is not document:
+        known = self._mine.get(id(document))
+        if known is None or known[0] is not document:
             is_here = bool(self._path) and self._key(target)[0] == self._path
-            is_mine = self._mine[id(document)] = (
+            known = self._mine[id(document)] = (
                 document,
                 is_here or same_document(document, self._document),
             )
-        return is_mine[1]
+        return known[1]
 
     def _is_own(self, target: Any) -> bool:
-        """Return True for geometry of this file that nobody declared."""
+        """Return True for geometry of this file that nobody declared a component."""
         if not self._is_mine(target) or self._is_declared(target):
             return False
         return not self._reader.standard(target)[0]
 
     def _find_wholes(self, tree: Tree, container: Any) -> None:
-        """Find parts that hold nothing but geometry: each is one own part, not piece by piece."""
+        """Find parts that hold nothing but geometry: each is one own part, and not one for each piece."""
         mixed, full = set[Key](), set[Key]()
         for name, (obj, kind) in tree.members.items():
             if kind in _GEOMETRY and not self._is_declared(obj) and self._is_geometry(obj, kind):
@@ -351,7 +349,7 @@ class Reading:
                 self._wholes.add(name)
 
     def _is_geometry(self, obj: Any, kind: Kind, depth: int = 0) -> bool:
-        """Return True if an object shows geometry only."""
+        """Return True if an object shows nothing but geometry."""
         if kind not in REPEATERS:
             return kind is Kind.LOCAL
         return depth < _MAX_NESTING and all(
@@ -359,7 +357,7 @@ class Reading:
         )
 
     def _find_repeated(self, tree: Tree) -> None:
-        """Find what arrays and compounds show: it never counts where it lies, nor do elements of link
+        """Find what arrays and compounds show: that never counts at its own place, nor do elements of link
         arrays.
         """
         has_elements = any(kind is Kind.ELEMENT for _, kind in tree.members.values())
@@ -367,7 +365,7 @@ class Reading:
             if kind is Kind.LINK and has_elements:
                 self._inside.update(map(self._key, elements(obj)))
             elif kind is Kind.COMPOUND or (kind is Kind.DRAFT_ARRAY and tree.times(name)):
-                # The first instance of an array stands where its original lies.
+                # The first instance of an array is at the place of its original.
                 covered = self._covered if tree.times(name) else self._gone
                 covered.update(map(self._key, sources(obj)))
 
@@ -400,7 +398,7 @@ class Reading:
         return [linked, first_of(own(obj, "LinkCopyOnChangeSource"))]
 
     def _leaves(self, tree: Tree) -> list[tuple[Contribution, int]]:
-        """Return what counts in a container, and how often; and the role of each object that lies in it."""
+        """Return what counts in a container, and how often. Notes the role of each object in it."""
         leaves: list[tuple[Contribution, int]] = []
         for name, (obj, kind) in tree.members.items():
             try:
@@ -433,7 +431,7 @@ class Reading:
             return ObjectRole.LEFT_OUT, None
         if kind in INLINE and name not in self._wholes and not self._is_closed(obj, kind):
             return ObjectRole.HOLDER, None
-        if any(label in self._shown and not tree.visible(label) for label in around):
+        if any(outer in self._shown and not tree.visible(outer) for outer in around):
             return ObjectRole.SOURCE, None
         node = self._node(name, obj, kind)
         if node is None or not node.worth:
@@ -441,7 +439,7 @@ class Reading:
         return self._unconsumed(tree, name, node)
 
     def _report_left_out(self, obj: Any, kind: Kind) -> None:
-        """Report what is left out by itself; not what goes with its container, nor what nobody buys."""
+        """Report what is left out by itself; not what is left out with its container, or what nobody buys."""
         if kind in _COUNTABLE or kind in INLINE or kind in DECLARABLE:
             self._is_left_out(obj)
             self._holds_components |= kind is Kind.DRAFT_ARRAY or kind in COMPONENTS
@@ -461,14 +459,14 @@ class Reading:
             return ObjectRole.COMPONENT, node
         if self._is_hardware(node):
             self._notes.add(FindingCode.CONSUMED, node.obj, target=feature)
-        left = {
+        remaining = {
             key: owner
             for key, owner in node.worth.items()
             if key[0] != STANDARD_PARTS and not (key[0] == self._path and self._is_own(owner[0]))
         }
-        if not left:
+        if not remaining:
             return ObjectRole.OPERAND, None
-        return ObjectRole.COMPONENT, Contribution(name, node.obj, node.kind, left, node.below, node.tree)
+        return ObjectRole.COMPONENT, Contribution(name, node.obj, node.kind, remaining, node.below, node.tree)
 
     @staticmethod
     def _is_hardware(node: Contribution) -> bool:
@@ -494,7 +492,7 @@ class Reading:
     def _split(
         self, leaves: Iterable[tuple[Contribution, int]], *, beside: bool = False
     ) -> tuple[list[Count], list[Count]]:
-        """Return the components, and the parts of this file that are no items yet."""
+        """Split the counts into components, and parts of this file that are no items yet."""
         counts: list[Count] = []
         mine: list[Count] = []
         for node, times in leaves:
@@ -506,7 +504,7 @@ class Reading:
         return counts, mine
 
     def _report_rings(self) -> None:
-        """Report links that lead back to what holds them, unless they bring nothing anyway."""
+        """Report links that lead back to their holder, unless they bring nothing anyway."""
         for ring in self._rings:
             links = [obj for obj in ring.values() if is_link(obj)]
             if not links or any(key in self._nodes and self._nodes[key].worth for key in ring):
@@ -519,10 +517,10 @@ class Reading:
     # --- what each of them brings ---
 
     def _node(self, key: Key, obj: Any, kind: Kind) -> Contribution | None:
-        """Return what one object brings; each is looked at once, so groups of groups cost no more than they
-        hold.
+        """Return what one object brings. Looks at each object once, so groups of groups cost no more than
+        they hold.
 
-        None for a ring, for what is nested too deep, and for what is damaged.
+        None for a ring, for an object that is nested too deep, and for a damaged object.
         """
         if (contribution := self._nodes.get(key)) is not None:
             return contribution
@@ -582,7 +580,7 @@ class Reading:
         return {self._reader.component(fastener): (fastener, 1)}
 
     def _imported(self, key: Key, obj: Any) -> CountedObjects:
-        """Return, for a part that A2plus imported, the part in the file that it came from."""
+        """Return the part in another file from which A2plus imported this part."""
         file = own(obj, "sourceFile")
         is_file = isinstance(file, str) and file.lower().endswith(".fcstd")
         ask = getattr(obj.Document, "imported", None) if is_file else None
@@ -621,7 +619,7 @@ class Reading:
         return Contribution(key, obj, kind, self._sum(below), tuple(below))
 
     def _is_left_out(self, obj: Any) -> bool:
-        """Return True for an object that is left out; says so."""
+        """Return True if an object is left out, and note that."""
         mark = left_out_by(obj)
         if mark == "Suppressed":
             self._notes.add(FindingCode.SUPPRESSED, obj)
@@ -654,7 +652,9 @@ class Reading:
 
     @staticmethod
     def _lost_by(link: Any, target: Target) -> CountedObjects:
-        """Return what a broken link stood for, if it says so; else its finding must do."""
+        """Return the component that a broken link stood for, if the link says so; its finding covers the
+        rest.
+        """
         problem = target.problem
         if problem is None or not problem.file or problem.code in _NO_COMPONENT_LOST or not target.instances:
             return {}
@@ -692,7 +692,7 @@ class Reading:
         return Contribution(key, link, kind, worth, tuple(below))
 
     def _in_document(self, key: Key, link: Any, kind: Kind, target: Target) -> Contribution:
-        """Return a link within the file brings what its target brings, which may be nothing."""
+        """Return what a link within the file brings: the same as its target, which may be nothing."""
         obj = target.obj
         node = self._node(self._key(obj), obj, kind_of(obj))
         below = ((node, target.instances),) if node is not None and node.worth else ()

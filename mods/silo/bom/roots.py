@@ -38,7 +38,7 @@ from silo.bom.objects import (
 from silo.bom.roles import SHOWING, Files, Reader, Reading
 from silo.bom.targets import Inspect, is_assembly_link
 
-# What to do where a document holds several assemblies. The window says it in words of its own.
+# What to do if a document holds several assemblies. The window says it in its own words.
 NAME_ONE = "Name the right assembly (--assembly NAME)."
 
 # The rank of a part that holds no components; what it holds makes it likelier.
@@ -57,7 +57,7 @@ _SPARES = ("Parts", "Source_shapes")
 
 
 def as_it_is(document: Any) -> Any:
-    """Return a document that is there with all its objects."""
+    """Return a document that is open with all its objects."""
     return document
 
 
@@ -83,23 +83,23 @@ class _Lying:
         return (self._holders[upper] for upper in climbed(name, lambda label: self._above.get(label, ())))
 
     def is_inner(self, name: str) -> bool:
-        """Return True for what lies in a container, also through folders, and for the copies that one
-        made.
+        """Return True for an object in a container, directly or through folders, and for the copies that a
+        container made.
         """
         if name not in self._inner:
             self._inner[name] = any(kind in _CONTAINERS for _, kind in self.around(name))
         return self._inner[name]
 
     def is_spare(self, obj: Any) -> bool:
-        """Return True for what a folder keeps for later; of visible standard parts only Assembly4's folders
-        do.
+        """Return True if a folder keeps the object for later; for visible standard parts, only Assembly4's
+        folders do.
         """
         around = {object_name(member).rstrip("0123456789") for member, _ in self.around(object_name(obj))}
         bought = kind_of(obj) is Kind.STANDARD and self.is_visible(obj)
         return bool(around.intersection(_SPARES) if bought else around)
 
     def is_visible(self, obj: Any) -> bool:
-        """Return True for what is visible itself and lies in visible containers."""
+        """Return True if the object is visible and lies in visible containers."""
         return all(
             is_switched_on(member) for member in (obj, *(outer for outer, _ in self.around(object_name(obj))))
         )
@@ -110,19 +110,19 @@ class _Lying:
 
 
 def _holders(survey: Survey) -> tuple[dict[str, tuple[Any, Kind]], dict[str, tuple[str, ...]]]:
-    """Return the containers and folders of a document by name; and what lists an object, by the object's
-    name.
+    """Return the containers and folders of a document by name, and the names of those that list an object, by
+    its name.
     """
     holders: dict[str, tuple[Any, Kind]] = {}
     above: dict[str, tuple[str, ...]] = {}
     for obj, kind in survey.of(_CONTAINERS | {Kind.FOLDER}):
-        listed = [label for name in ("Group", "ElementList") for label in own(obj, name) or ()]
+        listed = [member for name in ("Group", "ElementList") for member in own(obj, name) or ()]
         if kind is Kind.CONTAINER and is_assembly3(obj):
-            listed += [label for group in listed for label in own(group, "Group") or ()]
+            listed += [member for group in listed for member in own(group, "Group") or ()]
         holders[name := object_name(obj)] = (obj, kind)
         alone = (name,)  # one tuple for all that lie in this holder only
-        for label in map(object_name, listed):
-            above[label] = (*above[label], name) if label in above else alone
+        for inner in map(object_name, listed):
+            above[inner] = (*above[inner], name) if inner in above else alone
     return holders, above
 
 
@@ -139,7 +139,9 @@ def _rank(obj: Any, reader: Reader) -> int | None:
 
 
 def _holds(container: Any, reader: Reader) -> int:
-    """Return 2 for components of other files, 1 for standard or declared parts only, 0 for neither."""
+    """Return 2 if a container holds components of other files, 1 if only standard or declared parts, 0 if
+    neither.
+    """
     hardware, shows_others = False, False
     for obj in climbed(
         container, lambda member: members(member) if member is container or _is_walked(member) else ()
@@ -164,13 +166,13 @@ def _is_walked(obj: Any) -> bool:
 
 
 def _is_far(target: Any, container: Any) -> bool:
-    """Return True for a component of another file, also for one that is missing there."""
+    """Return True for a component of another file, even if that is missing."""
     return isinstance(target, Lost) or not same_document(target.Document, container.Document)
 
 
 def find_assemblies(document: Any) -> list[Any]:
-    """Return the top-level containers of a document, the likeliest assembly first (document order within a
-    rank).
+    """Return the top-level containers of a document, the likeliest assembly first (equal ones in document
+    order).
     """
     return [obj for _, obj in _candidates(_Lying(survey_of(document)))]
 
@@ -202,7 +204,7 @@ def silent_reader(
     """Return a reader that records no findings.
 
     counts_beside
-        visible standard parts beside the one assembly of a file count with it.
+        visible standard parts beside a file's only assembly count with it.
     """
     files = files or Files()
     silent = Reader(inspect, files, hardware=hardware)
@@ -212,12 +214,12 @@ def silent_reader(
 
 
 def choose_assembly(document: Any, name: str | None = None) -> Any:
-    """Return the assembly of a document.
+    """Choose the assembly of a document.
 
     name
-        ``Name`` or ``Label`` of the wanted one, where a document holds several.
+        ``Name`` or ``Label`` of the wanted assembly, if a document holds several.
 
-    Raises InputError where there is no such object, or where several are equally likely.
+    Raises InputError if there is no such object, or if several are equally likely.
     """
     if name is not None:
         return _named(document, name)
@@ -231,7 +233,7 @@ def choose_assembly(document: Any, name: str | None = None) -> Any:
 
 
 def _likely(candidates: _Candidates) -> list[Any]:
-    """Return the containers that may be the assembly: real assemblies, and parts that hold components."""
+    """Return the containers that may be the assembly: real assemblies, or parts that hold components."""
     if not candidates or candidates[0][0][0] > _HOLDS_NOTHING - 2:
         return []
     reader = silent_reader()
@@ -240,7 +242,7 @@ def _likely(candidates: _Candidates) -> list[Any]:
 
 
 def _root_or_part(document: Any, lying: _Lying, candidates: _Candidates) -> Any:
-    """Return the one part of a file that has nothing else to count, or the document with all that lies in
+    """Return the one part of a file with nothing else to count; otherwise the document with all that lies in
     it.
     """
     best = [obj for standing, obj in candidates if standing == candidates[0][0]]
@@ -275,9 +277,7 @@ def _named(document: Any, name: str) -> Any:
 
 
 def _loose_bodies(lying: _Lying) -> list[Any]:
-    """Return the geometry that lies in no container, no Body and no feature; of that the visible, where any
-    is.
-    """
+    """Return the geometry in no container, Body or feature; only the visible geometry, if some is visible."""
     loose = lying.loose(_LOCAL)
     if len(loose) > 1:  # to ask every feature costs more than all the rest
         inner = lying.survey.grouped(_LOCAL)
@@ -289,11 +289,11 @@ def _loose_bodies(lying: _Lying) -> list[Any]:
 
 
 def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> list[Any]:
-    """Return visible standard parts beside an assembly, which can only belong to it: it is the one of its
-    file.
+    """Return the visible standard parts beside an assembly; they belong to it, if it is the only assembly of
+    its file.
 
-    What other objects of the document show are sources, what a feature consumes are operands, and what lies
-    in Assembly4's folders are spares.
+    Parts that other objects of the document show are sources, parts that a feature consumes are operands, and
+    parts in Assembly4's folders are spares; none of these are returned.
     """
     if getattr(container, "is_document_root", False):
         return []
@@ -312,7 +312,7 @@ def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> l
 def _roles_beside(
     top: Any, reader: Reader, lying: _Lying, objects: Iterable[Any], roles: Mapping[str, ObjectRole | None]
 ) -> Iterator[tuple[Any, ObjectRole]]:
-    """Yield the role of each of some objects that lie in no container, for the assembly ``top``."""
+    """Yield the role that each of these objects, which lie in no container, has for the assembly ``top``."""
     survey = lying.survey
     shown = {name for _, name in Reading(reader, top).shown_by(survey.of(SHOWING))}
     eaten = consumed([obj for obj, _ in survey.of(_LOCAL)], object_name)
@@ -335,9 +335,9 @@ def _roles_beside(
 
 
 def beside(top: Any, fates: Mapping[str, ObjectRole | None]) -> list[Any]:
-    """Return what lies in the document of ``top``, but in no container and no folder, and holds components.
+    """Return the objects in the document of ``top`` that lie in no container or folder and hold components.
 
-    It is not counted, and nobody may have noticed. Another assembly has a BOM of its own.
+    They are not counted, and perhaps nobody has noticed that. Another assembly has its own BOM.
     """
     if isinstance(top, DocumentRoot):
         return []
@@ -349,7 +349,7 @@ def beside(top: Any, fates: Mapping[str, ObjectRole | None]) -> list[Any]:
 
 
 def seen_beside(top: Any, reader: Reader) -> list[Any]:
-    """Return what FreeCAD shows of the document of ``top``, but no part of it: geometry too, which holds no
+    """Return what FreeCAD shows of the document of ``top`` beside it: also geometry, which holds no
     component.
     """
     lying = _Lying(survey_of(top.Document))
@@ -364,8 +364,7 @@ def seen_beside(top: Any, reader: Reader) -> list[Any]:
 
 
 def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, ObjectRole | None]:
-    """Return the role of each object with a shape, a link or a fastener's properties, for the assembly
-    ``top``.
+    """Find the role of each object with a shape, a link or a fastener's properties, for the assembly ``top``.
 
     None breaks the law: a container of the assembly holds the object, and the count does not know it.
 
@@ -375,13 +374,13 @@ def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, ObjectRole 
     survey = survey_of(getattr(top, "Document", None))
     roles: dict[str, ObjectRole | None] = {name: role for (_, name), role in contents.roles.items()}
     roles[object_name(top)] = ObjectRole.HOLDER
-    if not (left := list(survey.of(_BESIDE | {Kind.ELEMENT}, roles.keys()))):
+    if not (others := list(survey.of(_BESIDE | {Kind.ELEMENT}, roles.keys()))):
         return roles
     lying = _Lying(survey)
     grouped = survey.grouped(_LOCAL)
     outside = {object_name(obj) for obj, _ in lying.around(object_name(top))}
     beside = []
-    for obj, kind in left:
+    for obj, kind in others:
         name = object_name(obj)
         if name in outside:  # it holds the assembly
             roles[name] = ObjectRole.CONSTRUCTION
@@ -398,7 +397,7 @@ def fates(top: Any, contents: Contents, reader: Reader) -> dict[str, ObjectRole 
 
 
 def _inside(lying: _Lying, name: str, roles: Mapping[str, ObjectRole | None]) -> ObjectRole | None:
-    """Return the role of what lies in a container and is no member of the assembly."""
+    """Return the role of an object that lies in a container and is no member of the assembly."""
     around = list(lying.around(name))
     if any(is_assembly3(obj) for obj, _ in around):  # its elements and constraints
         return ObjectRole.CONSTRUCTION

@@ -23,7 +23,7 @@ from silo.bom.document import derived, own, property_names
 # The namespace of standard parts; it never changes, or every screw would become a new item.
 NAMESPACE = uuid.UUID("5d8d3a1e-6f0b-5c7a-9a54-2f1d7c0e4b36")
 
-# Stands in the place of the file in the key of a standard part, whose designation is all that it is.
+# Replaces the file in the key of a standard part, which only its designation identifies.
 STANDARD_PARTS = "standard part:"
 
 _TYPES = ("Part::FeaturePython", "PartDesign::FeaturePython")
@@ -64,19 +64,17 @@ _INCHES = re.compile(r"(?:(\d+)[ -])?(?:(\d+)/(\d+)|(\d+(?:\.\d+)?)) ?in")
 
 @lru_cache(maxsize=4096)
 def standard_uuid(designation: str) -> str:
-    """Return the identity of the article with this designation, the same in every project."""
+    """Make the identity of the article with this designation, the same in every project."""
     return str(uuid.uuid5(NAMESPACE, designation))
 
 
 def is_tool(designated_type: str) -> bool:
-    """Return True for taps and dies: they cut threads and are no parts."""
+    """Return True for taps and dies: they cut threads, and are no parts."""
     return designated_type.startswith(_TOOLS)
 
 
 def fastener_type(obj: Any) -> str:
-    """Return the type of a fastener (``ISO4762``, ``ScrewTap``, …) as it is called today; "" for anything
-    else.
-    """
+    """Return the present name of a fastener's type (``ISO4762``, ``ScrewTap``, …); "" for anything else."""
     if not (derived(obj, _TYPES[0]) or derived(obj, _TYPES[1])):
         return ""
     diameter = _property(obj, "Diameter")
@@ -97,7 +95,7 @@ def _is_known(kind: str) -> bool:
 
 
 def _type_of_old(obj: Any) -> str:
-    """Return what an object without a type is, by its class or, where no add-on is there, by what it has."""
+    """Find the type of an object without a type by its class; without the add-on, by its properties."""
     module, name = _class_of(obj)
     if module in _MODULES and name in _CLASSES:
         return _CLASSES[name]
@@ -124,9 +122,7 @@ def _class_of(obj: Any) -> tuple[str, str]:
 
 
 def designation(obj: Any) -> str:
-    """Return the designation of a fastener in trade form, such as "ISO 4762 M4×16"; "" for tools and all
-    others.
-    """
+    """Return the trade name of a fastener, such as "ISO 4762 M4×16"; "" for tools and everything else."""
     kind = fastener_type(obj)
     if not kind or is_tool(kind):
         return ""
@@ -149,7 +145,7 @@ _MAKING = (
 
 
 def designated(kind: str, properties: Mapping[str, Any]) -> str:
-    """Return the designation of a type with these properties (names of today; lengths in mm)."""
+    """Write the designation of a type with these properties (their present names; lengths in mm)."""
     kind = _RENAMED.get(kind, kind)
     inches = kind.startswith("ASME") or kind.endswith("Inch")
     get = properties.get
@@ -187,7 +183,7 @@ def _standard_name(kind: str) -> str:
 
 
 def _property(obj: Any, name: str) -> Any:
-    """Return a property in either spelling; None if the object has neither."""
+    """Return a property by its present or its old name; None if the object has neither."""
     names = property_names(obj)
     if names is not None:
         spelt = _spelling(names).get(name)
@@ -199,19 +195,23 @@ def _property(obj: Any, name: str) -> Any:
 # Thousands of screws have the same few lists of properties.
 @lru_cache(maxsize=1024)
 def _spelling(names: frozenset[str] | tuple[str, ...]) -> dict[str, str]:
-    """Return how an object with these properties spells those of a fastener: name of today → its own."""
+    """Map the present names of a fastener's properties to the names that an object with these
+    properties has.
+    """
     listed = frozenset(names)
-    result = {}
+    spelt = {}
     for name in ("Type", *_MAKING, *_TRAITS):
         if name in listed:
-            result[name] = name
+            spelt[name] = name
         elif (old := name[0].lower() + name[1:]) in listed:
-            result[name] = old
-    return result
+            spelt[name] = old
+    return spelt
 
 
 def _size(value: Any) -> str:
-    """Return a size as text: no brackets of not preferred ones, no zeros at the end, inches written "in"."""
+    """Write a size: no brackets (which mark sizes that are not preferred), no zeros at the end, inches as
+    "in".
+    """
     if value is None:
         return ""
     if not isinstance(value, str):
@@ -223,9 +223,7 @@ def _size(value: Any) -> str:
 
 
 def _length(value: Any, inches: bool) -> str:
-    """Return a length as text; of inch sizes in inches where it is a fraction of them, otherwise with its
-    unit.
-    """
+    """Write a length; for sizes in inches, in inches if it is a fraction of one, otherwise with its unit."""
     text = _size(value)
     if not inches or not text:
         return text
@@ -248,7 +246,7 @@ def _fraction(length: Fraction) -> str:
 
 
 def millimetres(value: Any) -> float | None:
-    """Return a number; of a quantity of FreeCAD its value, which is in mm."""
+    """Return a number as a float; for a FreeCAD quantity, its value in mm. None for anything else."""
     value = getattr(value, "Value", value)
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
@@ -263,7 +261,7 @@ def _is_above(value: Any, least: float = 0) -> bool:
 
 
 def same_articles(designations: Iterable[str]) -> list[tuple[str, str]]:
-    """Return pairs of designations that are one article under two standards, such as DIN 934 and ISO 4032."""
+    """Find pairs of designations for one article under two standards, such as DIN 934 and ISO 4032."""
     unique = set(designations)
     pairs = []
     for old in sorted(unique):

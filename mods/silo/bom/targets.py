@@ -97,17 +97,19 @@ class _Hop:
 
 
 def is_link(obj: object) -> bool:
-    """Return an ``App::Link`` (or ``App::LinkPython``); elements of arrays and groups are none."""
+    """Return True for an ``App::Link`` (or ``App::LinkPython``), False for elements of arrays and groups."""
     return derived(obj, "App::Link")
 
 
 def is_assembly_link(obj: object) -> bool:
-    """Return an instance of an assembly (FreeCAD >= 1.0); derived from App::Part, so ask this first."""
+    """Return True for an instance of an assembly (FreeCAD >= 1.0). Its type is derived from App::Part, so ask
+    this first.
+    """
     return derived(obj, "Assembly::AssemblyLink")
 
 
 def is_excluded(obj: object) -> bool:
-    """Return True if the object itself is marked as no part of any BOM."""
+    """Return True if the object itself is excluded from every BOM."""
     return own(obj, "SiloBomExclude") is True
 
 
@@ -127,10 +129,10 @@ def _negative(vector: Any) -> bool:
 
 
 def is_mirrored(link: object, index: int | None = None) -> bool:
-    """Return True for a negative scale: an odd number of negative axes makes the other hand of a part.
+    """Return True if a scale mirrors the part, which makes its other hand: an odd number of negative axes.
 
     index
-        of one element of an array; else any mirrored element decides.
+        of one element of an array; without it, any mirrored element decides.
     """
     if (mirrored := _scaled_negative(link)) or not is_array(link):
         return mirrored
@@ -152,7 +154,7 @@ def resolve_target(link: object, inspect: Inspect | None = None) -> Target:
 
     inspect
         says what is wrong with a live object: why a link has no target, or that FreeCAD opened a target from
-        a damaged file; None where nothing is.
+        a damaged file; None if nothing is.
     """
     try:
         target = _resolve(link, _Trail(inspect))
@@ -165,7 +167,7 @@ def resolve_target(link: object, inspect: Inspect | None = None) -> Target:
 
 
 def _is_elsewhere(target: Any, link: Any) -> bool:
-    """Return True for an object of another file, and for the assembly that was asked for."""
+    """Return True if the target is in another file, or is ``link`` itself (an assembly)."""
     return target is link or not same_document(target.Document, link.Document)
 
 
@@ -200,7 +202,7 @@ def _resolve(link: object, trail: _Trail) -> Target:
 
 
 def _next_hop(link: Any, trail: _Trail) -> tuple[_Hop, Any]:
-    """Return where a link leads, and the changed copy of that which it shows instead."""
+    """Follow a link by one step; returns where it leads, and the changed copy that it shows instead."""
     linked = getattr(link, "LinkedObject", None)
     source, copy = first_of(own(link, "LinkCopyOnChangeSource")), first_of(linked)
     if source is not None:
@@ -268,14 +270,14 @@ def _follow_sub(start: Any, sub: Any, trail: _Trail) -> _Hop:
         and not is_element_name(element)
         and (named := _child(current, element, trail).obj) is not None
     ):
-        # FreeCAD writes object names with a dot behind; people and scripts forget it.
+        # FreeCAD writes a dot after object names; people and scripts forget it.
         through.append(Step(current, index, not through))
         current, element = named, ""
     return _Hop(current, element, index if is_link(current) else None, through=tuple(through))
 
 
 def _child(parent: Any, name: str, trail: _Trail) -> _Hop:
-    """Return the object ``name`` below ``parent``, as FreeCAD's ``getSubObject`` finds it."""
+    """Find the object ``name`` below ``parent``, as FreeCAD's ``getSubObject`` does."""
     child = _member(parent, name)
     if child is not None:
         return _Hop(child)
@@ -318,12 +320,12 @@ def _member(holder: Any, name: str) -> Any:
 
 
 def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tuple[list[str], list[str]]:
-    """Return labels of what the copies still show though it is gone, and of what they lack; sorted.
+    """Return the labels of copies whose original is gone, and of originals without a copy; sorted.
 
     link
         the AssemblyLink.
     assembly
-        what it stands for in the end.
+        the assembly for which it stands.
     """
     originals = _originals(link, assembly)
     own = {key(part) for part in own_parts(link, assembly, key)}
@@ -351,8 +353,7 @@ def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tu
 
 
 def own_parts(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> list[Any]:
-    """Return what somebody put into a flexible AssemblyLink himself: standard parts, and links that are no
-    copies.
+    """Return what a person put into a flexible AssemblyLink: standard parts, and links that are no copies.
 
     A copy leads to an object of the assembly's file, most often a link. A link array of FreeCAD 1.1 leads to
     the part itself, so an array is taken for a copy.
@@ -386,7 +387,7 @@ def _group(container: Any) -> Iterable[Any]:
 def _arrays(
     originals: Iterable[Any], key: Callable[[Any], Hashable]
 ) -> dict[tuple[Hashable, int], list[Hashable]]:
-    """Link arrays by what they repeat, and how often."""
+    """Map what link arrays repeat, and how often, to these arrays."""
     arrays: dict[tuple[Hashable, int], list[Hashable]] = {}
     for original in originals:
         if is_link(original) and is_array(original):

@@ -111,9 +111,9 @@ _SMALL, _USUAL_TAIL, _TAIL = 1 << 16, 1 << 13, END.size + 0xFFFF
 _FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_BINARY", "O_CLOEXEC"))
 _ENCRYPTED = 0x1 | 0x40 | 0x2000
 STORED, _DEFLATED = 0, 8
-# Deflate cannot pack better than this, so so many packed bytes are safe to unpack in one go.
+# Deflate cannot pack better than this, so this many packed bytes are safe to unpack in one step.
 _HIGHEST_RATIO = 1032
-# zlib joins what it unpacks in one step, so a large text in one step would be there twice.
+# zlib joins its pieces, so a large text that is unpacked in one step would be in memory twice.
 _LONGEST_STEP = 1 << 24
 
 
@@ -132,7 +132,7 @@ class FileState(NamedTuple):
 
     @classmethod
     def now(cls, path: str) -> FileState | None:
-        """Return the state of a file as it is now; None if it cannot be read."""
+        """Read the present state of a file; None if it cannot be read."""
         try:
             return cls.of(os.stat(path))
         except OSError:
@@ -162,8 +162,8 @@ class Directory(NamedTuple):
     tail: bytes  # end record, comment, and whatever follows
 
     def entries(self, wanted: bytes | None = None) -> Iterator[ZipEntry]:
-        """Yield the entries in directory order, or only those of one name. Raises ValueError if it is
-        damaged.
+        """Yield the entries in directory order, or only those of one name. Raises ValueError if the directory
+        is damaged.
         """
         raw, position = self.raw, 0
         for _ in range(self.entry_count):
@@ -209,11 +209,11 @@ class ContainerFile:
         os.close(self._descriptor)
 
     def changed(self) -> bool:
-        """Return True if somebody wrote into this very file since it was opened."""
+        """Return True if the file was written to since it was opened."""
         return FileState.of(os.fstat(self._descriptor)) != self.state
 
     def entry(self, name: bytes) -> ZipEntry | None:
-        """Return the entry of this name, None if there is none; two of one name are refused."""
+        """Return the entry of this name; None if there is none. Raises FcstdError if there are two."""
         try:
             entries = list(self.directory.entries(name))
         except ValueError as error:
@@ -223,7 +223,7 @@ class ContainerFile:
         return entries[0] if entries else None
 
     def packed(self, entry: ZipEntry, most: int) -> bytes:
-        """Return the packed bytes of an entry, at most ``most``."""
+        """Read the packed bytes of an entry, at most ``most``."""
         self._check(entry, most)
         # With the local header in one go: its extra field is seldom longer than the directory's.
         length = LOCAL.size + len(entry.name) + entry.packed + 64
@@ -233,11 +233,13 @@ class ContainerFile:
         return data if len(data) == entry.packed else self._read(entry.offset + begin, entry.packed)
 
     def data_offset(self, entry: ZipEntry) -> int:
-        """Return where an entry's packed bytes begin in the file."""
+        """Return the position in the file at which an entry's packed bytes begin."""
         return entry.offset + self._data_at(entry, self._read(entry.offset, LOCAL.size + len(entry.name)))
 
     def _data_at(self, entry: ZipEntry, local: bytes) -> int:
-        """Return where the data begins, from the local header; which must be that of the same entry."""
+        """Read from the local header where the data begins. Raises FcstdError if it is not the header of this
+        entry.
+        """
         if len(local) < LOCAL.size or not local.startswith(_LOCAL_MARK):
             raise self._error("it is damaged: an entry lies outside its place")
         fields = LOCAL.unpack_from(local)
@@ -249,7 +251,7 @@ class ContainerFile:
         return begin
 
     def read(self, offset: int, length: int) -> bytes:
-        """Return bytes of the file as it stands."""
+        """Read bytes of the file without unpacking them."""
         return self._read(offset, length)
 
     def _check(self, entry: ZipEntry, most: int) -> None:
@@ -281,7 +283,7 @@ class ContainerFile:
         raise self._no_container()
 
     def _end_record(self) -> tuple[int, tuple[int, ...]] | None:
-        """Return the last end record that fits with its comment: where it is, and its fields."""
+        """Find the last end record whose comment has the right length: its position, and its fields."""
         window = self._window
         position = window.rfind(_END_MARK)
         while position >= 0:
@@ -369,7 +371,7 @@ class Inflater:
             raise self._error(f"is too large: {entry.size} bytes unpacked, at most {most}")
 
     def step(self, length: int) -> bytes:
-        """Return up to ``length`` (> 0) more bytes; b"" and ``finished`` at the end. Raises FcstdError."""
+        """Unpack up to ``length`` (> 0) more bytes; b"" and ``finished`` at the end. Raises FcstdError."""
         if self.finished:
             return b""
         data = self._stored(length) if self._entry.method == STORED else self._inflated(length)
@@ -377,7 +379,7 @@ class Inflater:
         return data
 
     def whole(self) -> bytes:
-        """Return all of an entry that was not begun; in one go where it cannot become too large."""
+        """Unpack all of an entry that was not begun; in one step if it cannot become too large."""
         highest = len(self._packed) * _HIGHEST_RATIO + 1
         if self._entry.method == STORED or highest > self._most:
             return self.rest()
@@ -392,11 +394,11 @@ class Inflater:
         return data
 
     def rest(self, end: int | None = None) -> bytes:
-        """Return all that is left, or what is left before a position."""
+        """Unpack everything that remains, or what remains up to a position."""
         most = len(self._packed) + 1 if self._entry.method == STORED else _LONGEST_STEP
         parts = BytesIO()
         while not self.finished and (end is None or self.produced < end):
-            # Some more than is promised, so that the end is met in this very step.
+            # A little more than the stated size, so that the end is reached in this step.
             left = max(self._entry.size - self.produced + 1, 1 << 16) if end is None else end - self.produced
             parts.write(self.step(min(left, most)))
         return parts.getvalue()
@@ -417,7 +419,7 @@ class Inflater:
         self._rest = engine.unconsumed_tail
         if engine.eof:
             self.finished = True
-            self._engine = None  # its buffers outweigh most files, and texts stay in memory by the thousand
+            self._engine = None  # its buffers are larger than most files, and many texts stay in memory
         elif not data and not self._rest:
             raise self._error("is damaged (it ends too early)")
         return data

@@ -170,13 +170,13 @@ PARENTS = _parents()
 
 
 def is_listed(type_name: str) -> bool:
-    """Return True for a type of the table, and for the Python form of one."""
+    """Return True if the table has the type, or the type of which it is the Python form."""
     return type_name in PARENTS or type_name.removesuffix("Python") in PARENTS
 
 
 @lru_cache(maxsize=4096)
 def ancestors(type_name: str) -> frozenset[str]:
-    """Return the type itself and all that it is derived from; unknown types are plain document objects."""
+    """Return the type and all types from which it is derived; an unknown type is a plain document object."""
     types = {type_name, _ROOT}
     parents = PARENTS.get(type_name)
     if parents is None:
@@ -190,7 +190,7 @@ def ancestors(type_name: str) -> frozenset[str]:
 
 @cache
 def _answer_of(ancestry: frozenset[str]) -> Callable[[str], bool]:
-    """Return one bound method for all objects of a type: a file may have hundreds of thousands."""
+    """Return one bound method for all objects of a type, of which a file may have hundreds of thousands."""
     return ancestry.__contains__
 
 
@@ -223,11 +223,13 @@ class FcstdObject:
         self.ancestry = ancestors(type_id)
         if not is_listed(type_id) and self._looks_like_a_link():
             self.ancestry = ancestors("App::Link") | {type_id}
-        # A walker asks this most of all; so the set itself answers.
+        # A walker asks this most often, so the set itself answers.
         self.isDerivedFrom = _answer_of(self.ancestry)
 
     def _looks_like_a_link(self) -> bool:
-        """Return a type that a later FreeCAD added, with the properties of a link array."""
+        """Return True if the object has the properties of a link array, as a type that a later FreeCAD added
+        may have.
+        """
         try:
             self._load()
         except DocumentError:  # a caller that asks for a property of it gets the error
@@ -237,21 +239,21 @@ class FcstdObject:
 
     @cached_property
     def Label(self) -> str:
-        """Return what people call the object; its ``Name`` where the file has no label."""
+        """Return what people call the object; its ``Name`` if the file has no label."""
         label = self.properties.value("Label")
         return label if isinstance(label, str) else self.Name
 
     @property
     def LinkProblem(self) -> Problem | None:
-        """Return why ``LinkedObject`` is None; where it is not, why the original of a changed copy is.
+        """Return why ``LinkedObject`` is None; if it is not None, why the original of a changed copy is.
 
-        None for a link that has what it records, and where there are no such properties.
+        None for a link that has its target, and for an object without these properties.
         """
         return self._problem_of("LinkedObject") or self._problem_of("LinkCopyOnChangeSource")
 
     def _problem_of(self, name: str) -> Problem | None:
         ref = self.properties.value(name)
-        # Most links have no original; only their target may be missed where it was never set.
+        # Most links have no original; only their target is reported as missing if it was never set.
         if not isinstance(ref, Ref) or (name != "LinkedObject" and not ref.name):
             return None
         return self.Document.problem_of(ref)
@@ -271,7 +273,7 @@ class FcstdObject:
         properties: Properties = mine["properties"]
         if name not in properties.numbers:
             raise AttributeError(name)
-        # The file does not change while it is open, so the next access need not come here.
+        # The file does not change while it is open, so the next access need not call this.
         piece = properties.piece(name)
         value = mine[name] = self._value(name, piece)
         if len(piece) > _REMEMBER_AT_MOST and self.Document.is_large:
@@ -279,7 +281,7 @@ class FcstdObject:
         return value
 
     def own_property(self, name: str, default: Any) -> Any:
-        """Return the value of a property, the default where there is none or it is not plain."""
+        """Return the value of a property; the default if there is none or it is not plain."""
         mine = self.__dict__
         if "properties" not in mine:
             self._load()
@@ -288,11 +290,11 @@ class FcstdObject:
         return getattr(self, name, default) if name in mine["properties"].numbers else default
 
     def unload(self) -> None:
-        """Give back what was read of the object; it is read again when somebody asks."""
+        """Forget what was read of the object; it is read again when it is needed."""
         del self.__dict__
 
     def shape_key(self) -> str:
-        """Return something equal for equal shapes, wherever they are placed; "" if the object has no
+        """Return a text that is equal for equal shapes, wherever they are placed; "" if the object has no
         shape.
         """
         value = self.properties.value("Shape") if "Shape" in self.properties.numbers else None
@@ -407,7 +409,7 @@ class FileSurvey(Survey):
         return {name for kind, names in self._groups if kind in kinds for name in names}
 
     def only(self, kinds: Set[Kind]) -> bool:
-        """Return True if there are no objects but of these kinds."""
+        """Return True if all objects are of these kinds."""
         return self._there <= kinds
 
     def has_python(self) -> bool:
@@ -461,12 +463,12 @@ class FcstdDocument:
 
     @cached_property
     def Uid(self) -> str:
-        """Return FreeCAD's id of the document; a copy of the file has the same."""
+        """Return FreeCAD's id of the document; copies of the file have the same one."""
         return self._text("Uid")
 
     @property
     def Meta(self) -> Mapping[str, str]:
-        """Free texts by key, empty where the file has none."""
+        """Return the document's free texts by key; {} if the file has none."""
         value = self.__dict__.get("_meta")
         if value is None:
             value = self._value("Meta")
@@ -481,17 +483,17 @@ class FcstdDocument:
 
     @cached_property
     def survey(self) -> FileSurvey:
-        """Return the objects by what they are; only those that somebody asks for are made."""
+        """Return the objects by their kinds; an object is made only if it is asked for."""
         self.complete()
         return FileSurvey(self, self._xml)
 
     @property
     def PropertiesList(self) -> tuple[str, ...]:
-        """Return the names of the document's own properties, as far as the file holds them."""
+        """Return the names of the document's own properties that the file holds."""
         return self.properties.names
 
     def getObject(self, name: str) -> FcstdObject | None:
-        """Return the object of this ``Name`` (never a label), None if there is none."""
+        """Return the object of this ``Name`` (never a label); None if there is none."""
         fcstd_object = self._objects.get(name)
         if fcstd_object is None and (kind := self._type_of(name)) is not None:
             fcstd_object = self.object_of(name, kind)
@@ -519,18 +521,18 @@ class FcstdDocument:
         return f"<document {self.FileName}>"
 
     def linked(self) -> set[str]:
-        """Return the recorded paths of linked files, about, where it holds more than geometry."""
+        """Return roughly the recorded paths of linked files; none if the file holds only geometry."""
         return set() if self.survey.only(_GEOMETRY) else self._xml.linked()
 
     def mentioning(self, name: str) -> Iterable[str]:
-        """Name the objects that may mention a name."""
+        """Return the names of objects that may mention a name."""
         return self._xml.mentioning(name)
 
     # For the objects of this document and the session; a walker has no use for what follows.
 
     @cached_property
     def is_large(self) -> bool:
-        """Return True if memory counts more than time."""
+        """Return True if the file is so large that memory counts more than time."""
         return self.content.known is None and len(self._xml.head.types) > _MANY_OBJECTS
 
     def was_read(self, obj: FcstdObject, size: int) -> None:
@@ -546,14 +548,16 @@ class FcstdDocument:
 
     @cached_property
     def folders(self) -> tuple[str, ...]:
-        """Return where the paths of links begin: the folder as the file was opened, then the one without
+        """Return the folders at which the paths of links begin: that of the path as opened, and that without
         symlinks.
         """
         location = self._found
         return tuple(dict.fromkeys((os.path.dirname(location.opened), os.path.dirname(location.real))))
 
     def check(self, target: FcstdObject) -> None:
-        """Make sure that what a walker asks of a link's target can be read. Raises DocumentError."""
+        """Make sure that everything that a walker asks of a link's target can be read. Raises
+        DocumentError.
+        """
         remembered = self.content.known
         if remembered is not None and target.Name in remembered.sound:
             return
@@ -586,7 +590,7 @@ class FcstdDocument:
         return table or table_of(self._xml, obj.Name, obj.TypeId)
 
     def members(self, names: Collection[str]) -> tuple[FcstdObject, ...]:
-        """Return the objects of these names, without those that are not there."""
+        """Return the objects of these names; names without an object are skipped."""
         types = self._xml.head.types
         if len(names) > _MANY_OBJECTS:  # no second copy of each name
             listed = {name: name for name in types}
@@ -594,23 +598,23 @@ class FcstdDocument:
         return tuple(self.object_of(name, types[name]) for name in names if name in types)
 
     def resolve(self, ref: Ref) -> FcstdObject | None:
-        """Return the object that a link means, None if it is unset or broken."""
+        """Return the object to which a link leads; None if the link is unset or broken."""
         if not ref.file and (local := self._objects.get(ref.name)) is not None:
             return local
-        fcstd_object = self._target(ref)
-        return fcstd_object if isinstance(fcstd_object, FcstdObject) else None
+        target = self._target(ref)
+        return target if isinstance(target, FcstdObject) else None
 
     def problem_of(self, ref: Ref) -> Problem | None:
-        """Return why ``resolve`` gives None."""
+        """Return why ``resolve`` gives None; None if it does not."""
         problem = self._target(ref)
         return problem if isinstance(problem, Problem) else None
 
     def imported(self, file: str) -> Any:
-        """Return the part that A2plus imported from a file, or why there is none (a LinkProblem)."""
+        """Return the part that A2plus imported from a file, or a LinkProblem that says why there is none."""
         return self._library.imported(self, file)
 
     def vectors(self, entry_name: str) -> tuple[Vector, ...]:
-        """Return a list of vectors from its side entry (``PropertyVectorList::RestoreDocFile``)."""
+        """Read a list of vectors from its side entry (``PropertyVectorList::RestoreDocFile``)."""
         if not entry_name:
             return ()
         entry = self._entries.get(entry_name.encode())
@@ -627,10 +631,9 @@ class FcstdDocument:
         return tuple(Vector(*numbers) for numbers in form.iter_unpack(data[_SIZE.size :]))
 
     def shape_key(self, entry_name: str) -> str:
-        """Return a hash of a shape from its side entry, the same wherever the shape is placed; "" without
-        one.
+        """Hash a shape from its side entry, so that its placement does not matter; "" if there is no shape.
 
-        The text form has all placements in a list of their own (``BRepTools_ShapeSet``).
+        The text form has all placements in a separate list (``BRepTools_ShapeSet``).
         """
         entry = self._entries.get(entry_name.encode()) if entry_name else None
         if entry is None or entry.size > self._xml.limits.side_entry:
@@ -657,11 +660,11 @@ class FcstdDocument:
         return value if isinstance(value, str) else ""
 
     def object_of(self, name: str, kind: str) -> FcstdObject:
-        """Return the object of this name and type."""
-        fcstd_object = self._objects.get(name)
-        if fcstd_object is None:
-            fcstd_object = self._objects[name] = FcstdObject(self, name, kind)
-        return fcstd_object
+        """Return the object of this name and type; makes it if it is not there yet."""
+        found = self._objects.get(name)
+        if found is None:
+            found = self._objects[name] = FcstdObject(self, name, kind)
+        return found
 
     def _target(self, ref: Ref) -> FcstdObject | Problem:
         key = (ref.file, ref.name)

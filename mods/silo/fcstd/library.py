@@ -33,7 +33,7 @@ _TARGETS = frozenset(Kind) - {Kind.NOTHING, Kind.FOLDER, Kind.LINK, Kind.ASSEMBL
 _TARGETS_AT_MOST = 24
 # What is mostly text. The values are kept, as they are asked for by each assembly that uses the file.
 _TEXTS = frozenset({"Label", "Meta", "SiloItemId", "SiloUUID"})
-# What lies in a target is asked for only where a link names an object inside it.
+# The content of a target is only needed if a link names an object inside it.
 _NOT_OF_TARGETS = frozenset({"ElementList", "Group"})
 _ENCODER = json.JSONEncoder(separators=(",", ":"))
 
@@ -56,7 +56,7 @@ class FileFacts(NamedTuple):
 
 
 def facts_of(document: FcstdDocument) -> str:
-    """Return the facts of a document that was read to its end, as JSON; "" if none can be given."""
+    """Write the facts of a document that was read to its end as JSON; "" if that is not possible."""
     content = document.content
     if isinstance(content, Remembered) or content.xml.is_careful:
         return ""
@@ -116,11 +116,11 @@ class Remembered:
 
     @property
     def known(self) -> Remembered:
-        """Return what spares reading the file."""
+        """Return the facts that spare reading the file."""
         return self
 
     def type_of(self, name: str) -> str | None:
-        """Return the type of an object, None if nothing is known of it."""
+        """Return the type of an object; None if nothing is known of it."""
         table = self.table(name)
         return None if table is None else table.kind
 
@@ -139,12 +139,10 @@ class Remembered:
 
     @property
     def xml(self) -> XmlText:
-        """Return the text."""
         return self._content().xml
 
     @property
     def directory(self) -> Directory:
-        """Return the directory of the container."""
         return self._content().directory
 
 
@@ -201,7 +199,7 @@ class _DigestTable(Properties):
 
 @lru_cache(maxsize=4096)
 def _shared(names: tuple[str, ...]) -> tuple[tuple[str, ...], dict[str, int]]:
-    """Return one shared value for the properties of a type, which most of its objects have."""
+    """Return one shared value for the property names of a type, which most of its objects have."""
     return names, dict.fromkeys(names, 0)
 
 
@@ -209,7 +207,7 @@ def _utf8(raw: bytes) -> str:
     return raw.decode()
 
 
-# Files of which facts are kept as values: as many as a large vault asks for at one time.
+# How many files' facts are kept as values: as many as a large vault needs at one time.
 _REMEMBERED_AT_MOST = 20_000
 
 
@@ -231,14 +229,14 @@ class Content:
 
     @property
     def digest(self) -> str:
-        """Return what tells this content from any other."""
+        """Return a text that distinguishes this content from any other."""
         return self.xml.digest(self.directory.raw)
 
     known: ClassVar[None] = None  # nothing that could spare reading it
 
     @property
     def size(self) -> int:
-        """Return bytes that stay in memory, about; unpacked text is counted elsewhere."""
+        """Return roughly how many bytes stay in memory; unpacked text is counted elsewhere."""
         return self.xml.packed_size + 2 * len(self.directory.raw) + 300 * self.directory.entry_count
 
 
@@ -269,10 +267,10 @@ class FileContents:
         self._size = 0
 
     def read(self, path: str) -> Content:
-        """Return the content of a file. Raises FcstdError."""
-        if (result := self._known.get(path)) is not None:
+        """Return the content of a file; reads it if it is not in memory. Raises FcstdError."""
+        if (known := self._known.get(path)) is not None:
             self._known.move_to_end(path)
-            return result
+            return known
         content = self._read(path)
         self.reads += 1
         self._keep(path, content)
@@ -288,16 +286,16 @@ class FileContents:
             self._size -= oldest.size
 
     def remembered(self, path: str, facts: str) -> Remembered:
-        """Return the content of a file of which facts are known."""
-        result = self._remembered.get((path, facts))
-        if result is None:
-            result = self._remembered[path, facts] = Remembered(path, facts, self)
+        """Return the content of a file whose facts are known."""
+        content = self._remembered.get((path, facts))
+        if content is None:
+            content = self._remembered[path, facts] = Remembered(path, facts, self)
             if len(self._remembered) > _REMEMBERED_AT_MOST:
                 self._remembered.popitem(last=False)
-        return result
+        return content
 
     def add(self, path: str, content: Content) -> None:
-        """Take what another process has read."""
+        """Take over what another process has read."""
         content.xml.shared = self.shared
         self._keep(path, content)
 
@@ -362,7 +360,7 @@ class Library:
         self._contents = FileContents(self.limits)
 
     def dissolve(self) -> None:
-        """Forget all documents and take them apart: no object of them can be used any more.
+        """Forget all documents and take them apart; their objects must not be used any more.
 
         Documents and their objects refer to each other. A program with thousands of sessions need not wait
         until Python finds such rings.
@@ -373,7 +371,7 @@ class Library:
         self.documents.clear()
 
     def open(self, path: Path | str) -> FcstdDocument:
-        """Return the document in a file, read to its end and checked. Raises DocumentError."""
+        """Open the document in a file, read it to its end and check it. Raises DocumentError."""
         opened = os.path.abspath(path)
         real = self._locator.real(opened)
         if opened != real:  # a symlink may lead elsewhere tomorrow
@@ -389,14 +387,12 @@ class Library:
         return document
 
     def glance(self, path: Path | str) -> FcstdDocument:
-        """Return the document in a file, of which only as much is read as is asked for. Raises
-        DocumentError.
-        """
+        """Open the document in a file, and read only what is asked for. Raises DocumentError."""
         opened = os.path.abspath(path)
         return self._document(FoundFile(opened, self._locator.real(opened)))
 
     def follow(self, owner: FcstdDocument, ref: Ref) -> FcstdObject | LinkProblem:
-        """Return the object that a link in ``owner`` means, or why there is none. Never raises for a broken
+        """Return the object to which a link in ``owner`` leads, or a LinkProblem. Never raises for a broken
         link.
         """
         location = self._locator.find(ref.file, owner.folders)
@@ -416,9 +412,11 @@ class Library:
         return target
 
     def imported(self, owner: FcstdDocument, file: str) -> object:
-        """Return the part or assembly in a file that A2plus imported into ``owner``, or a LinkProblem.
+        """Find the part or assembly in a file that A2plus imported into ``owner``; a LinkProblem if there is
+        none.
 
-        As A2plus does, a file that is not where it was is looked for in the folder of the owner.
+        Like A2plus, it also looks for the file in the folder of the owner, if the file is no longer in its
+        place.
         """
         from silo.bom.roots import choose_assembly
 
@@ -456,7 +454,7 @@ class Library:
             try:
                 return FcstdDocument(self, location, self._contents.read(location.real))
             except FcstdError as error:
-                # FreeCAD may just be writing it; if nobody is, a second look is the same as the first.
+                # FreeCAD may just be writing it; if not, the second reading gives the same as the first.
                 if error.state is None or error.state == FileState.now(location.real):
                     raise
                 return FcstdDocument(self, location, self._contents.read(location.real))
@@ -476,7 +474,7 @@ def open_document(
 ) -> FcstdDocument:
     """Open an FCStd file in a session of its own: the document, and on demand what it links to.
 
-    Raises DocumentError where this very file cannot be read; broken links show on the link objects.
+    Raises DocumentError if this very file cannot be read; a broken link is noted on its object.
 
     >>> from silo.bom.links import extract  # doctest: +SKIP
     >>> extract(open_document("gearbox.FCStd").getObject("Assembly"))  # doctest: +SKIP

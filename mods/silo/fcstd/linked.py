@@ -74,7 +74,7 @@ class ProjectPlace:
 
 
 def recorded_paths(path: Path | str) -> tuple[str, ...]:
-    """Return the paths of all files that a file links to, as recorded, each once. Raises DocumentError."""
+    """Read the paths of all files that a file links to, as recorded, each once. Raises DocumentError."""
     name = os.fspath(path)
     limits = Limits()
     with ContainerFile(name, limits) as container:
@@ -88,10 +88,10 @@ def recorded_paths(path: Path | str) -> tuple[str, ...]:
 
 
 def place_of(content: Path | str, path: str) -> ProjectPlace:
-    """Return what is to be known of a file for fetching its tree again. Raises DocumentError.
+    """Find what must be recorded of a file to fetch its tree again. Raises DocumentError.
 
     content
-        the file to read; it may lie elsewhere than ``path``, where it belongs.
+        the file to read; it may be elsewhere than at its place ``path``.
     """
     folder = os.path.dirname(path)
     locator = Locator()
@@ -120,7 +120,7 @@ def place_of(content: Path | str, path: str) -> ProjectPlace:
 
 
 def identity_in(library: Library, path: str) -> str:
-    """Return the identity of the item that a file belongs to; "" if it has none or several, or is
+    """Read the identity of the item to which a file belongs; "" if it has none or several, or is
     unreadable.
     """
     try:
@@ -137,7 +137,7 @@ def _hash(path: str) -> str:
 
 
 def _below(paths: list[str]) -> str:
-    """Return the first path, relative to the folder that holds all of them."""
+    """Return the first path, relative to the folder that holds all paths."""
     try:
         common = os.path.commonpath([os.path.dirname(path) for path in paths])
     except ValueError:  # on Windows: files on several drives
@@ -172,26 +172,26 @@ def relink(
 ) -> list[Relinked]:
     """Mend the links of these files that record ``old``, to lead to ``new``.
 
-    Returns the files that hold such links. Raises InputError where ``new`` does not hold the objects that
-    they want, DocumentError where a file cannot be read or written; both before anything is changed.
+    Returns the files that hold such links. Raises InputError if ``new`` does not hold the objects that they
+    want, DocumentError if a file cannot be read or written; both before anything is changed.
 
     check
         raises DocumentError for a file that must not be written now.
     """
     old, target = os.path.abspath(old), os.path.realpath(new)
     limits = Limits()
-    result = [
+    relinked = [
         link for path in dict.fromkeys(map(os.path.realpath, paths)) if (link := _look(path, old, limits))
     ]
-    _check_target(result, old, target, limits)
-    for link in result:
+    _check_target(relinked, old, target, limits)
+    for link in relinked:
         check_writable(link.path)
         if not dry_run:
             check(link.path)
     if not dry_run:
-        for link in result:
+        for link in relinked:
             _mend(link, old, target, limits)
-    return result
+    return relinked
 
 
 def _look(path: str, old: str, limits: Limits) -> Relinked | None:
@@ -207,7 +207,7 @@ def _look(path: str, old: str, limits: Limits) -> Relinked | None:
 
 
 def _records(text: bytes, path: str, file: str, limits: Limits) -> Iterator[_Record]:
-    """Yield the elements that record ``file``, as seen from the document at ``path``."""
+    """Yield the elements that record a link to ``file``, as seen from the document at ``path``."""
     if as_utf8(text) is not text:
         raise Malformed("is not in UTF-8")
     folder, wanted = os.path.dirname(path), {file, os.path.realpath(file)}
@@ -258,7 +258,7 @@ def _mend(relinked: Relinked, old: str, target: str, limits: Limits) -> None:
 
 
 def read_back(relinked: Relinked, copy: str, old: str, target: str, before: int) -> None:
-    """Raise DocumentError unless the mended copy can be read and holds the links as they are to be.
+    """Raise DocumentError unless the mended copy can be read and its links are as they should be.
 
     before
         how many links led to the target already.
@@ -293,9 +293,9 @@ class _Lost:
 def with_suggestions(
     extraction: Extraction, identities: Identities | None = None, files: Iterable[str] | None = None
 ) -> Extraction:
-    """Return the extraction, its findings of missing files with the file that was probably meant.
+    """Add to the findings of missing files the file that was probably meant.
 
-    Reads the project's files, or those of ``files``; costs nothing where no file is missing.
+    Reads the project's files, or those of ``files``; costs nothing if no file is missing.
     """
     lost = _lost(extraction)
     if not lost or (files is not None and not (files := list(files))):
@@ -333,7 +333,7 @@ def _lost(extraction: Extraction) -> dict[str, _Lost]:
 
 
 def _project_files(extraction: Extraction) -> Iterator[str]:
-    """Yield the FreeCAD files of the folder that all files of the tree share."""
+    """Yield the FreeCAD files in the folder that holds all files of the tree."""
     paths = [entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))]
     folders = [os.path.dirname(path) for path in paths if path]
     top = os.path.dirname(extraction.assembly.doc_path)
@@ -364,7 +364,7 @@ class _Project:
         self._opened: dict[str, FcstdDocument | None] = {}
 
     def meant(self, lost: _Lost) -> tuple[str, str] | None:
-        """Return the file, and why it is the one."""
+        """Find the file that was meant, and why; None unless exactly one file fits."""
         holding = [path for path in self._files if path != lost.file and self._holds(path, lost.objects)]
         rules: list[tuple[str, list[str]]] = [
             ("it carries the Silo identity", [path for path in holding if self._identified(path, lost)]),

@@ -138,7 +138,7 @@ def _map(node: XmlElement, _: str) -> dict[str, str]:
 
 
 def _class(node: XmlElement) -> Any:
-    """Return the class of a Python object, which is not made here: (module, name)."""
+    """Return the class of a Python object as (module, name); the object itself is never made."""
     module = node.attributes.get("module", "")
     return (module, node.attributes.get("class", "")) if module else ABSENT
 
@@ -169,7 +169,7 @@ def _link_subs(node: XmlElement, _: str) -> RefList:
 
 
 def _grouped(links: Iterable[dict[str, str]]) -> Iterable[Ref]:
-    """Yield one reference for a run of links to the same object, as FreeCAD groups them."""
+    """Yield one reference for each run of links to the same object, as FreeCAD groups them."""
     name, subs = None, list[str]()
     for link in links:
         if name is not None and link.get("obj", "") != name:
@@ -206,7 +206,7 @@ _READERS: dict[str, Callable[[XmlElement, str], Any]] = {
 
 
 def value_of(prop: XmlElement) -> Any:
-    """Return the plain value of a ``<Property>`` element; ABSENT where it has none."""
+    """Return the plain value of a ``<Property>`` element; ABSENT if it has none."""
     if not prop.children:
         return ABSENT
     kind = prop.attributes.get("type", "")
@@ -280,7 +280,7 @@ class Shape(NamedTuple):
 
     @classmethod
     def of(cls, names: Iterable[str], opening: bytes) -> Shape:
-        """Return the shape of these names, which must differ."""
+        """Make the shape of these names, which must differ."""
         listed = tuple(names)
         numbers = {name: number for number, name in enumerate(listed, start=1)}
         prefixes = (b"", *(f'{name}"'.encode() for name in listed))
@@ -323,18 +323,20 @@ class Properties:
 
     @property
     def size(self) -> int:
-        """Return bytes of the element."""
+        """Return the size of the element in bytes."""
         return self._end - self._begin
 
     def piece(self, name: str) -> bytes:
-        """Return the bytes of a property that is one of ``names``. Equal bytes, equal value."""
+        """Return the bytes of the property ``name``, which must be in the table. Equal bytes mean an equal
+        value.
+        """
         piece = self.kept.get(name)
         if piece is None:
             piece = (self._careful_cut()[1] if self._careful else self._cut())[self.numbers[name]]
         return piece
 
     def value(self, name: str) -> Any:
-        """Return the value, ABSENT where there is no such property or it has no plain value."""
+        """Return the value of a property; ABSENT if there is no such property or its value is not plain."""
         if name not in self.numbers:
             return ABSENT
         piece = self.piece(name)
@@ -342,7 +344,7 @@ class Properties:
         return value_of(self._careful_node(piece)) if value is None else value
 
     def quick_value(self, piece: bytes) -> Any:
-        """Return the same of a piece in FreeCAD's own form; None if it has another one."""
+        """Read the value of a piece in FreeCAD's own form; None if it has another form."""
         if (plain := _PLAIN.match(piece)) is not None:
             return {} if plain[1] is None else self._decode(plain[1])
         if (members := _MEMBERS.match(piece)) is not None:
@@ -356,7 +358,7 @@ class Properties:
 
     @property
     def texts(self) -> Mapping[str, Text]:
-        """Return values that are known without reading a piece."""
+        """Return the values that are known without reading a piece."""
         return _NO_TEXTS
 
     def _cut(self) -> list[bytes]:
@@ -398,7 +400,7 @@ class Properties:
 
 
 def table_of(xml: XmlText, name: str, type_id: str) -> Properties:
-    """Return the table of an object. Raises FcstdError."""
+    """Make the property table of an object. Raises FcstdError."""
     span = xml.span(name)
     if span is None:
         raise xml.error(f"does not hold the data of the object {name!r}")

@@ -67,20 +67,21 @@ Piece = bytes | KeptBytes
 
 
 def in_attribute(text: str) -> str:
-    """Return a text as the value of an XML attribute, to stand between quotes."""
+    """Escape a text for the value of an XML attribute, to be put between quotes."""
     from xml.sax.saxutils import escape  # late, as it imports HTTP and TLS
 
     return escape(text, _REFERENCES)
 
 
 def replaced_entry(container: ContainerFile, entry: ZipEntry, content: bytes) -> tuple[Piece, ...]:
-    """Return the container with ``content`` in ``entry``, in pieces: a big file is never held in memory.
+    """Make the container with ``content`` in ``entry``, in pieces, so that a big file is never held in
+    memory.
 
-    Raises FcstdError where entries overlap, or the result were too large for a plain zip.
+    Raises FcstdError if entries overlap, or if the result is too large for a plain zip.
     """
     entries = _entries(container)
     begin = entry.offset
-    # Up to the next entry: header, data, a data descriptor where there is one, and any padding.
+    # Up to the next entry: header, data, a data descriptor if there is one, and any padding.
     end = min((e.offset for e in entries if e.offset > begin), default=container.directory.offset)
     if end < container.data_offset(entry) + entry.packed:
         raise FcstdError(container.path, "it is damaged: its entries overlap")
@@ -103,7 +104,9 @@ def _entries(container: ContainerFile) -> list[ZipEntry]:
 
 
 def _local(container: ContainerFile, entry: ZipEntry, content: bytes) -> tuple[bytes, int]:
-    """Return local header and data, and the packed length; times, name and extra field as they were."""
+    """Make the local header and data, and return them with the packed length; times, name and extra field
+    stay.
+    """
     engine = zlib.compressobj(wbits=-zlib.MAX_WBITS)
     data = engine.compress(content) + engine.flush()
     header = list(LOCAL.unpack(container.read(entry.offset, LOCAL.size)))
@@ -138,17 +141,17 @@ def _end(directory: Directory, growth: int) -> bytes:
 
 _BLOCK = 1 << 20
 
-# The text of Document.xml → as it is to become; ValueError where it cannot be edited, says why.
+# The text of Document.xml → its edited text; a ValueError says why it cannot be edited.
 Edit = Callable[[bytes], bytes]
 
 
 def changed(path: str) -> FcstdError:
-    """Return the error that somebody else wrote the file meanwhile."""
+    """Make the error that somebody else changed the file meanwhile."""
     return FcstdError(path, "it was changed by somebody else meanwhile; nothing was written")
 
 
 def check_writable(path: str) -> None:
-    """Raise DocumentError where the file may not be replaced."""
+    """Raise DocumentError if the file may not be replaced."""
     # Asked of the mode: an administrator may write anything, and replacing a file needs no right to it at
     # all.
     if not os.stat(path).st_mode & stat.S_IWUSR or not os.access(path, os.W_OK):
@@ -165,7 +168,7 @@ def check_writable(path: str) -> None:
 
 
 def document_xml(container: ContainerFile, limits: Limits) -> tuple[ZipEntry, bytes]:
-    """Return the entry Document.xml and its text. Raises DocumentError."""
+    """Return the entry Document.xml and its unpacked text. Raises DocumentError."""
     entry = container.entry(DOCUMENT_XML)
     if entry is None:
         raise FcstdError(container.path, "it is not a FreeCAD document (there is no Document.xml in it)")
@@ -174,7 +177,7 @@ def document_xml(container: ContainerFile, limits: Limits) -> tuple[ZipEntry, by
 
 
 def edited_xml(container: ContainerFile, edit: Edit, limits: Limits) -> tuple[ZipEntry, bytes]:
-    """Return the entry Document.xml, and its text as it is to become. Raises DocumentError."""
+    """Return the entry Document.xml and its edited text. Raises DocumentError."""
     entry, text = document_xml(container, limits)
     try:
         return entry, edit(text)
@@ -186,7 +189,7 @@ def replace_file(path: str, state: FileState, content: Iterable[Piece], check: C
     """Replace the file, which must still be in ``state``, in one step. Raises DocumentError.
 
     check
-        looks at the copy that was written, and raises DocumentError where it is not what it should be.
+        looks at the copy that was written, and raises DocumentError if it is not as it should be.
     """
     # The file is closed by now: Windows lets nobody replace an open one.
     try:
@@ -243,10 +246,10 @@ def stamp(
     replace: bool = False,
     limits: Limits | None = None,
 ) -> bool:
-    """Write ``identity`` into the file; True where it was written, False where the file had it already.
+    """Write ``identity`` into the file; returns False if the file had it already.
 
     object_name
-        the object that the identity is for, where one file gives several parts: ``Meta["SiloUUID/<Name>"]``;
+        the object to which the identity belongs, if a file gives several parts: ``Meta["SiloUUID/<Name>"]``;
         None: the whole document, ``Meta["SiloUUID"]``.
     item_object
         the object that is the component: it gets the property ``SiloItemId`` too, by which a Silo finds the
@@ -255,7 +258,7 @@ def stamp(
         write over another identity.
 
     Raises DocumentError: the file cannot be read or written, is read-only, was changed meanwhile, carries
-    another identity, or has no such object. The file is then as it was.
+    another identity, or has no such object. The file is then unchanged.
     """
     real = one_path(str(path))
     _check_identity(real, identity)
@@ -282,7 +285,7 @@ def check_stampable(
 ) -> None:
     """Raise the DocumentError that :func:`stamp` would raise for a new identity; changes nothing.
 
-    Asked before an item is made on the server: a file that cannot name its item shall get none.
+    Call it before an item is made on the server: a file that cannot name its item must not get one.
     """
     real = one_path(str(path))
     limits = limits or Limits()
@@ -295,10 +298,11 @@ def check_stampable(
 def unstamp(
     path: Path | str, object_name: str, *, no_part: bool = False, limits: Limits | None = None
 ) -> bool:
-    """Take the identity of one object out of the file; False where there was nothing to do.
+    """Take the identity of one object out of the file; returns False if there was nothing to do.
 
     no_part
-        the object gets ``SiloBomExclude``: a person says that it is no part. Otherwise it has none then.
+        the object gets ``SiloBomExclude``: a person decided that it is no part. Otherwise the property is
+        removed.
 
     The document's own identity stays. Raises DocumentError as :func:`stamp` does.
     """
@@ -350,7 +354,7 @@ def _present(
     limits: Limits,
     item_object: str | None,
 ) -> bool:
-    """Return True if the identity is in each of its places. Raises DocumentError if another one is."""
+    """Return True if the identity is in each of its places. Raises DocumentError if another identity is."""
     with Library(limits=limits) as library:
         document = library.open(path)
         if document.state != state:
@@ -384,7 +388,7 @@ def _text_of(owner: object, name: str) -> str:
 def _stamped_xml(
     container: ContainerFile, key: str, identity: str, limits: Limits, item_object: str | None, replace: bool
 ) -> tuple[ZipEntry, bytes]:
-    """Return the entry Document.xml, and its content as it is to become."""
+    """Return the entry Document.xml and its text with the identity."""
 
     def edit(text: bytes) -> bytes:
         gone = ("SiloUUID",) if replace else ()
@@ -427,8 +431,9 @@ def _edited(
     depth_limit: int,
     whole: Iterable[str] = (),
 ) -> bytes:
-    """Return the text with these keys in ``Meta``, and these properties on the object; without those of the
-    ``whole`` document. None takes one away. Raises ValueError if it cannot be edited (says why).
+    """Set these keys in ``Meta`` and these properties of the object, and remove those named in ``whole`` from
+    the document. None removes a key or a property. Raises ValueError, with the reason, if the text cannot be
+    edited.
     """
     if xmltext.as_utf8(text) is not text:
         raise Malformed("is not in UTF-8")
@@ -470,16 +475,14 @@ def _with_all(element: bytes, properties: Mapping[str, bytes | None], depth_limi
 
 
 def _with_property(element: bytes, name: str, prop: bytes | None, indent: bytes, depth_limit: int) -> bytes:
-    """Return a ``<Properties>`` element, or the ``<Object>`` around it, with a property or, for None, without
-    it.
-    """
+    """Set a property in a ``<Properties>`` element, or in the ``<Object>`` around it; None removes it."""
     spans = xmltext.index_properties(element, depth_limit)
     here = spans.get(name)
     if here is not None and prop is not None:
         return element[: here[0]] + prop + element[here[1] :]
     if here is None and prop is None:
         return element
-    # Before the first property stands the start of their list, whatever stood before that.
+    # The start of the list is directly before the first property.
     start = element.rfind(b"<Properties", 0, min((span[0] for span in spans.values()), default=len(element)))
     if start < 0:
         raise Malformed("has an object without properties")
@@ -505,7 +508,7 @@ def _items(prop: XmlElement) -> dict[str, str]:
 
 
 def _start_tag(element: bytes) -> bytes:
-    """Return the first tag; a ``>`` may stand inside its quotes."""
+    """Return the first tag; its quotes may hold a ``>``."""
     match = re.match(rb"""<(?:[^<>"']|"[^"]*"|'[^']*')*>""", element)
     if match is None:
         raise Malformed("has a property that cannot be edited")

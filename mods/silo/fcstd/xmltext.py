@@ -52,7 +52,7 @@ class Refused(Malformed):
 class Head:
     """What stands before the data of the objects. ``types`` is in document order."""
 
-    attributes: dict[str, str] | bytes  # as bytes while nobody asked
+    attributes: dict[str, str] | bytes  # as bytes until they are asked for
     types: dict[str, str]
     properties: Span | None
 
@@ -97,7 +97,7 @@ def _refuse_doctype(*_: object) -> None:
 
 
 def as_utf8(raw: bytes) -> bytes:
-    """Return the text in UTF-8 without a declaration of another encoding."""
+    """Convert the text to UTF-8, without the declaration of another encoding."""
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         encoding = "utf-16"
     else:
@@ -156,14 +156,14 @@ class _DocumentIndex:
 
 
 def index_document(text: bytes, depth_limit: int) -> tuple[Head, dict[str, Span]]:
-    """Return the head, and where each object's data stands. Raises Malformed."""
+    """Find the head, and the place of each object's data. Raises Malformed."""
     index = _DocumentIndex()
     _XmlWalk(text, depth_limit, index.open_at, index.close_at).run()
     return index.head, index.data
 
 
 def index_properties(text: bytes, depth_limit: int) -> dict[str, Span]:
-    """Return where each property of one ``<Object>`` or ``<Properties>`` element stands. Raises Malformed."""
+    """Find the place of each property of one ``<Object>`` or ``<Properties>`` element. Raises Malformed."""
     spans: dict[str, Span] = {}
     level = 2 if text.startswith(b"<Properties") else 3
     path: list[str] = []
@@ -187,17 +187,17 @@ def index_properties(text: bytes, depth_limit: int) -> dict[str, Span]:
 
 
 def start_tags(text: bytes, depth_limit: int, tags: Collection[str]) -> list[tuple[int, dict[str, str]]]:
-    """Return where each element of these tags begins, and its attributes, in document order. Raises
+    """Find each element with one of these tags: its position and its attributes, in document order. Raises
     Malformed.
     """
-    result: list[tuple[int, dict[str, str]]] = []
+    found: list[tuple[int, dict[str, str]]] = []
 
     def open_at(depth: int, tag: str, attributes: dict[str, str], at: int) -> None:
         if tag in tags:
-            result.append((at, dict(attributes)))
+            found.append((at, dict(attributes)))
 
     _XmlWalk(text, depth_limit, open_at, lambda depth, tag, end: None).run()
-    return result
+    return found
 
 
 @dataclass(slots=True)
@@ -210,7 +210,7 @@ class XmlElement:
 
 
 def parse_value(snippet: bytes, depth_limit: int) -> XmlElement:
-    """Return one ``<Property>`` element as a tree. Raises Malformed."""
+    """Parse one ``<Property>`` element as a tree. Raises Malformed."""
     root = XmlElement("", {})
     stack = [root]
 
@@ -240,7 +240,7 @@ _CLOSING = b"</Object>"
 _LINKED = re.compile(rb'<XLink(?:Sub)?\s[^<>]*?\bfile="([^"<]+)"')
 _TAIL = re.compile(rb"\s*</ObjectData>\s*</Document>\s*\Z")
 
-# The first step holds the head and the object of a small part; then bigger ones, since more was needed.
+# The first step holds the head and the object of a small part; the next ones are bigger.
 _FIRST_STEP, _GROWTH, _HEAD_AT_MOST = 1 << 14, 4, 1 << 16
 
 
@@ -266,10 +266,10 @@ class SharedTexts:
         self._huge: XmlText | None = None
 
     def hold(self, text: XmlText, size: int) -> None:
-        """Count ``size`` bytes for a text; the texts that grew longest ago give theirs back for it.
+        """Count ``size`` bytes for a text; the texts that grew longest ago free theirs for it.
 
-        One text that is longer than all may be together does not count. Each text that grows would push it
-        out, though the next object is read from it again.
+        A text that is longer than all texts may be together does not count. Otherwise each growing text would
+        push it out, although the next object is read from it again.
         """
         self._total -= self._resident.pop(text, 0)
         if size > self._limit:
@@ -306,32 +306,30 @@ class XmlText:
         self.is_careful = False
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Send to another process what was read, not what was made of it."""
+        """Send to another process only what was read, not what was made from it."""
         return XmlText, (self.path, self._entry, self._packed, self.limits)
 
     @property
     def text(self) -> bytes:
-        """Return what is unpacked so far; spans count from its begin."""
+        """Return what is unpacked so far; spans count from its beginning."""
         return self._text if self._text is not None else self._unpack_again()
 
     @property
     def packed_size(self) -> int:
-        """Return bytes that stay in memory, about: the packed text, and where each object of it stands."""
+        """Return roughly how many bytes stay in memory: the packed text, and the place of each object."""
         return len(self._packed) + self._entry.size // 4
 
     def digest(self, directory: bytes) -> str:
-        """Return what tells this content from any other: of the packed text, and of the container's
-        directory, which holds a checksum of each other entry.
-        """
+        """Hash the packed text and the container's directory, which has a checksum of each other entry."""
         return sha256(b"%d %b%b" % (len(directory), directory, self._packed)).hexdigest()
 
     def release(self) -> None:
-        """Give the memory back; the text is unpacked again when somebody asks."""
+        """Free the memory of the text; it is unpacked again when it is needed."""
         self._text = None
 
     @property
     def head(self) -> Head:
-        """Return attributes, types of all objects, document properties."""
+        """Return the attributes, the types of all objects, and the document's properties."""
         if self._head is None:
             self._settle(self._find_head)
         assert self._head is not None
@@ -346,7 +344,7 @@ class XmlText:
         return head.attributes.get(name, default)
 
     def span(self, name: str) -> Span | None:
-        """Return where the data of an object of ``head.types`` stands."""
+        """Return where the data of an object lies; None if ``head.types`` does not have it."""
         if (span_here := self._data.get(name)) is None:
             if name not in self.head.types:
                 return None
@@ -356,16 +354,18 @@ class XmlText:
         return span_here >> _HALF, span_here & _LOW
 
     def complete(self) -> None:
-        """Read to the end, and check all that can be checked there."""
+        """Read to the end, and check everything that can be checked there."""
         if not self._complete:
             self._settle(self._index_objects)
 
     def error(self, reason: str) -> FcstdError:
-        """Return an error about this text."""
+        """Make an error about this text."""
         return FcstdError(self.path, f"its Document.xml {reason}")
 
     def malformed(self, problem: Malformed) -> FcstdError:
-        """Return an error about a piece of this text, with expat's word on the whole: it knows the line."""
+        """Make an error about a piece of this text; prefers expat's words about the whole, which name the
+        line.
+        """
         if self._sound is None and not self.is_careful:
             try:
                 whole = self._new_inflater().rest()
@@ -383,7 +383,7 @@ class XmlText:
             raise self.error("is not in UTF-8") from error
 
     def _settle(self, quick: Callable[[], None]) -> None:
-        """Try the quick way, then the careful one; what failed once fails again without being read again."""
+        """Try the quick way, then the careful one. What failed once fails again without being read again."""
         if self._failure is not None:
             raise FcstdError(self.path, self._failure.reason)
         try:
@@ -399,14 +399,14 @@ class XmlText:
         return Inflater(self.path, self._entry, self._packed, self.limits.document_xml, self.limits)
 
     def _begin(self, whole: bool) -> bytes:
-        """Return the first step; all of a small text, since it costs no more than a part of it."""
+        """Unpack the first step; all of a small text, since that costs no more than a part of it."""
         self._inflater = self._new_inflater()
         if whole or self._entry.size <= _FIRST_STEP * _GROWTH:
             return self._hold(self._inflater.whole())
         return self._hold(self._inflater.step(_FIRST_STEP))
 
     def _extend(self) -> bytes:
-        """Return the text with one more step of it. Raises _Unexpected at the end."""
+        """Unpack one more step, and return the text. Raises _Unexpected at the end."""
         text = self.text
         if self._inflater.finished:
             raise _Unexpected
@@ -458,7 +458,7 @@ class XmlText:
             raise self.error(f"lists {count} objects; at most {self.limits.objects} are read")
 
     def _index_objects(self, until: str | None = None) -> None:
-        """Index the objects from where the last run stopped, to the one named or to the end."""
+        """Index the objects from where the last run stopped, up to the named one or to the end."""
         if self._head is None:
             self._find_head(whole=until is None)
         if self._complete:
@@ -470,7 +470,7 @@ class XmlText:
             self._names.clear()
             return
         text, data, position = self.text, self._data, self._position
-        # Where the data stands in the order of the list, the names are those of the list, not copies of them.
+        # If the data is in the order of the list, the names are those of the list, not copies of them.
         listed = islice(self._head.types if self._head is not None else (), len(data), None)
         match, closing = _OBJECT.match, _CLOSING
         while True:
@@ -496,7 +496,9 @@ class XmlText:
         self._names.clear()
 
     def _cut_at_once(self) -> bool:
-        """Index the data of all objects where they stand in the order of the list; False where not."""
+        """Index the data of all objects, if they are in the order of the list; returns False if they
+        are not.
+        """
         assert self._head is not None  # found before
         pieces = self.text[self._position :].split(_CLOSING)
         tail = pieces.pop()
@@ -522,14 +524,14 @@ class XmlText:
         return True
 
     def mentioning(self, word: str) -> Iterable[str]:
-        """Return names of the objects in whose data a word may stand, of a text that was read to its end; in
-        the order of the text.
+        """Return the names of objects whose data may hold a word, in the order of the text, which must have
+        been read to its end.
         """
-        # A search is quicker than find() where the first letter is rare.
+        # A search is quicker than find() if the first letter is rare.
         text, wanted = self.text, re.compile(re.escape(word.encode()))
         if b"&" in text and b"&#" in text:  # which may be a letter
             return self.head.types
-        result, names = list[str](), list(self._data)
+        mentioned, names = list[str](), list(self._data)
         ends = list(map(_LOW.__and__, self._data.values()))
         if ends != sorted(ends):
             return self.head.types
@@ -538,12 +540,12 @@ class XmlText:
             number = bisect_right(ends, at.start())
             if number == len(names):
                 break
-            result.append(names[number])
+            mentioned.append(names[number])
             at = wanted.search(text, ends[number])
-        return result
+        return mentioned
 
     def linked(self) -> set[str]:
-        """Return the recorded paths of linked files, about; of a text that was read to its end."""
+        """Return roughly the recorded paths of linked files; the text must have been read to its end."""
         matches = {self.decode(path) for path in _LINKED.findall(self.text)}
         if any("&" in path for path in matches):
             from xml.sax.saxutils import unescape  # it imports HTTP and TLS
