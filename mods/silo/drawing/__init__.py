@@ -43,7 +43,7 @@ class Glb:
         self._quantized = False
 
     def material(self, colour: Sequence[float], alpha: float = 1.0, name: str = "") -> int:
-        """Return a material; ``colour`` is RGB as a screen shows it."""
+        """Add a material, and return its number; ``colour`` is RGB as a screen shows it."""
         # glTF wants linear values.
         linear = [round(float(c) ** 2.2, 4) for c in colour[:3]]
         surface = {
@@ -58,7 +58,7 @@ class Glb:
         return self._materials.setdefault(json.dumps(made), len(self._materials))
 
     def exact(self, vertices: Floats, normals: Floats, faces: NDArray[Any]) -> Shape:
-        """Add triangles as they are."""
+        """Add triangles unchanged."""
         points = vertices.astype("<f4")
         position = self._accessor(points, "VEC3", _VERTICES)
         self._accessors[position] |= _bounds(points)
@@ -67,7 +67,9 @@ class Glb:
     def quantized(
         self, vertices: Floats, normals: Floats, faces: NDArray[Any], low: Floats, size: float
     ) -> Shape:
-        """Add triangles in a cube from ``low`` with edges of ``size``, to 1/65535 of it; see :func:`cube`."""
+        """Add triangles in a cube from ``low`` with edges of ``size``, rounded to 1/65535 of it; see
+        :func:`cube`.
+        """
         self._quantized = True
         points = np.zeros((len(vertices), 4), "<u2")
         points[:, :3] = np.clip(np.rint((vertices - low) / size * 65535), 0, 65535)
@@ -79,7 +81,7 @@ class Glb:
         return position, normal, self._index(faces, "<u2" if len(vertices) <= 65535 else "<u4")
 
     def mesh(self, primitives: Sequence[tuple[Shape, int]]) -> int:
-        """Return the mesh of these triangles and materials."""
+        """Add the mesh of these triangles and materials, and return its number."""
         return self._meshes.setdefault(tuple(primitives), len(self._meshes))
 
     def node(self, mesh: int | None = None, matrix: Floats | None = None, **more: Any) -> int:
@@ -93,7 +95,7 @@ class Glb:
         return len(self.nodes) - 1
 
     def packed(self) -> bytes:
-        """Return all as one file."""
+        """Write everything as one GLB file."""
         document: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": "silo-mod"},
             "scene": 0,
@@ -140,7 +142,7 @@ class Glb:
 
 
 def products(glb: bytes) -> dict[str, Mesh]:
-    """Return the triangles of each product of a model (decision 24) in m. Raises ValueError, LookupError."""
+    """Read the triangles [m] of each product of a model (decision 24). Raises ValueError, LookupError."""
     (length,) = struct.unpack_from("<I", glb, 12)
     document, blob = json.loads(glb[20 : 20 + length]), glb[28 + length :]
     views, accessors = document.get("bufferViews", ()), document.get("accessors", ())
@@ -167,7 +169,7 @@ def products(glb: bytes) -> dict[str, Mesh]:
 
 
 def cube(vertices: Floats) -> tuple[Floats, float, Floats]:
-    """Return corner and edge of a cube around points, and (4, 4) from the unit cube to it.
+    """Return corner and edge of a cube around points, and the matrix (4, 4) from the unit cube to it.
 
     The scale is the same along all axes, so that normals stay as they are.
     """
@@ -205,7 +207,7 @@ class Shaded:
 
 
 def shaded(mesh: Mesh) -> Shaded:
-    """Return the mesh with normals; a vertex on an edge becomes several."""
+    """Add normals to the mesh; a vertex on a sharp edge becomes several."""
     if not len(mesh):
         return Shaded(mesh.vertices, np.zeros_like(mesh.vertices), mesh.faces)
     place = distinct(mesh.vertices)[1]
@@ -221,16 +223,16 @@ def shaded(mesh: Mesh) -> Shaded:
 
 
 def _smoothed(vertex: Indices, areas: Floats) -> Floats:
-    """Return (3 m, 3): for each corner the mean normal of the faces at its vertex that look about its own
-    way.
+    """Return (3 m, 3): for each corner the mean normal of those faces at its vertex that look in a similar
+    direction.
 
-    ``vertex`` (3 m,) of each corner, ``areas`` (m, 3) normals as long as the faces are large.
+    ``vertex`` (3 m,) of each corner, ``areas`` (m, 3) normals whose lengths are the areas of the faces.
     """
     flat = _unit(areas)
     order = np.argsort(vertex, kind="stable")
     starts = np.flatnonzero(np.r_[True, np.diff(vertex[order]) != 0])
     degrees = np.diff(np.r_[starts, len(order)])
-    result = flat[np.arange(len(vertex)) // 3]
+    normals = flat[np.arange(len(vertex)) // 3]
     for degree in np.unique(degrees):
         if degree > MAX_DEGREE:
             continue
@@ -238,11 +240,11 @@ def _smoothed(vertex: Indices, areas: Floats) -> Floats:
         face = corners // 3
         near = np.einsum("nix,njx->nij", flat[face], flat[face]) > CREASE
         mean = np.einsum("nij,njx->nix", near.astype(np.float64), areas[face]).reshape(-1, 3)
-        result[corners.reshape(-1)] = _unit(mean)
-    return result
+        normals[corners.reshape(-1)] = _unit(mean)
+    return normals
 
 
 def _unit(vectors: Floats) -> Floats:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    result: Floats = vectors / np.where(length > 0, length, 1.0)
-    return result
+    units: Floats = vectors / np.where(length > 0, length, 1.0)
+    return units

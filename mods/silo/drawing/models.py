@@ -82,11 +82,11 @@ class Drawer(Protocol):
     """Who makes triangles of a stored shape."""
 
     def faces(self, path: Path, named: str, place: Floats) -> Sequence[Mesh | None]:
-        """Return the triangles of each face in m, None for a face that has none. Raises DocumentError."""
+        """Make the triangles [m] of each face; None for a face that has none. Raises DocumentError."""
         ...
 
     def simplified(self, mesh: Mesh, error: float, keep_border: bool) -> Mesh:
-        """Return fewer triangles that are off by at most ``error`` [m]."""
+        """Make a mesh with fewer triangles, which are off by at most ``error`` [m]."""
         ...
 
     def measured(self, shapes: Sequence[Stored], weigh: bool) -> tuple[Box, Measured | None]:
@@ -95,7 +95,7 @@ class Drawer(Protocol):
 
 
 def draw(path: Path, drawer: Drawer) -> tuple[bytes, Structure]:
-    """Return geometry and structure of a FreeCAD file. Raises DocumentError."""
+    """Draw a FreeCAD file: return its geometry (GLB) and its structure. Raises DocumentError."""
     entries, looks = Entries(), Looks()
     try:
         with Library() as library, scratch_folder("silo-drawn-") as folder:
@@ -132,7 +132,7 @@ class FileWalk(Walk):
     _hops: dict[str, str] | None = None
 
     def all(self, document: Any) -> list[str]:
-        """Read the whole document; return the key of what it is as a whole, and of what else it holds."""
+        """Read the whole document; returns the key of the whole, and the keys of what else it holds."""
         try:
             top = choose_assembly(document)
             if getattr(top, "is_document_root", False) and (contents := self._reader.contents(top)).is_part:
@@ -205,7 +205,7 @@ class FileWalk(Walk):
         return self._way_to(file_of(end)), object_name(end)
 
     def _way_to(self, file: str) -> str:
-        """Return the path of a file as the links record it: of this file's, then of that file's own, with
+        """Return the path of a file as the links record it; paths over several files are joined with
         ``|``.
         """
         if self._hops is None:
@@ -229,7 +229,7 @@ class FileWalk(Walk):
         return key
 
     def _colours(self, node: Contribution, key: Key, count: int) -> list[list[float] | None]:
-        """Return what links put over each instance; the outermost one counts."""
+        """Return the colour that links give each instance; the outermost link counts."""
         obj = node.obj
         here = [self.looks.override(obj)] * count
         each = elements(obj) if node.kind is Kind.LINK else []
@@ -246,18 +246,18 @@ class FileWalk(Walk):
 
 
 def _is_body(body: tuple[Any, Any, Floats]) -> bool:
-    """Report whether a use can be one of the shapes of the product around it."""
+    """Return True if a use can be one of the shapes of the product around it."""
     end, _, place = body
     return not isinstance(end, Lost) and not is_container(end) and is_rigid(place)
 
 
 def file_of_path(path: str) -> str:
-    """Return a path as :func:`file_of` has it."""
+    """Return a path in the form of :func:`file_of`."""
     return path.replace("\\", "/")
 
 
 def _hops(file: str, documents: Iterable[str]) -> dict[str, str]:
-    """Return real path → how the links lead there from ``file``."""
+    """Map each real path to the way on which the links lead there from ``file``."""
     hops: dict[str, str] = {}
     waiting = [(file, "")]
     wanted = {os.path.realpath(document) for document in documents}
@@ -300,14 +300,14 @@ class Looks:
         return [GREY] * count
 
     def override(self, link: Any) -> Rgba | None:
-        """Return the colour that a link puts over all that it shows."""
+        """Return the colour with which a link covers all that it shows; None if it does not."""
         view = self._view(link)
         flag = _VALUE.search(view.get("OverrideMaterial", b""))
         match = _MATERIAL.search(view.get("ShapeMaterial", b"")) if flag and flag[1] == b"true" else None
         return _unpacked(int(match[1]), float(match[2])) if match else None
 
     def overrides(self, link: Any) -> list[Rgba | None]:
-        """Return the colours that a link array puts over its elements."""
+        """Return the colours with which a link array covers its elements."""
         view = self._view(link)
         flags = _VALUE.search(view.get("OverrideMaterialList", b""))
         colours = _materials(self._side(link, view.get("MaterialList", b"")))
@@ -316,8 +316,8 @@ class Looks:
 
     def _listed(self, obj: Any) -> list[Rgba]:
         view = self._view(obj)
-        if result := _materials(self._side(obj, view.get("ShapeAppearance", b""))):
-            return result
+        if colours := _materials(self._side(obj, view.get("ShapeAppearance", b""))):
+            return colours
         percent = _VALUE.search(view.get("Transparency", b""))
         clear = min(max(float(percent[1]), 0.0), 100.0) / 100 if percent else 0.0
         data = self._side(obj, view.get("DiffuseColor", b""))
@@ -345,7 +345,7 @@ def _unpacked(packed: int, clear: float) -> Rgba:
 
 
 def _materials(data: bytes) -> list[Rgba]:
-    """Return the diffuse colours of a ``PropertyMaterialList``: 24 bytes each, then texts."""
+    """Read the diffuse colours of a ``PropertyMaterialList``: 24 bytes each, then texts."""
     count = struct.unpack_from("<I", data)[0] if len(data) >= 4 else 0
     if len(data) < 4 + 24 * count:
         return []
@@ -412,7 +412,9 @@ def _picture(walk: FileWalk, key: str, leaf: Leaf, drawer: Drawer, unpacked: Unp
 def _stated(
     facts: ShapeSource, obj: Any, bodies: Sequence[tuple[Any, Floats]], drawer: Drawer, unpacked: Unpacked
 ) -> dict[str, Any]:
-    """Return material, size and mass of a part; no mass if a density lacks or the geometry is in doubt."""
+    """Measure material, size and mass of a part; no mass if a density is missing or the geometry is in
+    doubt.
+    """
     mine = facts.material(obj)
     by_material: dict[StatedMaterial, list[ShapeRef]] = {}
     for body, place in bodies:
@@ -420,7 +422,7 @@ def _stated(
             of = mine if mine != NOTHING else facts.material(body)
             by_material.setdefault(of, []).append(ShapeRef(handle, place))
     names = sorted({value.name for value in by_material if value.name})
-    result: dict[str, Any] = {"material": with_allowed_characters(", ".join(names))[:200] or None}
+    stated: dict[str, Any] = {"material": with_allowed_characters(", ".join(names))[:200] or None}
     weigh = all(value.density for value in by_material) and sum(map(len, by_material.values())) == len(bodies)
     solids, masses, corners = list[SolidProps](), list[float](), list[Floats]()
     for material, refs in by_material.items():
@@ -431,7 +433,7 @@ def _stated(
                 [(value.path, value.named, value.transform) for value in files], weigh
             )
         except DocumentError:
-            return result
+            return stated
         finally:
             for value in files:
                 remove_patiently(value.path)
@@ -442,17 +444,17 @@ def _stated(
             masses.append((material.density or 0.0) * solids[-1].volume_m3)
     if corners:
         extents = np.max(corners, axis=0) - np.min(corners, axis=0)
-        result["size_m"] = [round(float(value) * 1e-3, 7) for value in extents]
+        stated["size_m"] = [round(float(value) * 1e-3, 7) for value in extents]
     if weigh and sum(masses) > 0:
         middle = np.average([value.com_m for value in solids], axis=0, weights=masses)
-        result["mass_kg"], result["volume_m3"] = rounded(sum(masses)), rounded(combined(solids).volume_m3)
-        result["com_m"] = [rounded(float(value)) for value in middle]
-    return result
+        stated["mass_kg"], stated["volume_m3"] = rounded(sum(masses)), rounded(combined(solids).volume_m3)
+        stated["com_m"] = [rounded(float(value)) for value in middle]
+    return stated
 
 
 def _glb(pictures: Mapping[str, Picture], drawer: Drawer) -> bytes:
-    """Return all products as one file. Numbers are bounded by the largest product; the file's box needs no
-    walk.
+    """Write all products as one file. The largest product limits the error of all, so the box of the file is
+    not needed.
     """
     boxes = {key: joined(list(image.groups.values())) for key, image in pictures.items() if image.groups}
     sizes = {key: float(np.linalg.norm(image.extents)) for key, image in boxes.items()}
@@ -489,15 +491,15 @@ class NoDrawer:
     """For files without shapes."""
 
     def faces(self, path: Path, named: str, place: Floats) -> list[Mesh | None]:
-        """Raise DocumentError."""
+        """Refuse to draw: raise DocumentError."""
         raise DocumentError(named, "is not a shape that can be drawn")
 
     def simplified(self, mesh: Mesh, error: float, keep_border: bool) -> Mesh:
-        """Return the same."""
+        """Return the mesh unchanged."""
         return mesh
 
     def measured(self, shapes: Sequence[Stored], weigh: bool) -> tuple[Box, Measured | None]:
-        """Raise DocumentError."""
+        """Refuse to measure: raise DocumentError."""
         raise DocumentError(shapes[0][1], "is not a shape that can be measured")
 
 
@@ -510,7 +512,7 @@ class KernelDrawer:
         kernel.quiet()
 
     def faces(self, path: Path, named: str, place: Floats) -> list[Mesh | None]:
-        """Return the triangles of each face."""
+        """Make the triangles of each face."""
         from silo.inertia.geometry import kernel
         from silo.inertia.geometry.kernel.solids import load_shape
 
@@ -520,11 +522,11 @@ class KernelDrawer:
         return list(kernel.face_meshes(shape))
 
     def simplified(self, mesh: Mesh, error: float, keep_border: bool) -> Mesh:
-        """Return fewer triangles; all of them without meshoptimizer."""
+        """Make a mesh with fewer triangles; with the same ones if meshoptimizer is missing."""
         return simplified(mesh, error, keep_border)
 
     def measured(self, shapes: Sequence[Stored], weigh: bool) -> tuple[Box, Measured | None]:
-        """Return the box as the surfaces have it, and the solids as a mass has them."""
+        """Return the box around the surfaces, and the solids as they are measured for a mass."""
         from silo.inertia.geometry import kernel
         from silo.inertia.geometry.kernel.solids import load_shape, measure
 
@@ -534,12 +536,14 @@ class KernelDrawer:
 
 
 def simplified(mesh: Mesh, error: float, keep_border: bool) -> Mesh:
-    """Return fewer triangles that are off by at most ``error`` [m]; the same without meshoptimizer."""
+    """Make a mesh with fewer triangles, off by at most ``error`` [m]; the same mesh if meshoptimizer is
+    missing.
+    """
     try:
         from meshoptimizer import simplifier
     except (ImportError, OSError):
         return mesh
-    # In single precision: from the middle, and as large as one.
+    # For single precision: moved to the origin, and scaled to size 1.
     middle = mesh.vertices.min(axis=0)
     size = float(mesh.extents.max()) or 1.0
     points = np.ascontiguousarray((mesh.vertices - middle) / size, dtype=np.float32)
@@ -567,12 +571,13 @@ def send_models(
     cancelled: Cancel | None = None,
     at: Callable[[str], object] = lambda _: None,
 ) -> tuple[int, list[str]]:
-    """Make and send the models that the server lacks of these files, each with its SHA-256.
+    """Make and send the models of these files that the server lacks; each file has its SHA-256.
 
-    Return how many were sent, and in a sentence each what was not. Nothing here concerns a commit: it stands.
+    Returns how many were sent, and a sentence for each that was not. The commits remain done, whatever
+    happens here.
 
     command
-        starts another child than the geometry kernel's, which draws as :func:`work_with` does.
+        starts another child than that of the geometry kernel; it draws as :func:`work_with` does.
     """
     wanted = {sha256: path for path, sha256 in files}
     try:
@@ -582,7 +587,7 @@ def send_models(
     todo = [(wanted[place], place) for place in sorted(lacking, key=lambda one: str(wanted[one]))]
     sent, problems, left = 0, list[str](), len(todo)
     at(f"drawing {counted(left, 'file')}")
-    # FreeCAD's window is not kept waiting by work of ours.
+    # Our work must not keep FreeCAD's window waiting.
     shapes = todo if command else [place for place in todo if _has_shapes(place[0])]
     bare = ((*place, _drawn_here(*place)) for place in todo if place not in shapes)
     for path, sha256, model in chain(bare, _drawn(shapes, command, cancelled, problems)):
@@ -614,7 +619,7 @@ def _has_shapes(path: Path) -> bool:
 
 
 def _drawn_here(path: Path, sha256: str) -> tuple[bytes, bytes] | str:
-    """Draw a file that only places others: it needs no kernel, and no child."""
+    """Draw a file that only places others, which needs neither a kernel nor a child."""
     try:
         models = packed(path, NoDrawer())
         return models if content_hash(path) == sha256 else CHANGED
@@ -626,7 +631,7 @@ CHANGED = "the file has changed since it was committed"
 
 
 def packed(path: Path, drawer: Drawer) -> tuple[bytes, bytes]:
-    """Return structure and geometry of a file as they are sent. Raises DocumentError."""
+    """Write the structure and the geometry of a file as they are sent. Raises DocumentError."""
     glb, structure = draw(path, drawer)
     data = structure.model_dump_json(exclude_defaults=True).encode()
     return gzip.compress(data, 6, mtime=0), gzip.compress(glb, 6, mtime=0)
@@ -635,7 +640,7 @@ def packed(path: Path, drawer: Drawer) -> tuple[bytes, bytes]:
 def _drawn(
     todo: Sequence[tuple[Path, str]], command: Sequence[str], cancelled: Cancel | None, problems: list[str]
 ) -> Iterator[_Found]:
-    """Draw; one more problem, for all files, if nothing here can draw."""
+    """Draw the files; adds one problem for all files if nothing here can draw."""
     try:
         yield from _by_children(todo, command, cancelled)
     except ConfigError as error:
@@ -645,7 +650,7 @@ def _drawn(
 def _by_children(
     todo: Sequence[tuple[Path, str]], command: Sequence[str], cancelled: Cancel | None
 ) -> Iterator[_Found]:
-    """Draw by two children at most; FreeCAD is one."""
+    """Draw in at most two children; FreeCAD is one child."""
     count = min(1 if command else 2, os.cpu_count() or 1, len(todo))
     with ThreadPoolExecutor(max(count, 1)) as pool:
         shares = [todo[number::count] for number in range(count)]
@@ -656,8 +661,8 @@ def _by_children(
 def _by_child(
     files: Sequence[tuple[Path, str]], command: Sequence[str], cancelled: Cancel | None
 ) -> Iterator[_Found]:
-    """Draw by a child; a file that it dies of is left out, and the next child goes on behind it."""
-    starts = 2  # now and then FreeCAD ends while it starts
+    """Draw in a child; a file that crashes it is left out, and the next child continues after it."""
+    starts = 2  # sometimes FreeCAD ends while it starts
     while files:
         at = -1
 

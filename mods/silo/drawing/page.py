@@ -69,17 +69,17 @@ class Ellipsoid:
 
     @property
     def placement(self) -> Floats:
-        """Return (4, 4) from the unit sphere to the ellipsoid."""
-        result = np.eye(4)
-        result[:3, :3] = self.axes * self.radii
-        result[:3, 3] = self.centre
-        return result
+        """Return the matrix (4, 4) from the unit sphere to the ellipsoid."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.axes * self.radii
+        matrix[:3, 3] = self.centre
+        return matrix
 
 
 def inertia_ellipsoid(props: MassProps) -> Ellipsoid | None:
-    """Return the semi-axes; a body of mass m has I_a = m/5 (b² + c²), so a² = 5/(2m) (I_b + I_c - I_a).
+    """Return the ellipsoid with the same inertia: I_a = m/5 (b² + c²), so a² = 5/(2m) (I_b + I_c - I_a).
 
-    None without a mass.
+    Returns None if there is no mass.
     """
     if props.mass <= 0 or not np.isfinite(props.inertia).all():
         return None
@@ -91,7 +91,7 @@ def inertia_ellipsoid(props: MassProps) -> Ellipsoid | None:
 def colour_of(number: int) -> Colour:
     """Return a colour for the n-th link.
 
-    Colour-blind people can distinguish the first eight as well as can be.
+    Colour-blind people can distinguish the first eight well.
     """
     if number < len(_BASE):
         return _BASE[number]
@@ -108,7 +108,7 @@ def meshes_of(assembly: Assembly, views: Sequence[LinkView]) -> Mapping[str, Mes
 
 
 def views_of(report: InertiaReport, assembly: Assembly) -> list[LinkView]:
-    """Return the links of a report, in its order, then what no link has."""
+    """Make a view of each link of a report, in its order, and one of the parts without a link."""
     by_path = {instance.name: instance for instance in assembly.instances}
     views = []
     for link in report.links.values():
@@ -129,7 +129,7 @@ MARKER = 0.008
 
 
 def write_glb(assembly: Assembly, views: Sequence[LinkView]) -> bytes:
-    """Return the scene: one node per link, below it its instances, its centre of mass and its ellipsoid."""
+    """Write the scene: a node for each link, below it its instances, its centre of mass and its ellipsoid."""
     glb = Glb(assembly.name)
     top: list[int] = []
     glb.roots.append(glb.node(name=assembly.name, rotation=_Z_UP, children=top))
@@ -206,7 +206,7 @@ _SOURCE_COLOURS = {
 
 
 def report_html(report: InertiaReport, assembly: Assembly) -> str:
-    """Return the page, as text."""
+    """Write the page, as text."""
     views = views_of(report, assembly)
     shapes = bool(meshes_of(assembly, views))
     glb = base64.b64encode(write_glb(assembly, views)).decode() if shapes else ""
@@ -217,7 +217,7 @@ def report_html(report: InertiaReport, assembly: Assembly) -> str:
         ("/*VIEWER*/", _file("viewer/viewer.js")),
         ("/*REPORT*/", _file("drawing/report.js")),
         ("/*GLB*/", glb),
-        # Last: what a file says must not be searched for marks.
+        # Last: texts of a file must not be searched for marks.
         ("/*DATA*/", _json(_data(report, views, shapes))),
     ):
         head, _, tail = page.partition(mark)
@@ -231,7 +231,7 @@ def _file(path: str) -> str:
 
 
 def _json(data: Any) -> str:
-    """Return JSON that cannot end the element it stands in."""
+    """Write JSON that cannot end the HTML element around it."""
     return json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
@@ -337,7 +337,7 @@ def _part(link: str, part: PartResult) -> dict[str, Any]:
 
 
 def _vector(values: Iterable[float], size: float) -> list[float | None]:
-    """Round to 0 what is noise against ``size``, as in the other reports."""
+    """Round values to 0 that are noise against ``size``, as the other reports do."""
     return [0.0 if abs(value) <= NOISE * size else _finite(value) for value in values]
 
 
@@ -352,6 +352,6 @@ def _hex(colour: Colour) -> str:
 
 
 def ellipsoid(rings: int = 20, sectors: int = 32) -> Mesh:
-    """Return a unit sphere; scaled by three semi-axes it is any ellipsoid."""
+    """Make a unit sphere; scaled by three semi-axes it is any ellipsoid."""
     ball = creation.uv_sphere(radius=1.0, count=(rings, sectors))
     return Mesh(np.asarray(ball.vertices), np.asarray(ball.faces))

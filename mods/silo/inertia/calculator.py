@@ -95,12 +95,12 @@ class Task:
 
     @property
     def urdf_frames(self) -> Mapping[str, Floats]:
-        """Return link → (4, 4) placement in the assembly's frame, by the URDF."""
+        """Return link → (4, 4) placement in the assembly's frame, as the URDF has it."""
         return self.urdf.frames if self.urdf is not None else {}
 
 
 def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = None) -> InertiaReport:
-    """Return the mass properties of every link of an assembly. Pure: nothing is read or written."""
+    """Calculate the mass properties of every link of an assembly. Pure: nothing is read or written."""
     task = task or Task()
     urdf = task.urdf
     root = urdf.root if urdf is not None else ROOT_LINK
@@ -116,7 +116,7 @@ def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = No
 
 
 def _tell_lost_links(report: InertiaReport, urdf: Urdf) -> None:
-    """Warn of links whose mass goes nowhere, or whose frame nobody knows."""
+    """Warn of links whose mass goes nowhere, or whose frame is unknown."""
     for name, link in report.links.items():
         if name not in urdf.names and link.props.mass > 0:
             words = f"the URDF has no link of this name; its {link.props.mass:.6g} kg go nowhere"
@@ -129,7 +129,9 @@ def _tell_lost_links(report: InertiaReport, urdf: Urdf) -> None:
 
 
 def _named_alike(claims: Claims, urdf_links: tuple[str, ...]) -> Claims:
-    """Name links as the URDF does if both mean the same word, as in a starting map ("Arm", "arm link")."""
+    """Name links as the URDF does if both names are the same word, as in a starting map ("Arm", "arm
+    link").
+    """
     free = {name: word_of(name) for name in urdf_links if name not in claims.members}
     ours = Counter(word_of(name) for name in claims.members if name not in urdf_links)
     new: dict[str, str] = {}
@@ -160,7 +162,7 @@ def _tell_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
 def _tell_far_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
     """Warn of frames that a person wrote, far outside of the assembly.
 
-    Millimetres where metres are wanted.
+    The person probably wrote millimetres instead of metres.
     """
     for words in task.urdf.doubts if task.urdf is not None else ():
         report.add_warning("", "", words, MassCode.FRAME_FAR)
@@ -220,7 +222,9 @@ def _run(
 
 
 def _weights(task: Task, assembly: Assembly, claims: Claims) -> list[tuple[str, Sequence[int], float]]:
-    """Return what was weighed, components before the links around them. InputError for what is no mass."""
+    """Return the weighed groups, components before the links that hold them. InputError for a text that is no
+    mass.
+    """
     links = as_link_map(task.links)
     given = {link.name: link.mass for link in (links.links if links else ()) if link.mass} | dict(
         task.weights
@@ -262,7 +266,7 @@ def _framed(claims: Claims, task: Task) -> Claims:
 
 
 def _with_stated_densities(assembly: Assembly, materials: MaterialTable) -> Assembly:
-    """Give a material that the geometry file names without a density that of the table."""
+    """Look up the density of each material that the geometry file names without one."""
 
     def complete(prototype: Prototype) -> Prototype:
         if prototype.step_density is not None or not prototype.step_material:
@@ -299,7 +303,7 @@ class InertiaCalculator:
         return Task(self.materials, Options(self.default_density, self.step_density))
 
     def compute_from_step(self, step_path: Path | str) -> InertialProperties:
-        """Return the whole file as one body at the default density, in the file's frame."""
+        """Calculate the whole file as one body at the default density, in the file's frame."""
         assembly = read_geometry(step_path, self.read_options)
         name = assembly.name or "assembly"
         report = _run(assembly, None, self.task, _everything(assembly, name), InertiaReport())
@@ -312,9 +316,10 @@ class InertiaCalculator:
         link_name: str,
         report: InertiaReport,
     ) -> InertialProperties:
-        """Return the whole file as one link, masses by BOM; results and warnings go into ``report`` as well.
+        """Calculate the whole file as one link, with masses by the BOM. Adds results and warnings to
+        ``report``.
 
-        ``bom_entries``: what :class:`BOMParser` gives (all rows are used then), or any mapping name → entry.
+        ``bom_entries``: a table of :class:`BOMParser` (then all rows are used), or any mapping name → entry.
         """
         assembly = read_geometry(step_path, self.read_options)
         claims = _everything(assembly, link_name)
@@ -341,14 +346,14 @@ def compute_link_inertials(
     frame: FrameChoice | str = FrameChoice.ASSEMBLY,
     read_options: ReadOptions | None = None,
 ) -> InertiaReport:
-    """Return every link of an assembly file (spec bom-inertia, Task 5).
+    """Calculate every link of an assembly file (spec bom-inertia, Task 5).
 
     bom_path
-        a file, or what :class:`BOMParser` made of one.
+        a file, or the table that :class:`BOMParser` read.
     links
         a link map, its file, or a dict of link → patterns; None: each first-level sub-assembly is a link.
     density
-        [kg/m^3] of parts that the BOM does not have.
+        [kg/m^3] of parts that the BOM does not list.
 
     Numbers are in the assembly's frame unless ``frame`` or the link map says otherwise.
     """
@@ -365,7 +370,7 @@ def compute_link_inertials(
 
 
 def read_geometry(path: Path | str, options: ReadOptions | None = None) -> Assembly:
-    """Return the geometry of a STEP, mesh or FCStd file; the kernel is imported only now."""
+    """Read the geometry of a STEP, mesh or FCStd file. The kernel is imported only here."""
     from silo.inertia import geometry
 
     return geometry.read(path) if options is None else geometry.read(path, options=options)
@@ -376,7 +381,7 @@ def _everything(assembly: Assembly, name: str) -> Claims:
 
 
 def sum_up(placed: Placed, indices: Sequence[int]) -> MassProps:
-    """Return the mass properties of some instances together, in the assembly's frame."""
+    """Combine the mass properties of these instances, in the assembly's frame."""
     index = np.asarray(indices, np.intp)
     return combine_arrays(placed.mass[index], placed.com[index], placed.inertia(index))
 
@@ -402,7 +407,7 @@ def fill_links(
 
 
 def _sub_assemblies(assembly: Assembly, placed: Placed) -> Iterator[SubAssemblyResult]:
-    """Yield one mass per BOM row, in the order of the rows."""
+    """Yield the masses of placed sub-assemblies, one for each BOM row, in the order of the rows."""
     by_row: dict[int, list[PlacedAssembly]] = {}
     for occurrence in placed.groups:
         by_row.setdefault(id(occurrence.match.row), []).append(occurrence)
@@ -429,10 +434,7 @@ def _sub_assemblies(assembly: Assembly, placed: Placed) -> Iterator[SubAssemblyR
 
 
 def _shape(assembly: Assembly, placed: Placed, occurrence: PlacedAssembly) -> tuple[float, Floats | None]:
-    """Return the volume [m^3] and centre of mass (3,) [m] of a placed sub-assembly.
-
-    The centre in its own axes.
-    """
+    """Return the volume [m^3] of a placed sub-assembly, and its centre of mass (3,) [m] in its own axes."""
     volume = float(placed.volume[list(occurrence.below)].sum())
     frame = assembly.frames.get(occurrence.path)
     props = sum_up(placed, occurrence.below)
@@ -442,7 +444,7 @@ def _shape(assembly: Assembly, placed: Placed, occurrence: PlacedAssembly) -> tu
 
 
 def chosen_frame(name: str, claims: Claims, choice: FrameChoice) -> LinkFrame:
-    """Return the frame a link's numbers are given in: the map's word, else the run's choice."""
+    """Return the frame in which a link's numbers are given: that of the map, else the run's choice."""
     frame = claims.frame(name)
     if not frame.chosen and choice is FrameChoice.ASSEMBLY:
         return ASSEMBLY_FRAME
@@ -455,9 +457,10 @@ def chosen_frame(name: str, claims: Claims, choice: FrameChoice) -> LinkFrame:
 
 
 def _parts(assembly: Assembly, placed: Placed, indices: Iterable[int], link: str) -> Iterator[PartResult]:
-    """Yield the pieces that are alike in name, size, mass and its source, together; products or not.
+    """Group the pieces with the same name, size, mass and source of mass, even if they are different
+    products.
 
-    A bearing's fourteen balls are fourteen products in many files, and one line for people.
+    In many files, the fourteen balls of a bearing are fourteen products; a person wants to see one line.
     """
     groups: dict[tuple[object, ...], list[int]] = {}
     for index in indices:
@@ -506,7 +509,7 @@ def _part_warnings(report: InertiaReport, parts: Iterable[PartResult]) -> None:
 
 
 def tell_tensors(report: InertiaReport) -> None:
-    """Return the links that a simulator would refuse, or take in silence and get wrong."""
+    """Warn about links that a simulator refuses, or accepts without a word and computes wrongly."""
     for link in report.links.values():
         if TensorProblem.ZERO_MASS in link.problems:
             words = "the link has no mass; physics engines refuse a moving link without one"
@@ -518,7 +521,7 @@ def tell_tensors(report: InertiaReport) -> None:
 
 
 def tell_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> None:
-    """Return what the link map left open: unclaimed parts, overlaps, patterns without effect."""
+    """Warn about what the link map left open: unclaimed parts, overlaps, patterns without effect."""
     for part in report.unclaimed:
         many = f"{part.quantity} pieces, " if part.quantity > 1 else ""
         report.add_warning(
@@ -559,7 +562,7 @@ def _tell_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> N
 
 
 def tell_bom(report: InertiaReport, table: BomTable) -> None:
-    """Return what was noticed while the BOM was read."""
+    """Add the warnings that arose while the BOM was read."""
     for warning in table.warnings:
         report.add_warning("", warning.name, f"BOM {warning}", warning.code)
 

@@ -56,12 +56,12 @@ class LinkFrame:
     chosen: bool = False
 
     def inverse(self) -> Floats:
-        """Return (4, 4): assembly's frame → this frame."""
+        """Return the matrix (4, 4) from the assembly's frame to this one."""
         turn = self.placement[:3, :3].T
-        result = np.eye(4)
-        result[:3, :3] = turn
-        result[:3, 3] = -turn @ self.placement[:3, 3]
-        return result
+        matrix = np.eye(4)
+        matrix[:3, :3] = turn
+        matrix[:3, 3] = -turn @ self.placement[:3, 3]
+        return matrix
 
 
 def apart(left: Floats, right: Floats) -> tuple[float, float]:
@@ -75,19 +75,19 @@ ASSEMBLY_FRAME = LinkFrame(np.eye(4), "assembly frame")
 
 
 def origin_frame(xyz: Sequence[float], rpy: Sequence[float]) -> Floats:
-    """Return (4, 4) placement of a URDF origin.
+    """Return the placement (4, 4) of a URDF origin.
 
-    Xyz [m], rpy [rad] about fixed axes (R = Rz(y) Ry(p) Rx(r)).
+    ``xyz`` in m, ``rpy`` in rad about fixed axes (R = Rz(y) Ry(p) Rx(r)).
     """
     (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
-    result = np.eye(4)
-    result[:3, :3] = [
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
         [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
         [-sp, cp * sr, cp * cr],
     ]
-    result[:3, 3] = xyz
-    return result
+    matrix[:3, 3] = xyz
+    return matrix
 
 
 MOST_RAD = 6.3
@@ -148,7 +148,7 @@ class Claims:
 
 
 def read_link_map(path: Path | str) -> LinkMap:
-    """Return a YAML map. ConfigError with every problem of the file at once."""
+    """Read a link map in YAML. ConfigError names every problem of the file at once."""
     try:
         text = Path(path).read_text("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -157,9 +157,10 @@ def read_link_map(path: Path | str) -> LinkMap:
 
 
 def _yaml(text: str, source: str) -> Any:
-    """Return plain values: texts, lists and dicts, for a link may be called ``on`` or ``1.10``.
+    """Parse YAML into plain values (texts, lists and dicts), since a link may be called ``on`` or ``1.10``.
 
-    YAML lets the last of two equal keys win, which would lose a link's parts in silence.
+    In YAML the last of two equal keys wins, which would lose a link's parts without a message; so equal keys
+    are an error.
     """
     import yaml
 
@@ -184,10 +185,10 @@ def _yaml(text: str, source: str) -> Any:
 
 
 def as_link_map(links: LinkMap | Mapping[str, Any] | Path | str | None) -> LinkMap | None:
-    """Return what a caller may give for links: a map, its file, or plain values, with or without
-    ``links:`` around.
+    """Make a link map of what a caller may give: a map, its file, or plain values, with or without ``links:``
+    around.
 
-    ``{"base": ["base*", "plate"]}`` is link → patterns. ConfigError says what was wanted otherwise.
+    ``{"base": ["base*", "plate"]}`` is link → patterns. For anything else, ConfigError says what is allowed.
     """
     if links is None or isinstance(links, LinkMap):
         return links
@@ -203,7 +204,7 @@ def as_link_map(links: LinkMap | Mapping[str, Any] | Path | str | None) -> LinkM
 
 
 def link_map(data: Any, source: str = "the link map") -> LinkMap:
-    """Do as :func:`read_link_map`, from plain values."""
+    """Do what :func:`read_link_map` does, from plain values."""
     links = data.get("links") if isinstance(data, dict) else None
     if not isinstance(links, dict) or not links:
         raise ConfigError(f"{source}: wanted “links:” with a list of patterns for each link")
@@ -260,7 +261,9 @@ def _origin(value: Mapping[str, Any]) -> Floats:
 
 
 def claim(assembly: Assembly, links: LinkMap | None = None, root: str = ROOT_LINK) -> Claims:
-    """Give every instance to a link, or list it as unclaimed. ``root``: the link of what no other has."""
+    """Give every instance to a link, or list it as unclaimed. ``root``: the link of those that no other link
+    has.
+    """
     return _by_map(assembly, links) if links is not None else _by_first_level(assembly, root)
 
 
@@ -338,7 +341,7 @@ def _frame_of(assembly: Assembly, name: str) -> Floats | None:
 
 
 def matches(pattern: str, instance: Instance) -> bool:
-    """Report whether a pattern means this instance or a sub-assembly above it."""
+    """Return True if a pattern matches this instance or a sub-assembly above it."""
     if pattern.startswith(PATH):
         exact = pattern.removeprefix(PATH)
         return any("/".join(instance.path[:end]) == exact for end in range(1, len(instance.path) + 1))
@@ -356,7 +359,7 @@ def matches(pattern: str, instance: Instance) -> bool:
 
 
 def components(pattern: str, instances: Sequence[Instance]) -> list[list[int]]:
-    """Return the instances of each placed part or sub-assembly that a pattern means, highest level first."""
+    """Find the instances of each placed part or sub-assembly that a pattern matches, highest level first."""
     rows_by_path: dict[tuple[str, ...], list[int]] = {}
     for index, instance in enumerate(instances):
         levels = (
@@ -382,7 +385,7 @@ _ANY = "\x00"
 
 
 def _level(level: str) -> str:
-    """Return one level as a regular expression: ``*`` and ``?`` never cross a slash."""
+    """Translate one level into a regular expression: ``*`` and ``?`` never cross a slash."""
     if level == "**":
         return _ANY
     first, *others = (
@@ -422,9 +425,10 @@ def starting_map(
     """Give every instance to a link.
 
     urdf_links
-        link → mesh file names, as a URDF has them. Parts that are called like none go to ``root``.
+        link → mesh file names, as a URDF has them. Parts without a link of the same name go to ``root``.
     clusters
-        how many links to make of a file without sub-assemblies; None: as many as fit the positions best.
+        how many links to make of a file without sub-assemblies; None: the number that fits the positions
+        best.
     """
     if urdf_links:
         return _by_urdf(assembly, urdf_links, root)
@@ -436,8 +440,8 @@ def starting_map(
 
 def _by_urdf(assembly: Assembly, urdf_links: Mapping[str, Sequence[str]], root: str) -> StartingMap:
     owner_of: dict[str, str] = {}
-    for said in (_said_by_links(urdf_links), _said_by_meshes(urdf_links)):
-        for word, name in said.items():
+    for owners in (_said_by_links(urdf_links), _said_by_meshes(urdf_links)):
+        for word, name in owners.items():
             owner_of.setdefault(word, name)
     members: dict[str, list[int]] = {name: [] for name in urdf_links}
     members.setdefault(root, [])
@@ -467,7 +471,7 @@ def _said_by_meshes(urdf_links: Mapping[str, Sequence[str]]) -> dict[str, str]:
 
 
 def _only(owners: dict[str, str], words: Sequence[str]) -> dict[str, str]:
-    """Leave out words that two links have: a mesh of a wheel that four links share says nothing."""
+    """Leave out words that two links have: a mesh of a wheel that four links share shows no link."""
     times = Counter(words)
     return {word: name for word, name in owners.items() if word and times[word] == 1}
 
@@ -504,12 +508,14 @@ def _by_position(assembly: Assembly, clusters: int | None) -> StartingMap:
 
 def _centre(assembly: Assembly, instance: Instance) -> Floats:
     turn, shift = instance.transform[:3, :3], instance.transform[:3, 3]
-    result: Floats = turn @ assembly.prototypes[instance.prototype].com_m + shift
-    return result
+    centre: Floats = turn @ assembly.prototypes[instance.prototype].com_m + shift
+    return centre
 
 
 def _clustered(points: Floats, count: int | None) -> Labels:
-    """Return (n,) cluster of each point; the count with the best silhouette, if none is given."""
+    """Return the cluster (n,) of each point; if no count is given, with the count that has the best
+    silhouette.
+    """
     different = len(np.unique(points.round(9), axis=0)) if len(points) else 0
     if count is not None:
         return _lloyd(points, max(1, min(count, different)))
@@ -518,14 +524,14 @@ def _clustered(points: Floats, count: int | None) -> Labels:
     for tried in range(2, min(MOST_CLUSTERS, different // 3) + 1):
         labels = _lloyd(points, tried)
         score = _silhouette(points, labels)
-        # A link more must be worth it.
+        # One more link must be clearly better.
         if score > best_score + 0.02:
             best, best_score = labels, score
     return best
 
 
 def _lloyd(points: Floats, count: int) -> Labels:
-    """Run k-means from the points that lie farthest from each other; the same for the same points."""
+    """Run k-means, starting from the points that are farthest apart; equal points give equal clusters."""
     if not len(points):
         return np.zeros(0, np.intp)
     start = int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmax())
@@ -547,7 +553,7 @@ def _lloyd(points: Floats, count: int) -> Labels:
 
 
 def _silhouette(points: Floats, labels: Labels) -> float:
-    """Return rate clusters from -1 to 1, by distances to the centres of clusters: 1 is tight clusters far
+    """Rate clusters from -1 to 1 by the distances to their centres; 1 means tight clusters that are far
     apart.
     """
     numbers = np.unique(labels)
@@ -562,7 +568,7 @@ def _silhouette(points: Floats, labels: Labels) -> float:
 
 
 def as_yaml(start: StartingMap, assembly: Assembly) -> str:
-    """Return the map as YAML, commented; :func:`silo.inertia.links.read_link_map` reads it."""
+    """Write the map as YAML with comments; :func:`silo.inertia.links.read_link_map` reads it."""
     lines = [
         "---",  # several maps in one stream are several documents
         f"# Link map for {_comment(assembly.source or assembly.name)}, made by `silo-mod links`.",
@@ -590,7 +596,7 @@ def as_yaml(start: StartingMap, assembly: Assembly) -> str:
 def _lines_of(
     assembly: Assembly, members: Mapping[str, Sequence[int]], ids: Sequence[int]
 ) -> list[tuple[tuple[str, ...], list[int]]]:
-    """Return (path, instances below it), each as high up as everything below belongs to this one link."""
+    """Return (path, instances below it), at the highest level at which this link has all instances."""
     owner = {index: name for name, indices in members.items() for index in indices}
     below = placed_below(assembly) | {
         instance.path: [index] for index, instance in enumerate(assembly.instances)
@@ -622,7 +628,7 @@ def _quoted(text: str) -> str:
 
 
 def as_map(start: StartingMap, assembly: Assembly) -> LinkMap:
-    """Return what the YAML says, without writing it."""
+    """Return the map that the YAML describes, without writing it."""
     return link_map(
         {
             "links": {

@@ -93,7 +93,7 @@ class MassDecision:
 
     @property
     def informed(self) -> bool:
-        """Report whether the BOM itself has a mass or a material for the product."""
+        """Return True if the BOM itself has a mass or a material for the product."""
         return self.source in (Source.BOM_MASS, Source.MATERIAL) or self.material is not None
 
 
@@ -107,14 +107,16 @@ class MassRule:
     has_bom: bool = True
 
     def density_of(self, material: str | None) -> float | None:
-        """Return the density [kg/m^3] of a material text, None if it is not understood."""
+        """Return the density [kg/m^3] of the material that a text names; None if the text is not
+        understood.
+        """
         if material is None:
             return None
         answer = self.materials.find(material)
         return answer.material.density if isinstance(answer, MaterialHit) else None
 
     def decide(self, prototype: Prototype, match: Match | None) -> MassDecision:
-        """Return the mass of one piece of ``prototype``, by the first rule that applies."""
+        """Decide the mass of one piece of ``prototype``, by the first rule that applies."""
         if match is None:
             return self._without_row(prototype)
         row = match.row
@@ -124,7 +126,7 @@ class MassRule:
         return self._without_mass(base, prototype, row.material)
 
     def decide_by_sub_assembly(self, prototype: Prototype, match: Match) -> MassDecision:
-        """Do as :meth:`decide`, by the row of a sub-assembly around the part, which gives no mass."""
+        """Do what :meth:`decide` does, by the row of a sub-assembly around the part, which gives no mass."""
         base = self._base(match, Rule.SUB_ASSEMBLY)
         return self._without_mass(base, prototype, match.row.material, f" to “{match.row.name}” around it")
 
@@ -169,7 +171,7 @@ class MassRule:
     def _zero_of_known_material(
         self, base: MassDecision, prototype: Prototype, row: BOMEntry
     ) -> MassDecision:
-        """Decide on "0 kg" of steel: it is less than the BOM shows, and not nothing."""
+        """Decide on "0 kg" of steel: it is less than the BOM can show, but not nothing."""
         decision = self._material(base, prototype, row.material or "")
         given = GivenMass(0.0, row.quantum_kg)
         note = zero_doubt(given, prototype.volume_m3, decision.density or 0.0, row.material or "")
@@ -299,7 +301,7 @@ class GivenMass:
 
     @property
     def pieces(self) -> float:
-        """Return how many pieces the row is for by its largest reading; 1 if it does not say."""
+        """Return the largest number of pieces for which the row can be; 1 if it does not say."""
         return max(self.quantities, default=1.0)
 
 
@@ -313,7 +315,7 @@ class Expectation:
 
 
 def expectation(prototype: Prototype, text: str | None, material: Material | None) -> Expectation | None:
-    """Expect the density of the row's material if it is known, else by what the geometry file states."""
+    """Expect the density of the row's material if it is known, else the one that the geometry file states."""
     if prototype.volume_m3 <= 0:
         return None
     if material is not None:
@@ -323,7 +325,7 @@ def expectation(prototype: Prototype, text: str | None, material: Material | Non
 
 
 def mass_doubts(given: GivenMass, prototype: Prototype, expected: Expectation | None) -> Iterator[Note]:
-    """Warn of everything that speaks against a BOM mass, worst last."""
+    """Warn of everything that contradicts a BOM mass, the worst last."""
     yield from _rounding(given)
     if given.kg > 0 and not prototype.volume_m3:
         yield Note(
@@ -353,7 +355,7 @@ def _rounding(given: GivenMass) -> Iterator[Note]:
 
 
 def zero_doubt(given: GivenMass, volume: float, density: float, material: str) -> Note:
-    """Warn of a BOM mass of 0 kg of a part whose material is known; the material's mass is used."""
+    """Warn of a BOM mass of 0 kg for a part whose material is known; the material's mass is used."""
     weight = density * volume
     used = f"{material} times the volume gives {weight:.6g} kg, which was used"
     if weight <= given.quantum:
@@ -387,9 +389,9 @@ def _against(given: GivenMass, volume: float, expected: Expectation) -> Iterator
 
 
 def implausible(given: GivenMass, volume: float) -> Iterator[Note]:
-    """Warn of a mass that no material gives in this volume.
+    """Warn of a mass that no material has in this volume.
 
-    Grams read as kilograms, or that of another part.
+    Grams may have been read as kilograms, or it is the mass of another part.
     """
     if volume <= 0 or not given.kg:
         return
@@ -407,11 +409,11 @@ def implausible(given: GivenMass, volume: float) -> Iterator[Note]:
 
 
 def looks_like_totals(masses: Iterable[tuple[bool, float, bool]]) -> bool:
-    """Report whether the whole mass column seems to hold row totals.
+    """Return True if the whole mass column seems to hold row totals.
 
     masses
-        of each row that gives one: (could be compared with a density, pieces, looks like the row's total).
-        One total convinces if no comparable row of several pieces is that of one piece.
+        of each row with a mass: (can be compared with a density, pieces, looks like the row's total). One
+        total is enough if no comparable row of several pieces has the mass of one piece.
     """
     several = [total for compared, pieces, total in masses if compared and pieces >= 2]
     return bool(several) and all(several)
@@ -425,8 +427,8 @@ TOTAL_BY_OTHERS = Note(
 
 
 def density_doubts(prototype: Prototype, used: Material) -> Iterator[Note]:
-    """Warn of what the geometry file states against the material that is used, and how much that one
-    varies.
+    """Warn if the density of the used material varies much, and if the geometry file states another
+    density.
     """
     stated, density = prototype.step_density, used.density
     if used.spread >= SPREAD_LIMIT:
@@ -574,7 +576,9 @@ class Groups:
                 self.mass[index] = (self.decisions[index].density or 0.0) * self.volume[index]
 
     def _set(self, index: int, match: Match, new: MassDecision) -> None:
-        """Return one decision per (row, product): instances of one product stay one part in the report."""
+        """Set the decision of an instance. All instances of one (row, product) share it, so that they stay
+        one part in the report.
+        """
         key = (match, self.decisions[index], self.assembly.instances[index].prototype)
         self.decisions[index] = self._made.setdefault(key, new)
 
@@ -609,15 +613,15 @@ class Placed:
     groups: Sequence[PlacedAssembly] = ()
 
     def inertia(self, index: NDArray[np.intp]) -> Floats:
-        """Return (n, 3, 3) [kg m^2] of some instances, about their own centres of mass."""
+        """Return the tensors (n, 3, 3) [kg m^2] of these instances, about their own centres of mass."""
         volume = self.volume[index]
         density = np.divide(self.mass[index], volume, out=np.zeros(len(index)), where=volume > 0)
-        result: Floats = self.unit[index] * density[:, None, None]
-        return result
+        tensors: Floats = self.unit[index] * density[:, None, None]
+        return tensors
 
 
 def place_all(assembly: Assembly, rule: MassRule, matching: Matching) -> Placed:
-    """Decide on every product once, then give every instance its mass."""
+    """Decide the mass of every product once, then give each instance its mass."""
     instances = assembly.instances
     volume, com, unit = _geometry(assembly)
     beside = companions(assembly)
@@ -641,11 +645,12 @@ def place_all(assembly: Assembly, rule: MassRule, matching: Matching) -> Placed:
 
 
 def weighed(placed: Placed, groups: Sequence[tuple[str, Sequence[int], float]]) -> tuple[Placed, list[Note]]:
-    """Return the instances scaled so that each group weighs what a scale says; notes on what cannot be.
+    """Scale the instances so that each group has its weighed mass; also return notes on groups where that is
+    impossible.
 
     groups
-        (name, indices, kg), those inside of others first. What has a weight of its own already keeps it, and
-        the rest of its group shares what is left: by its masses, by volume where it has none.
+        (name, indices, kg), those inside of others first. A part with its own weight keeps it, and the rest
+        of its group shares the remaining weight: by mass, or by volume if there are no masses.
     """
     mass, decisions = placed.mass.copy(), list(placed.decisions)
     notes: list[Note] = []
@@ -684,7 +689,7 @@ def _geometry(assembly: Assembly) -> tuple[Floats, Floats, Floats]:
 
 
 def _note_totals(decisions: dict[str, MassDecision]) -> None:
-    """Mark the masses that cannot be checked as doubtful if those that can be are row totals."""
+    """Mark masses that cannot be checked as doubtful, if those that can be are row totals."""
     given = {key: decision for key, decision in decisions.items() if decision.source is Source.BOM_MASS}
     totals = {key: any(note.code == MassCode.ROW_TOTAL for note in d.notes) for key, d in given.items()}
     if not looks_like_totals((d.compared, d.pieces, totals[key]) for key, d in given.items()):

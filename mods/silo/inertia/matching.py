@@ -46,31 +46,30 @@ _INVISIBLE = dict.fromkeys(map(ord, "\u00ad\u200b\u200c\u200d\u2060\ufeff"))
 
 
 def plain(name: str) -> str:
-    """Return the name in NFKC, case-folded, without unseen characters.
-
-    Underscores, hyphens, runs of spaces are one space.
+    """Return the name in NFKC, case-folded and without invisible characters. Underscores, hyphens and runs of
+    spaces become one space.
     """
     return _separated(unicodedata.normalize("NFKC", name.translate(_INVISIBLE)).casefold())
 
 
 def bare(name: str) -> str:
-    """Do as :func:`plain`, without one occurrence mark at the end: ``<2>``, `` (1)``, ``:3``.
+    """Do what :func:`plain` does, and cut one occurrence mark at the end: ``<2>``, `` (1)``, ``:3``.
 
-    ``_10`` stays: it is part of real part names ("BALL_JHA17.step_10").
+    ``_10`` stays, because real part names have it ("BALL_JHA17.step_10").
     """
     return plain(_OCCURRENCE.sub("", name.strip()))
 
 
 def is_lossy(name: str) -> bool:
-    """Report whether characters were lost on the way: "?" or U+FFFD."""
+    """Return True if characters were lost on the way: "?" or U+FFFD."""
     return _LOST_RUN.search(name) is not None
 
 
 def could_be(lossy: str, intact: str) -> bool:
-    """Report whether ``lossy`` is ``intact`` with characters lost.
+    """Return True if ``lossy`` may be ``intact`` with characters lost.
 
-    Only characters outside ASCII get lost, so that "M?" is never "M3". A run of k marks stands for one to k
-    of them (é may become one mark or two). Both compositions of accents are tried.
+    Only characters outside of ASCII get lost, so "M?" is never "M3". A run of k marks stands for one to k
+    characters (é may become one mark or two). Both compositions of accents are tried.
     """
     pattern = _lossy_pattern(lossy)
     return any(pattern.fullmatch(_fold(intact, form)) is not None for form in ("NFC", "NFD"))
@@ -116,7 +115,7 @@ class Suggester:
         self._budget = budget
 
     def near(self, name: str, limit: int = 3) -> tuple[str, ...]:
-        """Return up to ``limit`` names, the nearest first."""
+        """Return up to ``limit`` similar names, the most similar first."""
         fitting = self._by_digits.get(digits(name), {})
         self._budget -= len(fitting)
         if not fitting or self._budget < 0:
@@ -132,7 +131,7 @@ class Suggester:
 
 
 def _alike(left: str, right: str) -> float:
-    """Return rate likeness from 0 to 1; 0 at once if it cannot reach the limit."""
+    """Rate the similarity from 0 to 1; 0 at once if it cannot reach the limit."""
     matcher = SequenceMatcher(None, left, right, autojunk=False)
     if matcher.real_quick_ratio() < SUGGEST_FROM or matcher.quick_ratio() < SUGGEST_FROM:
         return 0.0
@@ -162,7 +161,7 @@ class Bundle:
 
     @property
     def row(self) -> BOMEntry:
-        """Return the first row; the others say the same."""
+        """Return the first row; the others have the same data."""
         return self.rows[0]
 
 
@@ -177,7 +176,7 @@ class Match:
 
     @property
     def row(self) -> BOMEntry:
-        """Return the row (the first of several that say the same)."""
+        """Return the row (the first of several with the same data)."""
         return self.bundle.row
 
 
@@ -222,9 +221,10 @@ class _Reading(StrEnum):
 
 
 def _readings(products: Sequence[Product], table: BomTable) -> frozenset[_Reading]:
-    """Return which reading of the quantities the parts that nothing can be mistaken for agree on; else both.
+    """Find the reading of the quantities that the parts with an unambiguous name show; both if they show
+    none.
 
-    Only rows count on which the readings differ, of a name that one row and one product have.
+    Only rows count for which the readings differ, and whose name only one row and one product have.
     """
     rows = {plain(row.name): row for row in table.rows if not row.has_children}
     row_names = Counter(plain(row.name) for row in table.rows if not row.has_children)
@@ -254,7 +254,7 @@ class _Matcher:
     def run(
         self, products: Sequence[Product], rows: Sequence[BOMEntry], density: DensityOf
     ) -> dict[str, Match]:
-        """Return the matches by the products' keys."""
+        """Match the products, and return the matches by the products' keys."""
         matches: dict[str, Match] = {}
         for rule, candidates in _finders(rows):
             wanted = [product for product in products if product.key not in matches]
@@ -278,7 +278,7 @@ class _Matcher:
         return total is not None and self.taken[id(row)] + product.count <= total
 
     def _bundled(self, rows: Sequence[BOMEntry]) -> list[Bundle]:
-        """Return rows with equal data together, in the order of their first row."""
+        """Group the rows with equal data, in the order of their first row."""
         groups: dict[tuple[str | None, float | None], list[BOMEntry]] = {}
         for row in rows:
             groups.setdefault(row.data, []).append(row)
@@ -324,7 +324,7 @@ class _Contest:
         self.found[product.key] = Match(bundle, self.rule, decided, doubt)
 
     def _share_one(self, bundle: Bundle) -> None:
-        """Give all products the one bundle, unless its quantity or mass is that of one of them only."""
+        """Give all products the one bundle, unless its quantity or mass fits only one of them."""
         decided = Decided.SAME_DATA if len(bundle.rows) > 1 else Decided.ONLY
         takers = self.products
         if len(takers) > 1 and bundle.quantities and sum(p.count for p in takers) not in bundle.quantities:
@@ -338,7 +338,7 @@ class _Contest:
             self.found[product.key] = Match(bundle, self.rule, decided)
 
     def _settle(self, decided: Decided, fits: Callable[[Product, Bundle], bool]) -> None:
-        """Pair what fits in one way only, from both sides, until nothing changes."""
+        """Pair, from both sides, what fits in only one way, until nothing changes."""
         changed = True
         while changed and self.products and self.bundles:
             changed = False
@@ -368,7 +368,7 @@ class _Contest:
 
 
 def _same_parent(product: Product, bundle: Bundle) -> bool:
-    # Only if the BOM is structured: else every row stands at the top and proves nothing.
+    # Only if the BOM is structured: otherwise every row is at the top and proves nothing.
     return any(bundle.parents) and {plain(name) for name in product.parents} <= bundle.parents
 
 
@@ -377,7 +377,7 @@ def _may_count(product: Product, bundle: Bundle) -> bool:
 
 
 def _with_doubtful_shapes(products: Sequence[Product], matches: dict[str, Match]) -> dict[str, Match]:
-    """Warn of different shapes that got one row: one of them at most can weigh its mass."""
+    """Warn of different shapes that got the same row: at most one of them can have its mass."""
     by_row: dict[int, list[Product]] = defaultdict(list)
     for product in products:
         if product.key in matches and matches[product.key].row.has_mass and product.volume_m3 > 0:
@@ -429,12 +429,12 @@ def _finders(rows: Sequence[BOMEntry]) -> Iterator[tuple[Rule, Finder]]:
 
 
 def _tells_apart(number: str) -> bool:
-    """Report whether a number names a part: exporters and BOMs both count 1, 2, 3."""
+    """Return True if a number identifies a part: exporters and BOMs both count 1, 2, 3."""
     return bool(number.strip()) and not re.fullmatch(r"\s*\d{1,3}\s*", number)
 
 
 def _index(pairs: Iterable[tuple[str, BOMEntry]]) -> Mapping[str, Sequence[BOMEntry]]:
-    """Return key → its rows, each once."""
+    """Map each key to its rows, each once."""
     index: dict[str, dict[int, BOMEntry]] = defaultdict(dict)
     for key, row in pairs:
         if key:
@@ -445,9 +445,7 @@ def _index(pairs: Iterable[tuple[str, BOMEntry]]) -> Mapping[str, Sequence[BOMEn
 def _components(
     products: Sequence[Product], options: Mapping[str, Sequence[BOMEntry]]
 ) -> list[tuple[list[Product], list[BOMEntry]]]:
-    """Return the products that compete for the same rows, together with those rows, in order of
-    appearance.
-    """
+    """Group the products that compete for the same rows with these rows, in order of appearance."""
     group_of: dict[int, int] = {}
     groups: dict[int, tuple[list[Product], list[BOMEntry]]] = {}
     fresh = count()

@@ -68,7 +68,7 @@ DOUBTFUL = (
 
 
 def rounded(value: float) -> float:
-    """Return a number as it is kept in Silo."""
+    """Round a number to the digits that Silo keeps."""
     # Twelve digits: a second run on another machine must not make a revision of the last bit.
     return float(f"{value + 0.0:.12g}") if abs(value) > 1e-15 else 0.0
 
@@ -190,7 +190,7 @@ class Assembly:
 
 
 def _freeze(owner: object, **shapes: tuple[int, ...]) -> None:
-    """Make fields arrays of these shapes that nobody can write. InputError."""
+    """Turn fields into read-only arrays of these shapes. InputError if they do not fit."""
     for name, shape in shapes.items():
         array = np.array(getattr(owner, name), dtype=np.float64)
         if array.shape != shape:
@@ -225,9 +225,7 @@ class Product:
 
 
 def leaf_products(assembly: Assembly) -> tuple[Product, ...]:
-    """Return the placed prototypes in order of appearance, without companions of a solid (see
-    :func:`companions`).
-    """
+    """Return the placed prototypes in order of appearance, but not the :func:`companions` of a solid."""
     beside = companions(assembly)
     counts: dict[str, int] = defaultdict(int)
     parents: dict[str, set[str]] = defaultdict(set)
@@ -251,9 +249,9 @@ def leaf_products(assembly: Assembly) -> tuple[Product, ...]:
 
 
 def companions(assembly: Assembly) -> frozenset[str]:
-    """Return the prototypes without a solid that only ever stand beside a solid of the same product.
+    """Return the prototypes without a solid that always stand beside a solid of the same product.
 
-    Pro/E writes a SOLID and a wire COMPOUND for one product: that is one part, not two of one name.
+    Pro/E writes a SOLID and a wire COMPOUND for one product: these are one part, not two with the same name.
     """
     if all(prototype.has_solid for prototype in assembly.prototypes.values()):
         return frozenset()
@@ -270,7 +268,7 @@ def companions(assembly: Assembly) -> frozenset[str]:
 
 
 def placed_below(assembly: Assembly) -> dict[tuple[str, ...], list[int]]:
-    """Return the indices of the instances in each placed sub-assembly, by its path, as they appear."""
+    """Map the path of each placed sub-assembly to the indices of its instances, in order of appearance."""
     below: dict[tuple[str, ...], list[int]] = defaultdict(list)
     for index, instance in enumerate(assembly.instances):
         for depth in range(1, len(instance.path)):
@@ -279,9 +277,8 @@ def placed_below(assembly: Assembly) -> dict[tuple[str, ...], list[int]]:
 
 
 def sub_assemblies(assembly: Assembly) -> tuple[Product, ...]:
-    """Return the products that contain others, by name, in order of appearance.
-
-    ``count`` is that of their instances.
+    """Return the products that contain others, by name, in order of appearance; ``count`` counts their
+    instances.
     """
     counts: dict[str, int] = defaultdict(int)
     parents: dict[str, set[str]] = defaultdict(set)
@@ -354,7 +351,7 @@ _TENSOR_WORDS = {
 
 
 def tensor_words(problems: Iterable[TensorProblem]) -> str:
-    """Return why a tensor is no rigid body's, in words that end a sentence."""
+    """Say why no rigid body has a tensor, as the end of a sentence."""
     return ", ".join(_TENSOR_WORDS[problem] for problem in problems)
 
 
@@ -395,17 +392,17 @@ class MassProps:
 
     @classmethod
     def nothing(cls) -> MassProps:
-        """Return no mass at all; the neutral element of :func:`combine`."""
+        """Return a body without mass, the neutral element of :func:`combine`."""
         return cls(0.0, np.zeros(3), np.zeros((3, 3)))
 
     @property
     def center_mass(self) -> Floats:
-        """Return (3,) centre of mass [m]."""
+        """Return the centre of mass (3,) [m]."""
         return self.com
 
     @property
     def moment_inertia(self) -> Floats:
-        """Return (3, 3) tensor [kg m^2] about the centre of mass.
+        """Return the tensor (3, 3) [kg m^2] about the centre of mass.
 
         Off-diagonals are tensor elements (-∫xy dm).
         """
@@ -413,16 +410,16 @@ class MassProps:
 
     @property
     def principal_inertia_components(self) -> Floats:
-        """Return (3,) principal moments [kg m^2], ascending."""
+        """Return the principal moments (3,) [kg m^2], ascending."""
         return self.principal()[0]
 
     @property
     def principal_inertia_vectors(self) -> Floats:
-        """Return (3, 3): the unit axis of each principal moment, one a row, right-handed."""
+        """Return (3, 3): in each row the unit axis of a principal moment, right-handed."""
         return self.principal()[1].T
 
     def __add__(self, other: object) -> MassProps:
-        """Return both as one rigid body. InputError if their frames are known to differ."""
+        """Combine both into one rigid body. InputError if their frames are known to differ."""
         if not isinstance(other, MassProps):
             return NotImplemented
         if self.frame and other.frame and self.frame != other.frame:
@@ -444,10 +441,9 @@ class MassProps:
         return f"MassProps(mass={self.mass:.6g} kg, com=[{centre}] m, principal=[{moments}] kg m²{where})"
 
     def transformed(self, placement: ArrayLike, frame: str = "") -> MassProps:
-        """Return the same body after ``placement`` ((4, 4), rigid or mirrored); ``frame`` names the new
-        frame.
+        """Move the body by ``placement`` ((4, 4), rigid or mirrored); ``frame`` names the new frame.
 
-        A placement that scales is refused (InputError): a mass says nothing about what scaling does to it.
+        A placement that scales is refused (InputError), since a mass does not show what scaling does to it.
         Scaled *geometry* is handled exactly, by :func:`place`.
         """
         matrix = as_placement(placement)
@@ -469,10 +465,10 @@ class MassProps:
         return moments, axes
 
     def check(self, tolerance: float = CHECK_TOLERANCE) -> tuple[TensorProblem, ...]:
-        """Return everything that keeps this from being a rigid body; empty if all is well.
+        """Find everything that keeps this from being a rigid body; () if nothing does.
 
-        On eigenvalues, never on the diagonal: diag(.02, .02, .02) with ixy = .015 looks right and is not.
-        ``tolerance`` is relative to the largest principal moment; a flat plate (a + b = c) is fine.
+        It checks the eigenvalues, not the diagonal: diag(.02, .02, .02) with ixy = .015 looks right, but is
+        not. ``tolerance`` is relative to the largest principal moment; a flat plate (a + b = c) is fine.
         """
         if not (np.isfinite(self.mass) and np.isfinite(self.com).all() and np.isfinite(self.inertia).all()):
             return (TensorProblem.NOT_FINITE,)
@@ -492,23 +488,23 @@ class MassProps:
         return tuple(problems)
 
     def to_inertial(self) -> InertialProperties:
-        """Return the spec's plain type, the tensor made exactly symmetric."""
+        """Convert to the spec's plain type, with an exactly symmetric tensor."""
         x, y, z = self.com.tolist()
         (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = ((self.inertia + self.inertia.T) / 2).tolist()
         return InertialProperties(self.mass, (x, y, z), ixx, iyy, izz, ixy, ixz, iyz)
 
 
 def parallel_axis(masses: Floats, offsets: Floats) -> Floats:
-    """Return (3, 3) tensor [kg m^2] of point masses ((N,) [kg]) at ``offsets`` ((N, 3) [m]) about the
+    """Return the tensor (3, 3) [kg m^2] of point masses ((N,) [kg]) at ``offsets`` ((N, 3) [m]) about the
     origin.
     """
     second = np.einsum("n,ni,nj->ij", masses, offsets, offsets)
-    result: Floats = np.trace(second) * _EYE3 - second
-    return result
+    tensor: Floats = np.trace(second) * _EYE3 - second
+    return tensor
 
 
 def combine(bodies: Sequence[MassProps]) -> MassProps:
-    """Return all bodies as one rigid body, in their common frame."""
+    """Combine all bodies into one rigid body, in their common frame."""
     if not bodies:
         return MassProps.nothing()
     return combine_arrays(
@@ -519,9 +515,9 @@ def combine(bodies: Sequence[MassProps]) -> MassProps:
 
 
 def combine_arrays(masses: ArrayLike, coms: ArrayLike, inertias: ArrayLike) -> MassProps:
-    """Do as :func:`combine`, from (N,) [kg], (N, 3) [m], (N, 3, 3) [kg m^2].
+    """Do what :func:`combine` does, from (N,) [kg], (N, 3) [m], (N, 3, 3) [kg m^2].
 
-    Without any mass the centre is the origin, since there is none.
+    Without any mass there is no centre, and the origin is returned.
     """
     mass = np.asarray(masses, float)
     com = np.asarray(coms, float)
@@ -536,7 +532,7 @@ def combine_arrays(masses: ArrayLike, coms: ArrayLike, inertias: ArrayLike) -> M
 def place(
     volumes: ArrayLike, coms: ArrayLike, units: ArrayLike, placements: ArrayLike
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the geometry of N instances after their placements.
+    """Move the geometry of N instances by their placements.
 
     volumes : (N,) [m^3]; coms : (N, 3) [m]; units : (N, 3, 3) [m^5], tensors per unit density about the coms
     placements : (N, 4, 4); rigid, mirrored, or any invertible affine map (then exact as well: the second
@@ -563,25 +559,27 @@ def _stretched(unit: Floats, turn: Floats, stretch: Floats) -> Floats:
     trace = np.trace(unit, axis1=1, axis2=2)[:, None, None]
     second = trace / 2 * _EYE3 - unit
     second = stretch[:, None, None] * (turn @ second @ turn.transpose(0, 2, 1))
-    result: Floats = np.trace(second, axis1=1, axis2=2)[:, None, None] * _EYE3 - second
-    return result
+    tensors: Floats = np.trace(second, axis1=1, axis2=2)[:, None, None] * _EYE3 - second
+    return tensors
 
 
 def rigid_mask(placements: Floats, tolerance: float = RIGID_TOLERANCE) -> NDArray[np.bool_]:
-    """Return (N,) bool: which of the (N, 4, 4) placements neither scale nor shear (a mirror is rigid)."""
+    """Return (N,) bool: True for each of the (N, 4, 4) placements that neither scales nor shears (a mirror is
+    rigid).
+    """
     turn = placements[:, :3, :3]
     off = np.abs(turn.transpose(0, 2, 1) @ turn - _EYE3)
-    result: NDArray[np.bool_] = off.max(axis=(1, 2)) <= tolerance
-    return result
+    mask: NDArray[np.bool_] = off.max(axis=(1, 2)) <= tolerance
+    return mask
 
 
 def is_rigid(placement: Floats, tolerance: float = RIGID_TOLERANCE) -> bool:
-    """Report whether a (4, 4) placement neither scales nor shears; a mirror is rigid."""
+    """Return True if a (4, 4) placement neither scales nor shears; a mirror is rigid."""
     return bool(rigid_mask(placement[None], tolerance)[0])
 
 
 def as_placement(value: ArrayLike) -> Floats:
-    """Return a (4, 4) placement, checked: finite, last row 0 0 0 1, invertible (InputError otherwise)."""
+    """Check a (4, 4) placement: finite, last row 0 0 0 1, invertible. InputError otherwise."""
     try:
         matrix = np.asarray(value, float)
     except (TypeError, ValueError) as error:

@@ -44,16 +44,16 @@ _NOISE = 1e-14
 
 
 def number(value: float) -> str:
-    """Print fifteen significant digits, which hide the last bit's noise; never "-0"."""
+    """Write fifteen significant digits, which hide the noise of the last bit; never "-0"."""
     return f"{value + 0.0:.15g}"
 
 
 def settled(props: MassProps) -> MassProps:
-    """Return ``props`` as they will be printed, symmetric, with principal moments that keep a + b >= c.
+    """Round ``props`` to the digits that are printed, symmetric, with principal moments that keep a + b >= c.
 
     A flat plate has a + b = c, and rounding may push c above by some 1e-16: MuJoCo refuses that. All moments
-    are then raised by what is missing, which is below 1e-9 of the largest one; more than that is no rounding
-    and stays as it is, for the check to find.
+    are then raised by the missing amount, which is below 1e-9 of the largest one; a larger amount is no
+    rounding, and stays for the check to find.
     """
     tensor = _printed(_quiet((props.inertia + props.inertia.T) / 2))
     for _ in range(4):
@@ -67,10 +67,10 @@ def settled(props: MassProps) -> MassProps:
 
 
 def _quiet(values: Floats, size: float | None = None) -> Floats:
-    """Put zero for what is rounding against ``size``: 1e-18 m beside 0.3 m is no position."""
+    """Write zero for rounding noise against ``size``: 1e-18 m beside 0.3 m is no position."""
     size = float(np.abs(values).max()) if size is None else size
-    result: Floats = np.where(np.abs(values) <= _NOISE * size, 0.0, values)
-    return result
+    quiet: Floats = np.where(np.abs(values) <= _NOISE * size, 0.0, values)
+    return quiet
 
 
 def _printed(values: Floats) -> Floats:
@@ -78,9 +78,9 @@ def _printed(values: Floats) -> Floats:
 
 
 def writable(links: Iterable[LinkResult]) -> dict[str, MassProps]:
-    """Return link → properties fit for a simulator. Links without mass are left out.
+    """Return link → properties that a simulator accepts. Links without mass are left out.
 
-    Raises InputError with every link whose tensor no rigid body can have; then nothing is to be written.
+    Raises InputError with every link whose tensor no rigid body can have; then nothing may be written.
     """
     fit: dict[str, MassProps] = {}
     bad: list[str] = []
@@ -101,7 +101,7 @@ FORMAT = "silo-inertia/1"
 
 
 def report_data(report: InertiaReport) -> dict[str, Any]:
-    """Return the report as JSON values; SI units throughout, the order of links and parts is stable."""
+    """Return the report as JSON values, in SI units. The order of links and parts is stable."""
     return {
         "format": FORMAT,
         "assembly": {"name": report.assembly, "source": report.source},
@@ -122,9 +122,9 @@ def report_data(report: InertiaReport) -> dict[str, Any]:
 
 
 def report_json(report: InertiaReport, encoding: str = "utf-8") -> str:
-    """Return :func:`report_data` as text; floats read back unchanged.
+    """Write :func:`report_data` as text; its floats read back unchanged.
 
-    What ``encoding`` cannot hold is escaped.
+    Characters that ``encoding`` lacks are escaped.
     """
     data = report_data(report)
     text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
@@ -190,7 +190,7 @@ CSV_COLUMNS: dict[str, str | Callable[[str, PartResult], object]] = {
 
 
 def report_csv(report: InertiaReport) -> str:
-    """Return one row per link and part (RFC 4180).
+    """Write one row for each link and part (RFC 4180).
 
     Text that a spreadsheet would take for a formula is quoted.
     """
@@ -241,13 +241,13 @@ SNIPPETS = tuple(_SNIPPETS)
 
 
 def inertial(props: MassProps, kind: str = "urdf") -> str:
-    """Return a link's ``<inertial>``. ``kind``: one of :data:`SNIPPETS`."""
+    """Write a link's ``<inertial>``. ``kind``: one of :data:`SNIPPETS`."""
     values = vars(props.to_inertial())
     com = " ".join(map(number, values.pop("com")))
     return _SNIPPETS[kind][1].format(com=com, **{name: number(value) for name, value in values.items()})
 
 
-# What stands around all links, so that the file loads as it is; {} is the model's name.
+# The text around all links that makes the file loadable; {} is the model's name.
 _AROUND = {
     "urdf": ("<robot name={}>", "</robot>"),
     "sdf": ('<sdf version="1.9">\n<model name={}>', "</model>\n</sdf>"),
@@ -259,7 +259,7 @@ _RESERVED = {"mjcf": {"world"}, "sdf": {"world"}}
 
 
 def snippets(links: Mapping[str, MassProps], kind: str) -> str:
-    """Return all links, each in its ``<link>`` or ``<body>``, to paste from.
+    """Write all links to copy from, each in its ``<link>`` or ``<body>``.
 
     ``kind``: one of :data:`SNIPPETS`.
     """
@@ -271,7 +271,7 @@ def snippets(links: Mapping[str, MassProps], kind: str) -> str:
 
 
 def document(links: Mapping[str, MassProps], kind: str, name: str) -> str:
-    """Return a file of all links that the format's own reader loads; the joints are yours to add.
+    """Write a file of all links that the format's own reader loads; the user adds the joints.
 
     InputError if a link has a name that the format does not allow.
     """
@@ -318,14 +318,14 @@ SOURCE_WORDS = {
 
 
 def how(part: PartResult) -> str:
-    """Return how a part found its row, in words: "normalised, by quantity"."""
+    """Say how a part found its row: "normalised, by quantity"."""
     if part.decided_by in (Decided.ONLY, Decided.SAME_DATA):
         return part.rule.replace("_", " ")
     return f"{part.rule.replace('_', ' ')}, by {part.decided_by}"
 
 
 def material_of(part: PartResult) -> str:
-    """Return the BOM's material, and what it was understood as if that is another word."""
+    """Return the BOM's material, followed by its name in the table if that differs."""
     text = part.material or ""
     name = part.material_name or ""
     if not name or name.casefold() == text.casefold():
@@ -334,9 +334,9 @@ def material_of(part: PartResult) -> str:
 
 
 def report_tables(report: InertiaReport, *, whole: bool = False) -> RenderableType:
-    """Return links, parts and warnings for a terminal.
+    """Write links, parts and warnings for a terminal.
 
-    ``whole``: all of them, each on one line, for a pipe.
+    ``whole``: all rows, each on one line, for a pipe.
     """
     tables = (_links_table(report, whole=whole), _parts_table(report, whole=whole))
     return Group(tables[0], Text(), tables[1], Text(), report_warnings(report, whole=whole))
@@ -374,7 +374,7 @@ def _links_table(report: InertiaReport, *, whole: bool) -> Table:
 
 
 def _link_cells(link: LinkResult) -> tuple[str, str, str, str, str, str]:
-    """Return name, mass, centre, moments, products, number of parts."""
+    """Write the cells of a link: name, mass, centre, moments, products, number of parts."""
     t = link.props.inertia
     size = float(abs(t).max())
     return (
@@ -424,9 +424,9 @@ def _is_one_body(report: InertiaReport) -> bool:
 
 
 def report_warnings(report: InertiaReport, *, whole: bool = False) -> Text:
-    """Return the warnings for a terminal, a line for each cause: mass at stake, parts, the first message.
+    """Write the warnings for a terminal, a line for each cause: mass at stake, parts, the first message.
 
-    ``whole``: with every place.
+    ``whole``: with all places.
     """
     if not report.warnings:
         return Text("No warnings.", style="green")
@@ -456,7 +456,7 @@ def _grouped(warnings: Iterable[PartWarning], *, with_links: bool = True) -> dic
 
 
 def report_markdown(report: InertiaReport) -> str:
-    """Return the report as Markdown."""
+    """Write the report as Markdown."""
     out = [f"# Mass properties of {_cell(report.assembly or 'the assembly')}", ""]
     out += [f"Geometry: {_cell(report.source)}  ", f"BOM: {_cell(report.bom) or 'none'}", ""]
     out += ["## Links", "", *_link_rows(report), "", *_frames(report), ""]
@@ -517,7 +517,7 @@ def _plain(text: str) -> Text:
 
 
 def _clean(text: str) -> str:
-    """Put a text on one line, without control characters: a part's name must not steer a terminal."""
+    """Put a text on one line without control characters, since a part's name must not steer a terminal."""
     return " ".join(re.sub(r"[\x00-\x1f\x7f-\x9f]", " ", text).split())
 
 
@@ -526,12 +526,12 @@ def _short(value: float) -> str:
 
 
 def _vector(values: Iterable[float], size: float = 0.0) -> str:
-    """Print five digits each; what is noise against ``size`` is shown as 0."""
+    """Write each value with five digits; noise against ``size`` becomes 0."""
     return "  ".join(f"{value:.5g}" if abs(value) > NOISE * size else "0" for value in values)
 
 
 def write_whole(path: Path | str, data: bytes, *, like: Path | str | None = None) -> None:
-    """Replace ``path`` by ``data`` in one step. A symbolic link stays one: what it leads to is replaced.
+    """Replace ``path`` by ``data`` in one step. If it is a symbolic link, its target is replaced.
 
     ``like``: take the mode of that file; else that of the old file, else what a new file gets here.
     InputError if the folder or the file cannot be written.

@@ -81,7 +81,7 @@ class Pushed:
 def plan_push(
     report: InertiaReport, part_numbers: Mapping[str, str] | None = None, top: str | None = None
 ) -> PushPlan:
-    """Return what a report says of each item. Pure.
+    """Plan what a report sets on each item. Pure.
 
     part_numbers
         prototype key → number, if neither BOM nor geometry file has it (a FreeCAD document's identities).
@@ -137,10 +137,10 @@ def plan_push(
 def push(
     items: SiloClient, plan: PushPlan, report: Callable[[str], None] = lambda part_number: None
 ) -> Pushed:
-    """Write a plan. Other properties of an item stay; an item that has the numbers already is left alone.
+    """Write a plan. Other properties of an item stay; an item that already has the numbers is left alone.
 
     An item whose properties cannot be read is not written. An error that concerns all items ends the run: the
-    items that are left have it as their reason.
+    remaining items have it as their reason.
     """
     written: list[str] = []
     unchanged: list[str] = []
@@ -154,8 +154,8 @@ def push(
             continue
         report(wanted.part_number)
         try:
-            result = _write(items, wanted, plan.comment)
-            {True: written, False: unchanged, None: by_hand}[result].append(wanted.part_number)
+            outcome = _write(items, wanted, plan.comment)
+            {True: written, False: unchanged, None: by_hand}[outcome].append(wanted.part_number)
         except NotFoundError:
             unknown.append(wanted.part_number)
         except SiloError as error:
@@ -166,7 +166,7 @@ def push(
 
 
 def _write(items: SiloClient, wanted: PushItem, comment: str) -> bool | None:
-    """Write the numbers; return False if the item has them already, None if it keeps others."""
+    """Write the numbers; returns False if the item has them already, None if it has others that it keeps."""
     properties = items.get_properties(wanted.part_number)
     # The server replaces properties as a whole, so that what others wrote goes along.
     merged = {**properties, **wanted.properties}
@@ -235,7 +235,7 @@ def _comment(report: InertiaReport) -> str:
 
 
 def describe(item: PushItem) -> str:
-    """Return a line for people."""
+    """Describe an item in one line, for people."""
     volume = item.properties.get("volume_m3")
     text = f"{item.part_number}  {item.name}: {number(item.properties['mass_kg'])} kg"
     return text + (f", {volume * 1e6:.6g} cm³" if volume else "")

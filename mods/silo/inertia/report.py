@@ -78,12 +78,12 @@ class PartResult:
 
     @property
     def quantity(self) -> int:
-        """Return how many pieces."""
+        """Return the number of pieces."""
         return len(self.paths)
 
     @property
     def total_mass(self) -> float:
-        """Return [kg] of all pieces."""
+        """Return the mass [kg] of all pieces."""
         return self.mass * self.quantity
 
 
@@ -165,14 +165,14 @@ class InertiaReport:
     _told: set[PartWarning] = field(default_factory=set, init=False, repr=False, compare=False)
 
     def add_warning(self, link_name: str, part_name: str, message: str, code: str = "note") -> None:
-        """Add a warning; the same one twice is kept once."""
+        """Add a warning; equal warnings are kept once."""
         warning = PartWarning(link_name, part_name, message, code)
         if warning not in self._told:
             self._told.add(warning)
             self.warnings.append(warning)
 
     def causes(self) -> list[Cause]:
-        """Return the warnings by their effect: one cause for each code, those of the most mass first."""
+        """Group the warnings by code; the cause that concerns the most mass comes first."""
         masses: dict[tuple[str, str], float] = defaultdict(float)
         for link in self.links.values():
             masses[link.name, ""] = link.props.mass
@@ -189,7 +189,7 @@ class InertiaReport:
         return sorted(causes, key=lambda cause: -cause.mass)
 
     def get_summary(self) -> str:
-        """Return all warnings by link, in words."""
+        """Write all warnings, link by link."""
         if not self.warnings:
             return "No warnings."
         lines = [f"{counted(len(self.warnings), 'warning')}:"]
@@ -212,7 +212,7 @@ class InertiaReport:
 
     @property
     def bodies(self) -> dict[str, MassProps]:
-        """Return link → mass properties in the link's frame: numpy arrays, sums, moves, principal axes."""
+        """Return link → mass properties in the link's frame, as numpy arrays that can be added and moved."""
         return {name: link.props for name, link in self.links.items()}
 
     def __repr__(self) -> str:
@@ -221,7 +221,7 @@ class InertiaReport:
         return f"InertiaReport({self.assembly!r}: {words})"
 
     def parts(self) -> tuple[tuple[str, PartResult], ...]:
-        """Return (link, part) of everything, links first, then the unclaimed ones under ""."""
+        """Return (link, part) for all parts: those of links first, then the unclaimed ones under ""."""
         rows = [(link.name, part) for link in self.links.values() for part in link.parts]
         return (*rows, *(("", part) for part in self.unclaimed))
 

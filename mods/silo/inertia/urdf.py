@@ -53,7 +53,7 @@ class Filled:
 
 
 def write_urdf(urdf: Urdf, links: Mapping[str, MassProps], target: Path | str | None) -> Filled:
-    """Fill a URDF into ``target``, whole or not at all; without any of ``links``, do nothing."""
+    """Fill a URDF into ``target``, completely or not at all; does nothing if it has none of ``links``."""
     filled = urdf.filled(links)
     if filled.written and target is not None:
         write_whole(target, filled.data, like=urdf.source)
@@ -61,7 +61,7 @@ def write_urdf(urdf: Urdf, links: Mapping[str, MassProps], target: Path | str | 
 
 
 def read_urdf(path: Path | str) -> Urdf:
-    """Read a URDF file; InputError if it is absent or far too large, or no URDF that can be read."""
+    """Read a URDF file; InputError if it is absent, far too large, or no readable URDF."""
     try:
         if Path(path).stat().st_size > MAX_BYTES:
             raise InputError(f"{path}: larger than {MAX_BYTES // 2**20} MB, which no URDF is")
@@ -141,7 +141,7 @@ class Urdf:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the links, in the file's order."""
+        """Return the names of the links, in the file's order."""
         return tuple(span.name for span in self._links)
 
     @property
@@ -152,13 +152,13 @@ class Urdf:
     def filled(self, links: Mapping[str, MassProps]) -> Filled:
         """Replace or insert ``<inertial>`` of the named links; the rest of the file stays byte for byte."""
         newline = b"\r\n" if b"\r\n" in self.data else b"\n"
-        result = self.data
+        data = self.data
         for span in sorted(self._links, key=lambda span: -span.start):
             if span.name in links:
                 start, end, text = _edit(self.data, span, links[span.name], newline)
-                result = result[:start] + text + result[end:]
+                data = data[:start] + text + data[end:]
         return Filled(
-            result,
+            data,
             tuple(name for name in links if name in self.names),
             tuple(name for name in links if name not in self.names),
             tuple(name for name in self.names if name not in links),
@@ -166,15 +166,16 @@ class Urdf:
 
     @cached_property
     def frames(self) -> dict[str, Floats]:
-        """Return link → (4, 4) placement of its frame in the root link's frame, joints at position zero [m].
+        """Return link → placement (4, 4) [m] of its frame in the root link's frame, with the joints at
+        position zero.
 
-        None of them if there is a :attr:`problem`.
+        It is empty if there is a :attr:`problem`.
         """
         return {} if self.problem else self._placements
 
     @cached_property
     def problem(self) -> str:
-        """Return why the joints do not say where the links are: no tree, or no numbers; else ""."""
+        """Say why the joints do not give the places of the links: no tree, or no numbers; otherwise ""."""
         try:
             self._placements  # noqa: B018 - asked for what it raises
         except InputError as error:
@@ -187,7 +188,9 @@ class Urdf:
 
     @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """Report what is odd about the joints' origins though it can be read: more than a turn is degrees."""
+        """Report what is odd about the joints' origins although they can be read: more than a turn means
+        degrees.
+        """
         turned = [
             f"{joint.parent} → {joint.child} (rpy=“{joint.rpy}”)"
             for joint in self._joints
@@ -200,14 +203,16 @@ class Urdf:
 
     @cached_property
     def root(self) -> str:
-        """Return the link that all others hang on: ``base_link`` if there is one, else the tree's root."""
+        """Return the link to which all others are attached: ``base_link`` if there is one, else the tree's
+        root.
+        """
         below = {joint.child for joint in self._joints}
         roots = [name for name in self.names if name not in below]
         return roots[0] if len(roots) == 1 and ROOT_LINK not in self.names else ROOT_LINK
 
     @cached_property
     def loose(self) -> frozenset[str]:
-        """Return the links from which no joints lead to the root: where their frames are, nobody knows."""
+        """Return the links that no joints connect to the root; the places of their frames are unknown."""
         if self.problem:
             return frozenset()
         tops = {name: [name, *(j.parent for j in self._way_up(name))][-1] for name in self.names}
@@ -234,7 +239,7 @@ class Urdf:
             seen.add(link)
 
     def _placement(self, link: str) -> Floats:
-        result: Floats = np.eye(4)
+        matrix: Floats = np.eye(4)
         for joint in self._way_up(link):
             xyz, rpy = _numbers(joint.xyz), _numbers(joint.rpy)
             if len(xyz) != 3 or len(rpy) != 3 or not np.isfinite([*xyz, *rpy]).all():
@@ -243,8 +248,8 @@ class Urdf:
                     f"xyz=“{joint.xyz}” rpy=“{joint.rpy}”, wanted three numbers each; "
                     "a xacro file must be expanded first"
                 )
-            result = origin_frame(xyz, rpy) @ result
-        return result
+            matrix = origin_frame(xyz, rpy) @ matrix
+        return matrix
 
     def _doctype(self, *_: Any) -> None:
         raise InputError(f"{self.source}: has a DOCTYPE, which a URDF does not need and which is not read")
@@ -298,9 +303,8 @@ class Urdf:
             self._joint = None
 
     def _tag_end(self, start: int) -> tuple[int, bool]:
-        """Return where the tag that begins at ``start`` ends, and whether it closes itself.
-
-        A quoted ">" is none.
+        """Find the end of the tag that begins at ``start``, and if it closes itself. A quoted ">" is no
+        end.
         """
         match = re.compile(rb"<(?:\"[^\"]*\"|'[^']*'|[^>\"'])*>").match(self.data, start)
         if match is None:

@@ -56,7 +56,7 @@ _EMPTY = {
 
 
 def is_empty(cell: str) -> bool:
-    """Report whether a cell says "nothing": empty, "No value", "- None -", and their translations."""
+    """Return True if a cell says "nothing": empty, "No value", "- None -", and their translations."""
     text = unicodedata.normalize("NFKC", cell).strip().casefold()
     inner = re.fullmatch(r"[-–—<]\s*(.*?)\s*[-–—>]", text)
     return text in _EMPTY or (inner is not None and inner[1] in _EMPTY)
@@ -162,9 +162,9 @@ def parse_mass(text: str, *, mark: Mark | None = None, unit: str | None = None) 
 
 
 def unit_factor(unit: str) -> float | None:
-    """Return the kg per ``unit``; None if it is no unit of mass or weight.
+    """Return how many kg a ``unit`` is; None if it is no unit of mass or weight.
 
-    Case counts for Mg and forces only.
+    Upper and lower case matter only for Mg and for forces.
     """
     text = plain_text(unit).rstrip(".")
     if text == "Mg":
@@ -173,10 +173,7 @@ def unit_factor(unit: str) -> float | None:
 
 
 def column_mark(cells: Iterable[str]) -> Mark | None:
-    """Return the decimal mark that a column's unambiguous cells agree on.
-
-    None if they show none, or both.
-    """
+    """Return the decimal mark that a column's unambiguous cells show; None if they show none, or both."""
     return common_mark(cell.mark for cell in map(parse_mass, cells))
 
 
@@ -234,7 +231,7 @@ class MassHeader:
 
 
 def read_mass_header(cell: str) -> MassHeader:
-    """Take a header apart; for any text, also a header of something else than masses."""
+    """Take a header apart; works for any text, even the header of something other than masses."""
     text = plain_text(cell)
     header = MassHeader()
     for bracket in _BRACKETS.findall(text):
@@ -252,7 +249,7 @@ def read_mass_header(cell: str) -> MassHeader:
 
 
 def _read_words(text: str, header: MassHeader, *, title: bool = False) -> list[str]:
-    """Put what the words say into ``header``; return the words that say nothing known."""
+    """Put what the words mean into ``header``; returns the words that mean nothing to us."""
     kept: list[str] = []
     over = False
     for index, word in enumerate(_WORD.findall(text)):
@@ -341,17 +338,17 @@ class BOMEntry:
 
     @property
     def has_mass(self) -> bool:
-        """Report whether the BOM gives a mass; 0 kg is one."""
+        """Return True if the BOM gives a mass; 0 kg is one."""
         return self.mass_kg is not None
 
     @property
     def has_material(self) -> bool:
-        """Report whether a material is assigned."""
+        """Return True if a material is assigned."""
         return self.material is not None
 
     @property
     def data(self) -> tuple[str | None, float | None]:
-        """Return what decides a mass; rows with equal data need not be distinguished."""
+        """Return the values that decide a mass; rows with equal values need not be distinguished."""
         return (self.material, self.mass_kg)
 
 
@@ -385,9 +382,8 @@ class BomTable(Mapping[str, BOMEntry]):
         return f"BomTable({len(self.rows)} rows, {len(self)} names, {len(self.warnings)} warnings)"
 
     def total_quantity(self, row: BOMEntry) -> float | None:
-        """Return the pieces in the whole product: its quantity times that of every parent.
-
-        None if one is unknown.
+        """Return the pieces in the whole product: the row's quantity times that of every parent; None if one
+        is unknown.
         """
         total = 1.0
         for entry in (row, *self.ancestors(row)):
@@ -397,7 +393,7 @@ class BomTable(Mapping[str, BOMEntry]):
         return total
 
     def ancestors(self, row: BOMEntry) -> tuple[BOMEntry, ...]:
-        """Return the rows above, nearest first."""
+        """Return the rows above in the structure, the nearest first."""
         entries: list[BOMEntry] = []
         parent = row.parent
         while parent is not None:
@@ -407,7 +403,7 @@ class BomTable(Mapping[str, BOMEntry]):
 
 
 def as_table(entries: Mapping[str, BOMEntry]) -> BomTable:
-    """Return any mapping name → entry as a table; a table passes unchanged."""
+    """Make a table of any mapping name → entry; a table is returned unchanged."""
     if isinstance(entries, BomTable):
         return entries
     return BomTable(tuple(replace(entry, name=name) for name, entry in entries.items()))

@@ -57,7 +57,9 @@ class MassReader:
         self._unit_role = self._find_units(sheet)
 
     def _find_units(self, sheet: Sheet) -> Heading:
-        """Return the column of the masses' units. A column "Unit" is of the quantities if it has pieces."""
+        """Find the column with the units of the masses. A column "Unit" belongs to the quantities if it has
+        pieces.
+        """
         cell, at = sheet.columns.cell, sheet.columns.at
         if (
             Heading.MASS_UNIT in at
@@ -86,7 +88,7 @@ class MassReader:
             self._reported.add(code)
 
     def read(self, row: SheetRow, name: str, quantity: float | None) -> MassCell:
-        """Return the mass of one piece."""
+        """Read the mass of one piece."""
         cell, total = (self._cell(role, row, name) for role in MASS_COLUMNS)
         self._cells[row.line] = cell, total
         if cell.kg is not None or total.kg is None:
@@ -98,10 +100,10 @@ class MassReader:
         return MassCell()
 
     def to_display_precision(self, rows: Sequence[BOMEntry]) -> list[BOMEntry]:
-        """Return the quantum of the column's finest cell of the same unit, for all: exports trim trailing
+        """Give each cell the quantum of the finest cell with the same unit, since exports trim trailing
         zeros.
 
-        "0.3 kg" beside "0.009 kg" was shown with three decimals as well, so that it is ± 0.0005 kg.
+        If a column has "0.009 kg", its "0.3 kg" had three decimals as well, so that it is ± 0.0005 kg.
         """
         if self._columns.exact:
             return [replace(row, quantum_kg=0.0) for row in rows]
@@ -118,7 +120,7 @@ class MassReader:
         ]
 
     def _is_own(self, row: BOMEntry) -> bool:
-        """Report whether the mass of one piece stands in the file, and is no share of a total."""
+        """Return True if the file states the mass of one piece, and it is not a share of a total."""
         return self._cells[row.line][0].kg is not None
 
     def _cell(self, role: Heading, row: SheetRow, name: str) -> MassCell:
@@ -162,7 +164,7 @@ class MassReader:
         return replace(likely, ambiguous=True)
 
     def check_totals(self, table: BomTable) -> tuple[BOMEntry, ...]:
-        """Return the rows; a total that may be of one parent or of the whole product makes a row unsure."""
+        """Mark the rows whose total may be that of one parent or that of the whole product as unsure."""
         return tuple(self._checked(row, table) for row in table.rows)
 
     def _checked(self, row: BOMEntry, table: BomTable) -> BOMEntry:
@@ -179,7 +181,7 @@ class MassReader:
             )
             self._report(BomCode.AMBIGUOUS_MASS, words, row.line, row.name)
             return replace(row, unsure=True)
-        # Of the row, or of the whole product (Silo's own export): what fits is meant.
+        # Of the row, or of the whole product (as in Silo's own export): the one that fits counts.
         counts = {row.quantity, table.total_quantity(row) or row.quantity}
         if not any(_agree(row, count, total) for count in counts):
             words = (
@@ -231,7 +233,9 @@ class BOMParser:
         self._mass_unit = mass_unit
 
     def parse(self, path: Path | str) -> BomTable:
-        """Read a file. InputError if it is absent, or has no header with names; all else is a warning."""
+        """Read a file. InputError if it is absent, or has no header with names; everything else is a
+        warning.
+        """
         try:
             data = Path(path).read_bytes()
         except OSError as error:
@@ -239,7 +243,7 @@ class BOMParser:
         return self.parse_bytes(data, str(path))
 
     def parse_bytes(self, data: bytes, source: str = "BOM") -> BomTable:
-        """Do as :meth:`parse`, from bytes."""
+        """Do what :meth:`parse` does, from bytes."""
         sheet = read_sheet(
             data,
             source,
@@ -290,9 +294,10 @@ def _entry(
 
 
 def _indented(rows: list[BOMEntry], sheet: Sheet, warnings: list[BomWarning]) -> list[BOMEntry]:
-    """Return the rows with levels by the spaces before their names, if nothing else gives a structure.
+    """Derive levels from the spaces before the names, if nothing else shows the structure.
 
-    Steps of two spaces or more, never two steps down at once: a stray space makes no sub-assembly.
+    A step is two spaces or more, and there are never two steps down at once: a single wrong space makes no
+    sub-assembly.
     """
     at = sheet.columns.at
     if Heading.LEVEL in at or any("." in row.item for row in rows):
@@ -328,7 +333,7 @@ def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> fl
 
 
 def _item_role(sheet: Sheet) -> Heading:
-    """Return the column of item numbers; some tools call it the level: 1, 1.1, 1.1.2."""
+    """Return the role of the column with item numbers; some tools call it the level: 1, 1.1, 1.1.2."""
 
     def dotted(role: Heading) -> bool:
         return any(re.fullmatch(r"\d+(?:\.\d+)+", sheet.columns.cell(r.cells, role)) for r in sheet.rows)
@@ -347,7 +352,7 @@ def _level(text: str, item_role: Heading, line: int, name: str, warnings: list[B
 
 def _check_length(sheet: Sheet, row: SheetRow, name: str, warnings: list[BomWarning]) -> None:
     if not sheet.delimiter:
-        return  # a workbook's cells stand where they stand
+        return  # a workbook's cells have fixed places
     if any(cell.strip() for cell in row.cells[len(sheet.header) :]):
         what = "a comma without quotes shifts the columns"
     elif len(row.cells) <= max(sheet.columns.at.values()):
@@ -385,7 +390,7 @@ def _doubtful_columns(sheet: Sheet) -> Iterator[BomWarning]:
 
 
 def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
-    """Warn of columns that mean the same as one that is used, and say something else somewhere."""
+    """Warn of columns with the same meaning as a used column, but a different value somewhere."""
     cells = [row.cells for row in sheet.rows]
     for clash in find_clashes(sheet.header, cells, sheet.columns.at, sheet.columns.others, is_empty):
         yield BomWarning(
@@ -400,7 +405,7 @@ def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
 def _doubtful_items(rows: Sequence[BOMEntry]) -> Iterator[BomWarning]:
     """Warn of item numbers that a spreadsheet may have changed.
 
-    1.10 to 1.1, and 1.2 to the second of January.
+    A spreadsheet changes 1.10 to 1.1, and 1.2 to the second of January.
     """
     if not any("." in row.item for row in rows):
         return
@@ -437,10 +442,10 @@ _ITEM = re.compile(r"\d+(?:\.\d+)*")
 
 
 def with_structure(rows: Sequence[BOMEntry]) -> tuple[BOMEntry, ...]:
-    """Return the rows with ``parent``, ``level`` and ``has_children`` filled in.
+    """Fill in ``parent``, ``level`` and ``has_children`` of the rows.
 
-    Item numbers win over levels. A row whose parent is not in the file (a flattened list, a cut-out) stands
-    at the top: nothing is invented for it.
+    Item numbers win over levels. A row whose parent is not in the file (a flattened list, a cut-out) is at
+    the top level; no parent is invented for it.
     """
     parents = _by_item(rows) if any("." in row.item for row in rows) else _by_level(rows)
     having = {parent for parent in parents if parent is not None}
@@ -468,7 +473,9 @@ def _by_item(rows: Sequence[BOMEntry]) -> list[int | None]:
 
 
 def _by_level(rows: Sequence[BOMEntry]) -> list[int | None]:
-    """Return parents: the last row above that is one level up (levels may start at 0 or 1)."""
+    """Find the parent of each row: the last row above it that is one level up (levels may start at 0 or
+    1).
+    """
     stack: list[tuple[int, int]] = []
     parents: list[int | None] = []
     for index, row in enumerate(rows):

@@ -83,15 +83,15 @@ class Columns:
 
     @property
     def usable(self) -> bool:
-        """Report whether rows can be distinguished: by name, part number or description."""
+        """Return True if rows can be distinguished: by name, part number or description."""
         return not self.at.keys().isdisjoint(_NAMES)
 
 
 def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) -> Columns:
     """Find the roles of a header line. ``given``: role → header text, from the user; it wins over aliases.
 
-    A role found twice goes to the column whose name fits best, then to the first. Raises
-    InputError for a role that does not exist.
+    If two columns fit a role, the column whose name fits better gets it, then the first. Raises InputError
+    for a role that does not exist.
     """
     unknown = sorted((given or {}).keys() - ROLES)
     if unknown:
@@ -123,7 +123,7 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
 
 
 def _role_of(cell: str) -> tuple[Heading, int] | None:
-    """Return role and rank of a header: "Mass", "Mass (g)", "mass_kg", "Gewicht in kg", "Summe Masse"."""
+    """Find the role and rank of a header: "Mass", "Mass (g)", "mass_kg", "Gewicht in kg", "Summe Masse"."""
     role = alias(normal(cell.replace("/", " per ")))  # "Mass/unit" is no unit of a mass
     if role is not None and role[0] not in MASS_COLUMNS:
         return role if role[0] in ROLES else None
@@ -165,10 +165,10 @@ def read_sheet(
 ) -> Sheet:
     """Decode a CSV export, or the first sheet of a workbook that holds a BOM.
 
-    ``columns``, ``encoding``, ``delimiter``: the user's word, else detected.
+    ``columns``, ``encoding``, ``delimiter``: given by the user, else detected.
 
     Raises InputError if there is no header line with a column that distinguishes parts, or if the given
-    encoding does not fit; the message lists what was seen.
+    encoding does not fit; the message lists what was found.
     """
     if len(data) > MAX_BYTES:
         raise InputError(
@@ -250,9 +250,9 @@ def _sheet(
 def _as_shown(
     records: list[SheetRow], grid: Grid, header: SheetRow, columns: Columns
 ) -> tuple[list[SheetRow], list[str]]:
-    """Return the records with the texts of merged cells in each of their lines, and what a reader must know.
+    """Copy the text of each merged cell to all of its lines, and list what a reader must know.
 
-    A number in a merged cell may be of all lines together: the first keeps it.
+    A number in a merged cell may belong to all lines together, so only the first line keeps it.
     """
     used = sorted(columns.at.values())
     facts = {
@@ -307,7 +307,7 @@ def _columns(names: Sequence[str]) -> str:
 
 
 def _continues(header: SheetRow, columns: Columns, below: Sequence[SheetRow]) -> bool:
-    """Report whether the record below a header is its second line: no name, and units for masses."""
+    """Return True if the record below a header is its second line: no name, and units for masses."""
     if not below or any(columns.cell(below[0].cells, role) for role in _NAMES):
         return False
     if any(letter.isdigit() for cell in below[0].cells for letter in cell):
@@ -323,7 +323,7 @@ def _continues(header: SheetRow, columns: Columns, below: Sequence[SheetRow]) ->
 
 
 def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[tuple[str, str]]:
-    """Yield the name of each encoding that may be meant, and the text by it."""
+    """Yield the name of each encoding that is possible, and the text in it."""
     if encoding is not None:
         try:
             yield encoding, data.decode(encoding)
@@ -349,9 +349,9 @@ def _records(text: str, delimiter: str, *, strict: bool = False) -> Iterator[She
 
 
 def _bad_quotes(text: str, delimiter: str) -> int | None:
-    """Return the line from which quotes do not match, None if all is well.
+    """Return the line at which quotes stop matching; None if all match.
 
-    Without this look, a quote that is never closed would swallow all rows below it in silence.
+    Without this check, a quote that is never closed would hide all rows below it without a message.
     """
     line = 1
     try:
@@ -365,7 +365,7 @@ def _bad_quotes(text: str, delimiter: str) -> int | None:
 def _best_header(
     tables: Iterable[tuple[str, Sequence[SheetRow]]], given: Mapping[str, str] | None
 ) -> _Header | None:
-    """Return the (delimiter, line) that names most roles; None if no line names a usable set."""
+    """Find the (delimiter, line) that names most roles; None if no line names a usable set."""
     best: _Header | None = None
     score = (0, 0)
     for delimiter, rows in tables:

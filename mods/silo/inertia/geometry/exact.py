@@ -110,12 +110,13 @@ class Moments:
 
 
 def integrate(faces: Iterable[Face], *, centre: Floats, size: float, volume: float, eps: float) -> Moments:
-    """Return the moments of the solid that ``faces`` enclose.
+    """Integrate the moments of the solid that ``faces`` enclose.
 
     centre, size
-        of its box: integrated about the one, in units of the other, so that no digits are lost far away.
+        of its box; the integration is about the centre, in units of the size, so that no digits are lost far
+        from the origin.
     volume
-        a rough one, not 0; ``eps`` is relative to it.
+        an estimate, not 0; ``eps`` is relative to it.
     """
     # A shell without any volume would be refined forever; below this, rounding is larger than the tolerance.
     tolerance = eps * max(abs(volume) / size**3, THIN)
@@ -211,7 +212,7 @@ class _Flux:
         self.pieces = breaks if len(breaks) > 2 else np.array([breaks[0], breaks.mean(), breaks[-1]])
 
     def run(self) -> tuple[Floats, float]:
-        """Return the fluxes, and the estimated error of the first."""
+        """Integrate the fluxes, and estimate the error of the first."""
         flux, error = self._around()
         if self.face.surface.exact:
             return flux, error
@@ -225,7 +226,7 @@ class _Flux:
         return flux, error + change
 
     def _around(self) -> tuple[Floats, float]:
-        """Return all edges at once: most faces are simple, and then calls cost more than numbers."""
+        """Integrate along all edges at once: most faces are simple, so that calls cost more than numbers."""
         stretches = [self._stretches(edge) for edge in self.face.edges]
         low = np.concatenate([s[:-1] for s in stretches]) if stretches else np.zeros(0)
         high = np.concatenate([s[1:] for s in stretches]) if stretches else np.zeros(0)
@@ -245,7 +246,7 @@ class _Flux:
         return total, error
 
     def _stretches(self, edge: Curve) -> Floats:
-        """Return an edge's own breaks; a straight one also where it crosses a break of the surface."""
+        """Return an edge's own breaks; for a straight edge also where it crosses a break of the surface."""
         breaks = edge.breaks
         if not edge.line:
             return breaks
@@ -259,8 +260,8 @@ class _Flux:
         return np.union1d(breaks, breaks[0] + inside * (breaks[-1] - breaks[0]))
 
     def _stretch(self, owner: NDArray[np.intp], low: Floats, high: Floats) -> tuple[Floats, Floats]:
-        """Return (n, 15) fluxes of n stretches of the edges ``owner``, by the finer rule and by the
-        coarser.
+        """Integrate (n, 15) fluxes of n stretches of the edges ``owner``, by the finer and by the coarser
+        rule.
         """
         half = (high - low) / 2
         t = ((high + low) / 2)[:, None] + half[:, None] * _NODES
@@ -280,21 +281,22 @@ class _Flux:
         return np.einsum("j,njk->nk", _WEIGHTS, values), np.einsum("j,njk->nk", _GAUSS, values)
 
     def _inner(self, ends: Floats) -> Floats:
-        """Return (n, 15) integrals over u, from the middle break to each end (n, 2).
+        """Integrate (n, 15) over u, from the middle break to each end (n, 2).
 
-        Where edges do not quite meet, by the file's tolerances, the error grows with the distance from there.
+        If edges do not quite meet, within the file's tolerances, the error grows with the distance from
+        there.
         """
         rows, low, high = _clipped(self.pieces, ends[:, 0])
         x, weight = _gauss(self.face.surface.order)
-        result = np.zeros((len(ends), 15))
+        integrals = np.zeros((len(ends), 15))
         step = max(CHUNK // len(x), 1)
         for start in range(0, len(rows), step):
-            some = slice(start, start + step)
-            half = (high[some] - low[some]) / 2
-            u = ((high[some] + low[some]) / 2)[:, None] + half[:, None] * x
-            density = self._density(u, ends[rows[some], 1])
-            np.add.at(result, rows[some], (weight @ density) * half[:, None])
-        return result
+            chunk = slice(start, start + step)
+            half = (high[chunk] - low[chunk]) / 2
+            u = ((high[chunk] + low[chunk]) / 2)[:, None] + half[:, None] * x
+            density = self._density(u, ends[rows[chunk], 1])
+            np.add.at(integrals, rows[chunk], (weight @ density) * half[:, None])
+        return integrals
 
     def _density(self, u: Floats, v: Floats) -> Floats:
         point, du, dv = self.face.surface.at(u, v)
@@ -309,7 +311,9 @@ class _Flux:
 
 
 def _doubt(difference: Floats, value: Floats) -> Floats:
-    """Return the finer rule's error, from how far the coarser one is off (the rule of thumb of QUADPACK)."""
+    """Estimate the finer rule's error from its difference to the coarser one (the rule of thumb of
+    QUADPACK).
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(value > 0, difference / value, 0.0)
     doubt: Floats = np.where(ratio < 1e-3, value * np.minimum(ratio, (200 * ratio) ** 1.5), difference)
@@ -350,13 +354,13 @@ class Basis(Enum):
         return np.array([0.0, 1.0]) if self is Basis.LINEAR else np.array([0.0, 2.0, 4.0])
 
     def at(self, t: Floats) -> Floats:
-        """Return (…, k) values of the functions."""
+        """Return the values (…, k) of the functions."""
         if self is Basis.LINEAR:
             return np.stack([np.ones_like(t), t], axis=-1)
         return np.stack([np.ones_like(t), np.cos(t), np.sin(t)], axis=-1)
 
     def slope(self, t: Floats) -> Floats:
-        """Return (…, k) their derivatives."""
+        """Return the derivatives (…, k) of the functions."""
         if self is Basis.LINEAR:
             return np.stack([np.zeros_like(t), np.ones_like(t)], axis=-1)
         return np.stack([np.zeros_like(t), -np.sin(t), np.cos(t)], axis=-1)
@@ -384,7 +388,7 @@ class Elementary:
         value: Callable[[float, float], tuple[float, float, float]],
         u_range: tuple[float, float],
     ) -> Elementary:
-        """Fit the surface to a few of its points: whatever its axes are, left-handed ones too."""
+        """Fit the surface to a few of its points, for any axes, also left-handed ones."""
         points = np.array([[value(float(u), float(v)) for v in in_v.samples] for u in in_u.samples])
         from_u = np.linalg.inv(in_u.at(in_u.samples))
         from_v = np.linalg.inv(in_v.at(in_v.samples))
@@ -392,12 +396,12 @@ class Elementary:
 
     @property
     def u_breaks(self) -> Floats:
-        """Return the range in quarter turns, in which twelve points are exact to the last digit."""
+        """Divide the range into quarter turns, in which twelve points are exact to the last digit."""
         return np.array(self.u_range) if self.in_u is Basis.LINEAR else _quarters(*self.u_range)
 
     @property
     def order(self) -> int:
-        """Return the points per piece."""
+        """Return the number of points for each piece."""
         return 4 if self.in_u is Basis.LINEAR else 12
 
     def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
@@ -451,9 +455,8 @@ class Nurbs:
     def unrolled(
         self, u_range: tuple[float, float] | None = None, v_range: tuple[float, float] | None = None
     ) -> Nurbs:
-        """Return one turn of a periodic surface, repeated until it covers the ranges (None.
-
-        Not periodic there).
+        """Repeat one turn of a periodic surface until it covers the ranges; None: not periodic in that
+        direction.
         """
         poles, weights, knots, times = self.poles, self.weights, [self.u_knots, self.v_knots], [1, 1]
         for axis, ends in enumerate((u_range, v_range)):
@@ -467,22 +470,24 @@ class Nurbs:
 
     @property
     def exact(self) -> bool:
-        """Report whether the curve is a polynomial; quotients of polynomials are so only nearly."""
+        """Return True if the surface is polynomial; the integration of a quotient of polynomials is only
+        almost exact.
+        """
         return self.weights is None
 
     @property
     def u_breaks(self) -> Floats:
-        """Return where two polynomials meet."""
+        """Return the parameters at which two polynomials meet."""
         return np.unique(self.u_knots[self.u_degree : len(self.u_knots) - self.u_degree])
 
     @property
     def v_breaks(self) -> Floats:
-        """Return where two polynomials meet, the ends left out."""
+        """Return the parameters at which two polynomials meet, without the ends."""
         return np.unique(self.v_knots[self.v_degree : len(self.v_knots) - self.v_degree])[1:-1]
 
     @property
     def order(self) -> int:
-        """Return the points that are enough for second moments of a flux: degree 5p - 1 in u."""
+        """Return the number of points that is enough for second moments of a flux: degree 5p - 1 in u."""
         return max(5 * self.u_degree // 2 + 1, 8)
 
     @cached_property
@@ -509,7 +514,7 @@ class Nurbs:
 
 
 def _turns(knots: Floats, degree: int, ends: tuple[float, float]) -> tuple[int, Floats]:
-    """Return how many turns cover ``ends``, and their knots; those of one are clamped."""
+    """Count the turns that cover ``ends``, and return their knots; those of a single turn are clamped."""
     low, period = knots[0], knots[-1] - knots[0]
     first = int(np.floor((ends[0] - low) / period + 1e-6))
     last = max(int(np.ceil((ends[1] - low) / period - 1e-6)), first + 1)
@@ -520,7 +525,7 @@ def _turns(knots: Floats, degree: int, ends: tuple[float, float]) -> tuple[int, 
 def basis_functions(
     t: Floats, where: Floats, knots: Floats, degree: int
 ) -> tuple[NDArray[np.intp], Floats, Floats]:
-    """Return the B-splines at ``t`` (n, m), each row between the knots around ``where`` (n,).
+    """Evaluate the B-splines at ``t`` (n, m), each row between the knots around ``where`` (n,).
 
     Returns the first pole that counts (n,), and values and derivatives (n, m, degree + 1) of the functions
     that are not 0. Cox and de Boor's recursion; outside of the knots the last piece continues.
@@ -561,7 +566,7 @@ class Turned:
 
     @property
     def u_breaks(self) -> Floats:
-        """Return the range in quarter turns."""
+        """Divide the range into quarter turns."""
         return _quarters(*self.u_range)
 
     def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:

@@ -44,7 +44,7 @@ from silo.platform import remove_patiently, scratch_folder
 def read_freecad(
     path: Path, options: ReadOptions, report: Report, helpers: Helpers | None = None
 ) -> GeometryReading:
-    """Return the assembly, part or loose bodies of an FCStd file, with what it links to.
+    """Read the assembly, part or loose bodies of an FCStd file, with the files to which it links.
 
     Raises DocumentError.
     """
@@ -90,17 +90,17 @@ class Unpacked:
         self._numbers = count()
 
     def size(self, leaves: Sequence[Leaf]) -> int:
-        """Return the size of all their shapes, in bytes."""
+        """Return the size of all shapes of these products, in bytes."""
         return sum(self._entries.size(ref.handle.path, ref.handle.entry) for e in leaves for ref in e.shapes)
 
     def files(self, leaf: Leaf) -> list[_File]:
         """Unpack each shape. Raises DocumentError."""
-        result = []
+        unpacked = []
         for ref in leaf.shapes:
             path = self._folder / f"shape{next(self._numbers)}.brp"
             path.write_bytes(self._entries.read(ref.handle.path, ref.handle.entry))
-            result.append(_File(path, f"{ref.handle.path}: {ref.handle.entry}", ref.transform))
-        return result
+            unpacked.append(_File(path, f"{ref.handle.path}: {ref.handle.entry}", ref.transform))
+        return unpacked
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +113,11 @@ class _File:
 
 
 def measured_files(files: Sequence[_File], eps: float, mesh_check: bool) -> Measured | str:
-    """Return a product, measured from its shapes in its axes, or what is wrong; the files are taken away.
+    """Measure a product from its shape files, in its own axes, and delete them. Returns a text if something
+    is wrong.
 
-    FreeCAD keeps an object's placement as the location of its stored shape; that one is taken off, and the
-    walk's own put in its place, since a link may leave it out.
+    FreeCAD keeps an object's placement as the location of its stored shape; it is replaced by the placement
+    of the walk, since a link may ignore it.
     """
     # Inside FreeCAD there is no such kernel, and FreeCAD's own draws what is stored.
     from silo.inertia.geometry.kernel.solids import load_shape, measure
@@ -132,7 +133,7 @@ def measured_files(files: Sequence[_File], eps: float, mesh_check: bool) -> Meas
 
 
 def located(shape: Any, matrix: np.ndarray) -> Any:
-    """Return a shape with this placement (4, 4) [mm] in place of its own. Raises DocumentError."""
+    """Give a shape this placement (4, 4) [mm] in place of its own. Raises DocumentError."""
     from OCP.gp import gp_Trsf
     from OCP.TopLoc import TopLoc_Location
 
@@ -163,7 +164,7 @@ class StoredShape:
 
 
 def placed(numbers: Floats) -> Floats:
-    """Return (4, 4) from x y z and the quaternion x y z w, as FreeCAD orders it; identity if it is none."""
+    """Make (4, 4) from x y z and the quaternion x y z w, in FreeCAD's order; the identity if it is none."""
     x, y, z, w = numbers[3:7]
     norm = x * x + y * y + z * z + w * w
     matrix = np.eye(4)
@@ -198,7 +199,9 @@ class StoredFacts:
         self._entries = entries
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
-        """Return (4, 4) [mm] of the object's own placement; the identity if it has none that is a number."""
+        """Return (4, 4) [mm] of the object's own placement; the identity if it has none, or none of
+        numbers.
+        """
         match = _PLACEMENT.search(_piece(obj, name))
         if match is None:
             return np.eye(4)
@@ -210,7 +213,7 @@ class StoredFacts:
             return np.eye(4)
 
     def places(self, obj: Any) -> list[Floats]:
-        """Return the placements in the object's ``PlacementList``. DocumentError if they are damaged."""
+        """Read the placements in the object's ``PlacementList``. DocumentError if they are damaged."""
         match = _FILE.search(_piece(obj, "PlacementList"))
         data = self._entries.read(obj.Document.FileName, _name(match)) if match is not None else b""
         if len(data) < 4:
@@ -225,7 +228,7 @@ class StoredFacts:
         )
 
     def shape(self, obj: Any) -> StoredShape | None:
-        """Return the entry that holds the object's shape, None if it has none, or an empty one."""
+        """Return the entry that holds the object's shape; None if it has none, or an empty one."""
         match = _FILE.search(_piece(obj, "Shape"))
         if match is None or self._entries.size(file_of(obj), _name(match)) == 0:
             return None
@@ -239,7 +242,7 @@ class StoredFacts:
         return card_material(match[1].decode("ascii").lower()) if match is not None else NOTHING
 
     def problem(self, link: Any) -> LinkProblem | None:
-        """Return what the reader of files left on the link."""
+        """Return the problem that the reader of files noted for the link."""
         problem = getattr(link, "LinkProblem", None)
         return problem if isinstance(problem, LinkProblem) else None
 
@@ -256,7 +259,7 @@ class Entries:
         return self._open[path], self._open[path].getinfo(name)
 
     def read(self, path: str, name: str) -> bytes:
-        """Return the bytes of one entry. Raises DocumentError."""
+        """Unpack one entry. Raises DocumentError."""
         try:
             archive, info = self._info(path, name)
             if info.file_size > MAX_ENTRY_BYTES:
@@ -268,7 +271,7 @@ class Entries:
             raise DocumentError(path, f"its {name} cannot be unpacked: {error}") from error
 
     def size(self, path: str, name: str) -> int:
-        """Return how many bytes :meth:`read` would return; 1 if it would raise."""
+        """Return how many bytes :meth:`read` returns; 1 if it raises."""
         try:
             return self._info(path, name)[1].file_size
         except (KeyError, OSError, zipfile.BadZipFile):

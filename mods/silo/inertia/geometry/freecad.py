@@ -69,7 +69,7 @@ NOTHING = StatedMaterial()
 
 
 def linked_material(obj: Any) -> StatedMaterial | None:
-    """Return the material object that is linked to an object, stored or live; None if there is none."""
+    """Return the material object to which an object links, stored or live; None if there is none."""
     linked = own(obj, "Material")
     linked = linked[0] if isinstance(linked, tuple) and linked else linked
     material = own(linked, "Material") if linked is not None and not isinstance(linked, dict) else None
@@ -77,7 +77,7 @@ def linked_material(obj: Any) -> StatedMaterial | None:
 
 
 def told_material(name: str, density: float | None) -> StatedMaterial:
-    """Return a material by name and density [kg/m^3], of which only a sane one counts."""
+    """Make a material of a name and a density [kg/m^3], which must be plausible."""
     sane = _sane(density)
     if sane is None:
         return StatedMaterial(name, problem=f"its material '{name}' has no density that can be used")
@@ -97,7 +97,7 @@ def _from_map(materials: dict[str, str]) -> StatedMaterial:
 
 
 def card_material(uuid: str) -> StatedMaterial:
-    """Return the material of a card in an installed FreeCAD, or what is wrong with it."""
+    """Find the material of a card in an installed FreeCAD, or say what is wrong with it."""
     if uuid == NO_MATERIAL:
         return NOTHING
     card = card_of(uuid)
@@ -138,15 +138,17 @@ class ShapeSource(Protocol):
     (``silo.workbench.mass.shapes``)."""
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
-        """Return (4, 4) of an object's own placement; the identity where it has none."""
+        """Return (4, 4) of an object's own placement; the identity if it has none."""
         ...
 
     def places(self, obj: Any) -> list[Floats]:
-        """Return (4, 4) each, the object's own ``PlacementList``."""
+        """Return (4, 4) for each placement in the object's own ``PlacementList``."""
         ...
 
     def shape(self, obj: Any) -> Any:
-        """Return a handle on the object's shape, to measure it; None if it has none, or an empty one."""
+        """Return a handle by which the object's shape can be measured; None if it has none, or an empty
+        one.
+        """
         ...
 
     def material(self, obj: Any) -> StatedMaterial:
@@ -154,7 +156,7 @@ class ShapeSource(Protocol):
         ...
 
     def problem(self, link: Any) -> LinkProblem | None:
-        """Return why a link has no target, as far as that is known."""
+        """Return why a link has no target, if that is known."""
         ...
 
 
@@ -205,7 +207,7 @@ class Walk:
         )
 
     def problems(self) -> list[Note]:
-        """Return what was left out, or counted with a doubt."""
+        """Return notes about what was left out, or counted with a doubt."""
         for finding in self._reader.notes.findings():
             if finding.code in _TOLD:
                 self._note(_TOLD[finding.code], finding.message)
@@ -219,8 +221,8 @@ class Walk:
     # --- products ------------------------------------------------------------------------------------------
 
     def top(self, document: Any, name: str | None) -> str:
-        """Return the key of what is to be measured: the named object, the assembly, or the document's own
-        part.
+        """Choose what is measured (the named object, the assembly, or the document's own part), and return
+        its key.
         """
         obj = document.getObject(name) if name is not None else None
         try:
@@ -243,10 +245,10 @@ class Walk:
         return self.product(top)
 
     def product(self, obj: Any, copies: Any = None) -> str:
-        """Return the key of the product ``obj``, in its own axes.
+        """Walk the product ``obj`` in its own axes, and return its key.
 
         copies
-            a flexible AssemblyLink of it; or the object itself, if its own shape is all that there is.
+            a flexible AssemblyLink of it; or the object itself, if it has only its own shape.
         """
         self.documents.add(file_of(obj))
         key = self._key(obj, copies)
@@ -291,7 +293,7 @@ class Walk:
         self.nodes[key] = Node(key, self._name(obj), tuple(children))
 
     def _moved(self, link: Any) -> dict[str, Floats]:
-        """Return member name in the real assembly → where a flexible AssemblyLink's copy of it stands."""
+        """Map each member of the real assembly to the placement of its copy in a flexible AssemblyLink."""
         places: dict[str, Floats] = {}
         for copy in (getattr(link, "Group", None) or ()) if link is not None else ():
             if (original := first_of(getattr(copy, "LinkedObject", None))) is not None:
@@ -350,7 +352,7 @@ class Walk:
     def _uses(
         self, container: Any, count: Count, contents: Contents, moved: dict[str, Floats]
     ) -> Iterator[_Placed]:
-        """Yield every instance of a component in the axes of the container."""
+        """Yield every instance of a component, in the axes of the container."""
         shown = count.shown
         if count.quantity > MAX_ELEMENTS:
             words = f"{label_of(shown.obj)} claims {count.quantity} elements"
@@ -372,10 +374,10 @@ class Walk:
     def _placed(
         self, node: Contribution, key: Key, with_place: bool, moved: Floats | None = None
     ) -> Iterator[_Placed]:
-        """Yield what an object shows of a component, in the axes around the object.
+        """Yield each instance of a component that an object shows, in the axes around the object.
 
         with_place
-            with the object's own placement; ``moved`` stands for it.
+            True: with the object's own placement, or with ``moved`` in its place.
         """
         obj, kind = node.obj, node.kind
         if kind in (Kind.LINK, Kind.ELEMENT, Kind.ASSEMBLY_LINK):
@@ -452,7 +454,7 @@ class Walk:
                 yield from _moved_by(place, seen)
 
     def _along(self, steps: Sequence[Step], with_place: bool, moved: Floats | None) -> list[Floats]:
-        """Return (4, 4) of each instance that a chain of links shows."""
+        """Return (4, 4) for each instance that a chain of links shows."""
         around = [np.eye(4)]
         for number, step in enumerate(steps):
             obj = step.obj
@@ -476,7 +478,7 @@ class Walk:
         return self.facts.placement(link, "Placement" if has_both else "LinkPlacement")
 
     def _element_places(self, link: Any, index: int | None) -> list[Floats]:
-        """Return (4, 4) [mm] of each element of a link array that is not left out; one identity for a plain
+        """Return (4, 4) [mm] for each element of a link array that is not left out; one identity for a plain
         link.
         """
         count = own(link, "ElementCount", 0)
@@ -506,7 +508,7 @@ def _moved_by(outer: Floats, placed: Any) -> Iterator[_Placed]:
 
 
 def _mirror(obj: Any) -> Floats:
-    """Return (4, 4) [mm] of the plane that a mirror image is mirrored at."""
+    """Return (4, 4) [mm] of the reflection in the plane of a mirror image."""
     normal, base = (np.array(tuple(own(obj, name) or (0.0, 0.0, 0.0)), float) for name in ("Normal", "Base"))
     length = float(np.linalg.norm(normal))
     matrix = np.eye(4)
@@ -524,7 +526,9 @@ def file_of(obj: Any) -> str:
 
 
 def scale(link: Any) -> Floats:
-    """Return (4, 4) diagonal of a link's scale. A zero would flatten the part; FreeCAD takes it as 1."""
+    """Return the diagonal matrix (4, 4) of a link's scale. A zero would flatten the part; FreeCAD takes it as
+    1.
+    """
     vector = own(link, "ScaleVector")
     parts = list(vector) if vector is not None else []
     factor = own(link, "Scale")
@@ -542,9 +546,7 @@ def _diagonal(parts: list[float]) -> Floats:
 
 
 def product_key(path: str, name: str, designation: str, base: str) -> str:
-    """Return what identifies a product: a standard part by its designation, any other by its file and its
-    object.
-    """
+    """Return the key of a product: a standard part's designation, or file and object of any other."""
     return f"{STANDARD_PARTS}{designation}" if designation else f"{relative(path, base)}#{name}"
 
 
@@ -557,7 +559,9 @@ Measure = Callable[[Sequence[Leaf], Callable[[int, int], Any]], Sequence[Measure
 def assembled(
     walk: Walk, top: str, source: str, options: ReadOptions, measure: Measure, report: Report
 ) -> Assembly:
-    """Return the assembly that the walk found below the product ``top``. InputError if it does not end."""
+    """Measure the products that the walk found below ``top``, and make the assembly. InputError if the
+    nesting has no end.
+    """
     name = walk.nodes[top].name
     unfolded = unfold(walk.nodes, [Child(name, top)], options.max_instances)
     keys = unfolded.placed
@@ -572,17 +576,19 @@ def assembled(
 
 
 def one_by_one(measure: Callable[[Leaf], Measured]) -> Measure:
-    """Return one product after the other; ``measure`` raises DocumentError if the shapes cannot be had."""
+    """Make a function that measures one product after the other; ``measure`` raises DocumentError if it
+    cannot get the shapes.
+    """
 
     def measured(leaves: Sequence[Leaf], done: Callable[[int, int], Any]) -> list[Measured | str]:
-        result: list[Measured | str] = []
+        results: list[Measured | str] = []
         for number, leaf in enumerate(leaves, start=1):
             done(number, len(leaves))
             try:
-                result.append(measure(leaf))
+                results.append(measure(leaf))
             except DocumentError as error:
-                result.append(error.reason)
-        return result
+                results.append(error.reason)
+        return results
 
     return measured
 

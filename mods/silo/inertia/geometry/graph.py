@@ -35,12 +35,14 @@ MAX_ENTRIES = 20_000
 
 
 def is_generic(name: str) -> bool:
-    """Report the names that the kernel makes up: ``SOLID``, ``COMPOUND``, ``=>[0:1:1:14]``, none at all."""
+    """Return True for names that the kernel makes up: ``SOLID``, ``COMPOUND``, ``=>[0:1:1:14]``, or none at
+    all.
+    """
     return _GENERIC.fullmatch(name.strip()) is not None
 
 
 def lost_characters(name: str) -> list[Note]:
-    """Report "?" and U+FFFD, which exporters put for what their character set lacks ("Peça" → "Pe?a")."""
+    """Note "?" and U+FFFD, which exporters write for characters that they lack ("Peça" → "Pe?a")."""
     if "?" not in name and "\ufffd" not in name:
         return []
     words = f"characters of its name were lost in the export: '{name}'"
@@ -48,23 +50,25 @@ def lost_characters(name: str) -> list[Note]:
 
 
 def clean(name: str) -> str:
-    """Return the name without control characters and outer blanks; what it says is kept, mojibake as well."""
+    """Remove control characters and outer blanks from a name; the rest stays, even if it is garbled."""
     return "".join(c for c in name if unicodedata.category(c)[0] != "C" or c == "\ufffd").strip()
 
 
 def file_key(name: str) -> str:
-    """Return how a product's name is compared with a file's: NFC, case folded, outer blanks gone."""
+    """Return a name in the form in which products and files are compared: NFC, case folded, without outer
+    blanks.
+    """
     return unicodedata.normalize("NFC", name).strip().casefold()
 
 
 def bare_stem(document: str) -> str:
-    """Return the bare name in a path that some system wrote: the folder it names is never followed."""
+    """Return the bare name in a path from any system. Its folder is never opened."""
     return PurePosixPath(PureWindowsPath(document).name).stem
 
 
 def step_files(root: Path, depth: int) -> Iterator[Path]:
-    """Yield the STEP files in a folder and ``depth`` levels below, links that leave it left out, in a
-    fixed order.
+    """Yield the STEP files in a folder and ``depth`` levels below, in a fixed order, without links that lead
+    outside.
     """
     seen = 0
     waiting = [(root, 0)]
@@ -111,10 +115,10 @@ class Node:
 
 
 def in_metres(matrix: Floats, unit: float = 1e-3) -> Floats:
-    """Return the same (4, 4) placement, its translation in m instead of in ``unit`` [m], mm by default."""
-    result = matrix.copy()
-    result[:3, 3] *= unit
-    return result
+    """Convert the translation of a placement (4, 4) from ``unit`` [m], mm by default, to m."""
+    converted = matrix.copy()
+    converted[:3, 3] *= unit
+    return converted
 
 
 MAX_DEPTH = 200
@@ -136,7 +140,7 @@ class Unfolded:
         return list(dict.fromkeys(instance.prototype for instance in self.instances))
 
     def place(self, key: str, path: tuple[str, ...], products: tuple[str, ...], transform: Floats) -> None:
-        """Return one use of a product at ``path``; ``products`` are the names of those around it."""
+        """Add one use of a product at ``path``; ``products`` are the names of those around it."""
         node = self._nodes[key]
         products = (*products, node.name)
         if node.children:
@@ -146,7 +150,7 @@ class Unfolded:
             self.instances.append(Instance(path, products, key, transform))
 
     def fill(self, key: str, path: tuple[str, ...], products: tuple[str, ...], transform: Floats) -> None:
-        """Return the inside of an assembly: its own shapes, then its children."""
+        """Add the inside of an assembly: its own shapes, then its children."""
         node = self._nodes[key]
         names, stack = self._named(key)
         placed = transform @ stack
@@ -168,11 +172,11 @@ class Unfolded:
 
 
 def unfold(nodes: Mapping[str, Node], roots: Sequence[Child], max_instances: int) -> Unfolded:
-    """Return all instances below ``roots``.
+    """List all instances below ``roots``.
 
-    One root that holds others is the top assembly: it takes no part in the paths. Where several uses in one
-    parent have the same name, the second is called ``name<2>``, and so on, so that a path is unique. Shapes
-    that belong to an assembly itself stand among its children, under the assembly's own name.
+    A single root that holds others is the top assembly, which is not in the paths. If several uses in one
+    parent have the same name, the second is called ``name<2>``, and so on, so that each path is unique.
+    Shapes that belong to an assembly itself are among its children, under the assembly's own name.
 
     Raises InputError for a product that contains itself, for more than ``max_instances`` and for more than
     MAX_DEPTH levels.
@@ -185,23 +189,23 @@ def unfold(nodes: Mapping[str, Node], roots: Sequence[Child], max_instances: int
         count += count_instances(nodes, order)
     if count > max_instances:
         raise InputError(f"it unfolds to {count} placed parts, more than the {max_instances} allowed")
-    result = Unfolded(nodes)
+    unfolded = Unfolded(nodes)
     if len(roots) == 1 and nodes[roots[0].product].children:
-        result.fill(roots[0].product, (), (), roots[0].transform)
+        unfolded.fill(roots[0].product, (), (), roots[0].transform)
     else:
         for name, root in zip(unique_names([r.name for r in roots]), roots, strict=True):
-            result.place(root.product, (name,), (), root.transform)
-    return result
+            unfolded.place(root.product, (name,), (), root.transform)
+    return unfolded
 
 
 def unique_names(wanted: Sequence[str]) -> list[str]:
-    """Return the names, repeated ones marked ``<2>``, ``<3>`` … in order.
+    """Mark repeated names in order: ``<2>``, ``<3>`` …
 
     "/" would break a path and becomes "|".
     """
     taken: set[str] = set()
     counts: dict[str, int] = {}
-    result = []
+    names = []
     for raw in wanted:
         name = raw.replace("/", "|")
         unique = name
@@ -209,12 +213,12 @@ def unique_names(wanted: Sequence[str]) -> list[str]:
             counts[name] = counts.get(name, 1) + 1
             unique = f"{name}<{counts[name]}>"
         taken.add(unique)
-        result.append(unique)
-    return result
+        names.append(unique)
+    return names
 
 
 def count_instances(nodes: Mapping[str, Node], order: Sequence[str]) -> int:
-    """Return how many placed prototypes the last product of a :func:`bottom_up` order unfolds to."""
+    """Count the placed prototypes to which the last product of a :func:`bottom_up` order unfolds."""
     done: dict[str, int] = {}
     for key in order:
         node = nodes[key]
@@ -223,7 +227,7 @@ def count_instances(nodes: Mapping[str, Node], order: Sequence[str]) -> int:
 
 
 def depth(nodes: Mapping[str, Node], order: Sequence[str]) -> int:
-    """Return how many levels the last product of a :func:`bottom_up` order has, itself included."""
+    """Count the levels of the last product of a :func:`bottom_up` order, itself included."""
     done: dict[str, int] = {}
     for key in order:
         done[key] = 1 + max((done[child.product] for child in nodes[key].children), default=0)
@@ -231,7 +235,7 @@ def depth(nodes: Mapping[str, Node], order: Sequence[str]) -> int:
 
 
 def bottom_up(nodes: Mapping[str, Node], root: str) -> list[str]:
-    """Return the keys of all products below ``root`` and itself, each once, children before parents.
+    """Order all products below ``root`` and itself by key, each once, children before parents.
 
     Without recursion: a file may nest deeper than Python's stack. InputError on a cycle.
     """
@@ -309,7 +313,7 @@ Report = Callable[[str, int, int], None]
 
 
 def silent(stage: str, done: int = 0, total: int = 0) -> None:
-    """Return a report that nobody listens to."""
+    """Ignore progress: the report for a caller that wants none."""
 
 
 _LOCAL = {"isolate", "timeout_s", "memory_mb", "processes", "cache", "cache_dir", "progress", "cancelled"}
@@ -380,7 +384,9 @@ class ReadOptions:
 
     @classmethod
     def from_content(cls, values: Mapping[str, Any]) -> ReadOptions:
-        """Return the inverse of :meth:`content_options`, for the child process: no isolation, no cache."""
+        """Make the options from :meth:`content_options`, for the child process: without isolation and
+        cache.
+        """
         names = {f.name for f in fields(cls)}
         given = {name: value for name, value in values.items() if name in names - _LOCAL}
         if given.get("root") is not None:
@@ -402,7 +408,7 @@ class Format(StrEnum):
 
     @property
     def is_mesh(self) -> bool:
-        """Report whether it is triangles without a geometry kernel behind them."""
+        """Return True if the format has triangles and needs no geometry kernel."""
         return self in (Format.STL, Format.OBJ, Format.PLY, Format.GLB, Format.THREEMF)
 
 
@@ -414,7 +420,7 @@ _SUFFIXES = {f".{kind}": kind for kind in Format} | {
 
 
 def is_model_name(path: Path) -> bool:
-    """Report whether a file of this name is taken for geometry, whatever it holds."""
+    """Return True if a file of this name is taken for geometry, whatever it holds."""
     return path.suffix.lower() in _SUFFIXES
 
 
@@ -430,7 +436,7 @@ READABLE = "STEP, FCStd, BREP, STL, OBJ, 3MF, GLB, PLY"
 
 
 def detect(path: Path) -> Format:
-    """Return the format of a file.
+    """Detect the format of a file.
 
     Raises DocumentError if the file is missing, empty, a Git LFS pointer, or of no format we read. A file
     whose content contradicts its suffix (an HTML page saved as .step) is refused as well.

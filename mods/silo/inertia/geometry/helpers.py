@@ -48,14 +48,14 @@ waits for its next task would wait as long. The last task of all is for who is f
 
 
 def processors() -> int:
-    """Return the processors that this process may use."""
+    """Return how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def helpers_for(processes: int, memory_mb: int) -> Helpers:
-    """Return so many helpers that there are ``processes`` in all; 0: as many as there are processors."""
+    """Make helpers, so that ``processes`` work in all; 0: as many as there are processors."""
     wanted = (processes or processors()) - 1
     fitting = memory_mb // LEAST_MB if memory_mb else wanted
     count = max(0, min(wanted, fitting, MOST))
@@ -82,7 +82,7 @@ class Helpers:
             self._folder.cleanup()
 
     def folder(self) -> Path:
-        """Return a folder for what goes to and fro; taken away at the end."""
+        """Return the folder for files that are exchanged with the helpers; it is deleted at the end."""
         if self._folder is None:
             self._folder = scratch_folder("silo-helpers-")
         return Path(self._folder.name)
@@ -105,7 +105,7 @@ class Helpers:
             helper.one(_load_kernel, ())
 
     def begin(self, function: Callable[..., T], *arguments: Any) -> Callable[[], T]:
-        """Let one thing be done by the first helper; gives the result when it is called."""
+        """Let the first helper do one task; returns a function that gives the result."""
         if not self._running:
             return lambda: function(*arguments)
         begun = self._running[0].one(function, arguments)
@@ -122,12 +122,12 @@ class Helpers:
         task: Callable[[R], Task[T]],
         done: Callable[[int, int], Any],
     ) -> list[T]:
-        """Return one result for each row, in order.
+        """Do the task of each row, here and in the helpers, and return the results in the order of the rows.
 
         task
-            makes what is to be done for a row, for any process.
+            makes the task of a row, which any process can do.
         done
-            called in this process with how many have begun, and the total; its errors end everything.
+            called in this process with the number of begun tasks, and the total; its errors end everything.
         """
         results: dict[int, T] = {}
         waiting = deque(range(len(rows)))
@@ -143,7 +143,7 @@ class Helpers:
                 done(number + 1, len(rows))
                 results[number] = here(rows[number])
         for future in working:
-            # One that is still loading the kernel has nothing to do any more, and nobody waits for it.
+            # A helper that is still loading the kernel has nothing left to do, so nobody waits for it.
             if not future.cancel():
                 future.result()
         return [results[n] if n in results else here(row) for n, row in enumerate(rows)]
@@ -159,13 +159,15 @@ class _Helper:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="helper")
 
     def one(self, function: Callable[..., T], arguments: tuple[Any, ...]) -> Future[tuple[T] | None]:
-        """Return (result,), or None if the helper cannot do it."""
+        """Let the helper call ``function``; the future's result is (result,), or None if the helper cannot do
+        it.
+        """
 
         def run() -> tuple[T] | None:
-            result: tuple[T] | None = None
+            answer: tuple[T] | None = None
             with suppress(BrokenExecutor):
-                result = _received(self._sent(function, arguments))
-            return result
+                answer = _received(self._sent(function, arguments))
+            return answer
 
         return self._thread.submit(run)
 
@@ -194,7 +196,7 @@ class _Helper:
         return self._thread.submit(run)
 
     def end(self) -> None:
-        """End at once: whatever the helper does is not needed any more."""
+        """End at once; the helper's present task is no longer needed."""
         platform.end_workers(self._process)
         self._thread.shutdown(wait=True, cancel_futures=True)
 
@@ -229,13 +231,13 @@ def _begin(memory_mb: int) -> None:
 
 
 def _answer(path: Path, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Path:
-    """Do one thing. What it gives is left in a file: a pipe is full until the kernel lets its reader run."""
+    """Do one task. Its result goes into a file, since a pipe is full until the kernel lets its reader run."""
     value = function(*arguments)
     _noise.seek(0)
-    said = _noise.read()
+    printed = _noise.read()
     _noise.seek(0)
     _noise.truncate()
-    path.write_bytes(pickle.dumps((said, value)))
+    path.write_bytes(pickle.dumps((printed, value)))
     return path
 
 

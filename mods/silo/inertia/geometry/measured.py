@@ -50,9 +50,9 @@ class Measured:
     def prototype(
         self, key: str, name: str, *more: Note, empty: Note | None = None, **stated: Any
     ) -> Prototype:
-        """Return the product with these solids.
+        """Make the prototype of a product with these solids.
 
-        ``empty`` says why there is none, ``stated`` what the file gives.
+        ``empty`` says why there is no solid; ``stated``: values from the file.
         """
         whole = combined(self.solids)
         problems = [*self.problems, *more]
@@ -74,7 +74,7 @@ class Measured:
 def integration_notes(
     volume_m3: float, error: float, eps: float, *, distance_m: float, size_m: float
 ) -> list[Note]:
-    """Report what is doubtful about the integration of a solid.
+    """Note what is doubtful about the integration of a solid.
 
     error, eps
         estimated and wanted, relative to the volume (which is signed here).
@@ -98,7 +98,7 @@ def integration_notes(
 
 
 def differing_note(difference: float) -> Note:
-    """Report two integrations that both converged, and differ."""
+    """Note that two integrations both converged, but differ."""
     words = (
         f"two exact integrations differ by {difference:.1g}: its edges do not quite meet, by the file's own "
         "tolerances, and no finer integration helps"
@@ -107,9 +107,10 @@ def differing_note(difference: float) -> Note:
 
 
 def mesh_notes(deviation: float | None, missing: int) -> list[Note]:
-    """Return what the mesh says of a solid.
+    """Note what the mesh shows about a solid.
 
-    Its relative deviation in volume (None: not closed), missing faces.
+    ``deviation``: of its volume, relative (None: the mesh is not closed); ``missing``: how many faces have no
+    triangles.
     """
     if deviation is not None and deviation > MESH_TOLERANCE:
         message = (
@@ -124,7 +125,7 @@ def mesh_notes(deviation: float | None, missing: int) -> list[Note]:
 
 
 def no_solid(measured: Measured) -> Note:
-    """Report why a product has no volume."""
+    """Note why a product has no volume."""
     if measured.has_faces or measured.has_wires:
         what = "surfaces that enclose no solid" if measured.has_faces else "curves only"
         return Note(GeometryCode.NO_SOLID, f"it consists of {what}, so it has no volume")
@@ -132,7 +133,7 @@ def no_solid(measured: Measured) -> Note:
 
 
 def shell_note(shells: int, solids: int) -> Note:
-    """Report surfaces that close and were taken for solids."""
+    """Note surfaces that close and were taken for solids."""
     what = counted(shells, "closed surface", "closed surfaces")
     beside = ", beside its solids" if solids else ""
     words = f"{what}, no solid in the file{beside}: the volume inside was taken"
@@ -147,9 +148,9 @@ SLACK = 0.02
 
 
 def loose_notes(surfaces: Sequence[Mesh], bodies: Sequence[Body], solids: Sequence[SolidProps]) -> list[Note]:
-    """Report open surfaces beside solids that may be a body.
+    """Note open surfaces beside solids that may be a body.
 
-    Those in the box of a body are a thread, a label, a symbol.
+    Surfaces in the box of a body are a thread, a label, or a symbol.
     """
 
     def is_beside(mesh: Mesh, body: Body) -> bool:
@@ -171,23 +172,23 @@ def loose_notes(surfaces: Sequence[Mesh], bodies: Sequence[Body], solids: Sequen
 
 
 def lost_note(names: Sequence[str]) -> Note:
-    """Report bodies of a FreeCAD part that have no shape."""
+    """Note bodies of a FreeCAD part that have no shape."""
     what = "has no shape: its" if len(names) == 1 else "have no shape: their"
     words = f"{listed(names, 4)} {what} volume is missing; recompute the file, or make a solid of a mesh"
     return Note(GeometryCode.BODY_MISSING, words)
 
 
 def open_note(edges: int) -> Note:
-    """Report a solid whose faces do not close, or disagree on what is outside."""
+    """Note a solid whose faces do not close, or disagree on what is outside."""
     words = f"its faces do not close ({counted(edges, 'open edge')}), so it has no exact volume"
     return Note(GeometryCode.OPEN_SHELL, words)
 
 
 def drift_note(drift: float) -> Note | None:
-    """Report a solid whose edges are shared but whose faces do not meet there; None if they do.
+    """Note a solid whose edges are shared but whose faces do not meet there; None if they do.
 
     drift
-        how far its volume depends on the way that it is taken, relative.
+        how much its volume depends on the way in which it is integrated, relative.
     """
     if drift <= STATED:
         return None
@@ -203,7 +204,7 @@ TORN = 1e-3
 
 
 def cavity_note(together: Together) -> Note:
-    """Report solids that were taken as cavities of others."""
+    """Note that solids were taken as cavities of others."""
     words = (
         "some solids of this product are inside out and some are not: "
         f"{together.cavities} taken as cavities of the solid around them, {together.turned} as bodies"
@@ -216,7 +217,7 @@ LARGE_M, SMALL_M = 20.0, 5e-4
 
 
 def implausible_size(prototypes: Mapping[str, Prototype], unit: str) -> list[Note]:
-    """Report parts of 30 km or of a grain of dust: the file's unit is not the one that its numbers are in."""
+    """Note parts of 30 km, or of the size of a grain of dust: the file's unit must be wrong."""
     extents = [float(p.mesh.extents.max()) for p in prototypes.values() if isinstance(p.mesh, Mesh)]
     extents = extents or [p.volume_m3 ** (1 / 3) for p in prototypes.values() if p.volume_m3 > 0]
     if not extents or SMALL_M <= max(extents) <= LARGE_M:
@@ -230,7 +231,7 @@ def implausible_size(prototypes: Mapping[str, Prototype], unit: str) -> list[Not
 
 
 def placement_problems(instances: Sequence[Instance]) -> list[Note]:
-    """Report placements that scale (mirrored ones are rigid), and parts that are placed twice at one
+    """Note placements that scale (mirrored ones are rigid), and parts that are placed twice at the same
     place.
     """
     if not instances:
@@ -239,7 +240,7 @@ def placement_problems(instances: Sequence[Instance]) -> list[Note]:
     scaled = [i.name for i, rigid in zip(instances, rigid_mask(placements), strict=True) if not rigid]
     seen: set[tuple[str, bytes]] = set()
     twice = []
-    # 0.1 µm and 1e-7 of a turn; adding 0 makes -0 the 0 that it is.
+    # 0.1 µm and 1e-7 of a turn; adding 0 turns -0 into 0.
     for instance, place in zip(instances, np.round(placements, 7) + 0.0, strict=True):
         here = (instance.prototype, place.tobytes())
         if here in seen:
@@ -274,7 +275,7 @@ def assembled(
     source: str,
     unit: str,
 ) -> Assembly:
-    """Return what a reader found, as an assembly; the problems of its placements are added."""
+    """Make the assembly of what a reader found, and add the problems of its placements."""
     return Assembly(
         name=name,
         prototypes=prototypes,

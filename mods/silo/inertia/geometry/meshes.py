@@ -62,7 +62,7 @@ class MeshScene:
 
 
 def read_mesh(path: Path, kind: Format, options: ReadOptions, report: Report) -> GeometryReading:
-    """Return the assembly of a mesh file: one instance, or those of its scene. Raises DocumentError."""
+    """Read the assembly of a mesh file: one instance, or those of its scene. Raises DocumentError."""
     report("reading", 0, 0)
     scene = _scene(path, kind)
     unit, unit_name, problems = _unit(scene, options)
@@ -76,9 +76,9 @@ def read_mesh(path: Path, kind: Format, options: ReadOptions, report: Report) ->
     for number, key in enumerate(unfolded.placed, start=1):
         report("measuring", number, len(unfolded.placed))
         mesh = scene.meshes[key]
-        said = scene.said.get(key, ())
+        notes = scene.said.get(key, ())
         name = scene.nodes[key].name
-        prototypes[key] = _prototype(key, name, Mesh(mesh.vertices * unit, mesh.faces), said)
+        prototypes[key] = _prototype(key, name, Mesh(mesh.vertices * unit, mesh.faces), notes)
     problems += [*scene.said.get("", ())]
     problems += implausible_size(prototypes, unit_name)
     return GeometryReading(
@@ -87,7 +87,7 @@ def read_mesh(path: Path, kind: Format, options: ReadOptions, report: Report) ->
 
 
 def checked_mesh(path: Path, what: str, vertices: ArrayLike, faces: ArrayLike) -> Mesh:
-    """Return the triangles of a file, welded. Raises DocumentError for coordinates that cannot be meant."""
+    """Make a welded mesh of a file's triangles. Raises DocumentError if the coordinates cannot be real."""
     points = np.asarray(vertices, dtype=np.float64)
     _check(path, what, points)
     return welded(points, np.asarray(faces, dtype=np.int64))
@@ -111,9 +111,9 @@ def _scene(path: Path, kind: Format) -> MeshScene:
     if kind is Format.PLY and _is_cut_off(path.read_bytes()):
         raise DocumentError(str(path), "the file ends in the middle; export or copy it again")
     try:
-        # Infinite coordinates are refused below, in words; numpy's own would be about trimesh.
+        # Infinite coordinates are refused below, with a message; numpy's warning would be about trimesh.
         with path.open("rb") as stream, np.errstate(all="ignore"):
-            # Unprocessed: what trimesh would mend in silence is what we have to report.
+            # Unprocessed, since we report what trimesh would mend without a word.
             loaded = trimesh.load_scene(stream, file_type=kind.value, process=False)
     except MemoryError:
         raise
@@ -123,7 +123,9 @@ def _scene(path: Path, kind: Format) -> MeshScene:
 
 
 def _is_cut_off(data: bytes) -> bool:
-    """Report a PLY file of text with fewer lines than its header lists; trimesh counts binary ones."""
+    """Return True for a PLY file of text with fewer lines than its header lists; trimesh counts binary
+    ones.
+    """
     head, _, body = data.partition(b"end_header")
     listed = sum(map(int, re.findall(rb"^element\s+\S+\s+(\d+)", head, re.MULTILINE)))
     return b"format ascii" in head and listed > sum(bool(line.strip()) for line in body.splitlines())
@@ -142,7 +144,7 @@ def _from_trimesh(path: Path, kind: Format, loaded: Any) -> MeshScene:
         raise DocumentError(str(path), "holds no triangles")
     roots = _tree(loaded.graph, nodes)
     glb = kind is Format.GLB
-    said: list[Note] = []
+    notes: list[Note] = []
     if kind in (Format.OBJ, Format.GLB):
         used = [loaded.graph.transforms.node_data[n].get("geometry") for n in loaded.graph.nodes_geometry]
         read = (
@@ -150,8 +152,8 @@ def _from_trimesh(path: Path, kind: Format, loaded: Any) -> MeshScene:
             if glb
             else sum(len(m.faces) for m in loaded.geometry.values())
         )
-        said = _unread(path.read_bytes(), glb, read)
-    return MeshScene(meshes, nodes, roots, "m" if glb else "", 1.0 if glb else None, {"": said})
+        notes = _unread(path.read_bytes(), glb, read)
+    return MeshScene(meshes, nodes, roots, "m" if glb else "", 1.0 if glb else None, {"": notes})
 
 
 _POLYGON = re.compile(rb"^[ \t]*(f[ \t](?:[^\n]*\\\r?\n)*[^\n]*|surf[ \t])", re.MULTILINE)
@@ -181,19 +183,19 @@ def _unread(data: bytes, glb: bool, read: int) -> list[Note]:
     else:
         lines = [line.split() for line in _POLYGON.findall(data)]
         listed = sum(max(len(line) - 3, 0) if line[0] == b"f" else 1 for line in lines)
-    said = []
+    notes = []
     if read < listed:
         what = "placed meshes" if glb else "triangles and free-form surfaces"
         words = f"the file has {listed} {what}, and {read} were read: volume is missing"
-        said.append(Note(GeometryCode.BODY_MISSING, words))
+        notes.append(Note(GeometryCode.BODY_MISSING, words))
     if left_out:
         words = f"{counted(left_out, 'node')} of the file in no scene: left out"
-        said.append(Note(GeometryCode.NOT_COUNTED, words))
-    return said
+        notes.append(Note(GeometryCode.NOT_COUNTED, words))
+    return notes
 
 
 def _tree(graph: Any, nodes: dict[str, Node]) -> tuple[Child, ...]:
-    """Return the scene's own tree as nodes; a branch with neither meshes nor branches is left out."""
+    """Turn the scene's own tree into nodes, without branches that hold neither meshes nor branches."""
     children: Mapping[str, list[str]] = graph.transforms.children
 
     def use(name: str, parent: str, above: tuple[str, ...]) -> Child | None:
@@ -232,8 +234,8 @@ def _unit(scene: MeshScene, options: ReadOptions) -> tuple[float, str, list[Note
     return MESH_UNITS["mm"], "mm", [problem]
 
 
-def _prototype(key: str, name: str, mesh: Mesh, said: Sequence[Note]) -> Prototype:
-    problems = list(said)
+def _prototype(key: str, name: str, mesh: Mesh, notes: Sequence[Note]) -> Prototype:
+    problems = list(notes)
     solid = enclosed(mesh, problems)
     solids = (solid,) if solid.volume_m3 else ()
     return Measured(solids, tuple(problems), mesh, has_faces=True).prototype(key, name)
@@ -275,7 +277,7 @@ class _Model:
 
 
 def read_3mf(path: Path) -> MeshScene:
-    """Return the scene of a 3MF file. Raises DocumentError."""
+    """Read the scene of a 3MF file. Raises DocumentError."""
     try:
         with zipfile.ZipFile(path) as archive:
             return _Package(path, archive).scene()
@@ -323,9 +325,10 @@ class _Package:
         self._said[key].append(Note(code, words))
 
     def _is_left_out(self, role: str, part: str, number: str) -> bool:
-        """Report an object that is not the part, by the slicer's word, else by its own type.
+        """Return True for an object that is not the part, by the slicer's word, else by its own type.
 
-        Bambu Studio and Orca Slicer give all that is not the part one type, negative volumes as well.
+        Bambu Studio and Orca Slicer give everything that is not the part the same type, also negative
+        volumes.
         """
         self._reached.add(_key(part, number))
         obj = self._model(part).objects.get(number)
@@ -404,7 +407,9 @@ class _Package:
         return key
 
     def _carved(self, parent: str, child: Child, cuts: Sequence[Mesh]) -> Child:
-        """Return the use of a mesh of its own, without the negative volumes beside it."""
+        """Return the use of a mesh without the negative volumes beside it, which becomes a mesh of its
+        own.
+        """
         if cuts and child.product not in self._meshes:
             words = f"“{child.name}” is an assembly: {_NOT_CUT} from it"
             self._say("", words, GeometryCode.INVALID_SHAPE)
@@ -419,11 +424,11 @@ class _Package:
 
     def _carve(self, key: str, cuts: Sequence[Mesh]) -> None:
         for cut in cuts:
-            if (left := without(self._meshes[key], cut)) is None:
+            if (carved := without(self._meshes[key], cut)) is None:
                 words = f"the mesh or the volume does not close: {_NOT_CUT}"
                 self._say(key, words, GeometryCode.INVALID_SHAPE)
             else:
-                self._meshes[key] = left
+                self._meshes[key] = carved
                 self._say(key, "the slicer's negative volume was subtracted")
 
     def _mesh(self, number: str, vertices: Sequence[Corner], rows: Sequence[tuple[int, int, int]]) -> Mesh:

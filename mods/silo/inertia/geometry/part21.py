@@ -87,14 +87,13 @@ class Part21:
     complete: bool = False
 
     def of(self, *keywords: str) -> Iterator[tuple[int, tuple[Value, ...]]]:
-        """Yield all wanted entities with one of these keywords: id and arguments."""
+        """Yield id and arguments of each wanted entity with one of these keywords."""
         for number in self.listed(*keywords):
             yield number, self.arguments(number)
 
     def arguments(self, number: int) -> tuple[Value, ...]:
-        """Return the arguments of entity ``number``; of a complex one, its parts as Typed.
-
-        () if unreadable.
+        """Return the arguments of entity ``number``, or the parts of a complex one as Typed; () if
+        unreadable.
         """
         try:
             return _parsed(self.body(number))
@@ -102,17 +101,18 @@ class Part21:
             return ()
 
     def references(self, number: int) -> tuple[int, ...]:
-        """Return all ids that entity ``number`` refers to, in order, wherever they stand in it. Quick."""
+        """Return all ids to which entity ``number`` refers, in order, at any depth. Quick."""
         return tuple(int(numbers) for numbers in _REFERENCE.findall(self.body(number)) if numbers)
 
     def listed(self, *keywords: str) -> Iterator[int]:
-        """Return the ids of all wanted entities with one of these keywords, those of one in file order."""
+        """Return the ids of all wanted entities with one of these keywords; those of one keyword in file
+        order.
+        """
         return (number for keyword in keywords for number in self.ids.get(keyword, ()))
 
     def body(self, number: int) -> bytes:
-        """Return the text of entity ``number`` from its bracket to before its semicolon.
-
-        B"" if there is none.
+        """Return the text of entity ``number`` from its bracket to before its semicolon; empty if there is
+        none.
         """
         start = self.starts.get(number)
         if start is None:
@@ -124,12 +124,12 @@ class Part21:
 def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
     """Find bodies, and entities whose keyword is in ``wanted`` or ends in SHAPE_REPRESENTATION.
 
-    Of complex entities: units, bodies, and relationships that place a part.
+    Of the complex entities it finds units, bodies, and relationships that place a part.
     """
     if (end := data.rfind(b"*/") + 2) > 1:  # a comment may hold what looks like an entity
         # Most have one in the header only: the rest is not looked through.
         data = _COMMENT.sub(_blank, data[:end]) + data[end:]
-    result = Part21(data)
+    source = Part21(data)
     names: dict[bytes, str | None] = {}
     ordinal = 0
     for ordinal, match in enumerate(_ENTITY.finditer(data), start=1):
@@ -139,18 +139,18 @@ def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
             is_known = word in wanted or _SOLID.fullmatch(word) or word.endswith("SHAPE_REPRESENTATION")
             names[keyword] = word if is_known else None
         number = int(digits)
-        if number > result.highest:
-            result.highest = number
+        if number > source.highest:
+            source.highest = number
         name = names[keyword]
         if name is None or (not name and not _COMPLEX.search(data, match.end(), match.end() + 400)):
             continue
-        result.keywords[number] = name
-        result.ids[name].append(number)
-        result.ordinals[number] = ordinal
-        result.starts[number] = match.end() - 1
-    result.count = ordinal
-    result.complete = data.rfind(_END) > 0
-    return result
+        source.keywords[number] = name
+        source.ids[name].append(number)
+        source.ordinals[number] = ordinal
+        source.starts[number] = match.end() - 1
+    source.count = ordinal
+    source.complete = data.rfind(_END) > 0
+    return source
 
 
 def _blank(match: re.Match[bytes]) -> bytes:
@@ -159,7 +159,7 @@ def _blank(match: re.Match[bytes]) -> bytes:
 
 
 def refs(value: Value) -> tuple[int, ...]:
-    """Return the ids that a value refers to directly: of one reference, or of a list of them."""
+    """Return the ids to which a value refers directly: that of a reference, or those in a list."""
     if isinstance(value, EntityRef):
         return (value.id,)
     if isinstance(value, tuple):
@@ -168,13 +168,13 @@ def refs(value: Value) -> tuple[int, ...]:
 
 
 def ref(values: tuple[Value, ...], position: int) -> int | None:
-    """Return the id that argument ``position`` refers to, None if there is no such reference."""
+    """Return the id to which argument ``position`` refers; None if it is no reference."""
     references = refs(values[position]) if position < len(values) else ()
     return references[0] if references else None
 
 
 def text(values: tuple[Value, ...], position: int) -> str:
-    """Return argument ``position`` as text, "" if it is none."""
+    """Return argument ``position`` as text; "" if it is none."""
     value = values[position] if position < len(values) else None
     return value if isinstance(value, str) else ""
 
@@ -195,7 +195,7 @@ def _parsed(body: bytes) -> tuple[Value, ...]:
 
 
 def _list(body: bytes, position: int, depth: int) -> tuple[tuple[Value, ...], int]:
-    """Return the values of a bracketed list beginning at ``position``, and the position after it."""
+    """Parse the bracketed list at ``position``. Returns its values, and the position after it."""
     if depth > MAX_DEPTH:
         raise InputError(f"an entity nests its brackets more than {MAX_DEPTH} deep")
     values: list[Value] = []
@@ -245,9 +245,10 @@ _ESCAPE = re.compile(
 
 
 def decoded(raw: bytes) -> str:
-    """Return a Part 21 string as text: quotes, ``\\X\\``, ``\\X2\\``, ``\\X4\\`` and ``\\S\\`` undone.
+    """Decode a Part 21 string: quotes, ``\\X\\``, ``\\X2\\``, ``\\X4\\`` and ``\\S\\``.
 
-    Bytes above 127 are against the standard and common: UTF-8 if they are that, else Windows-1252.
+    Bytes above 127 break the standard, but are common; they are read as UTF-8 if possible, else as
+    Windows-1252.
     """
     try:
         plain = raw.decode("utf-8")
@@ -355,7 +356,7 @@ class Products:
     stray: tuple[int, ...] = ()
 
     def elsewhere(self) -> set[str]:
-        """Return the names of files that may hold products which have neither geometry nor parts here."""
+        """Return the names of files that may hold the products without geometry or parts here."""
         full = self.shaped.union(assembly for assembly, _ in self.uses)
         return {
             name
@@ -372,7 +373,7 @@ class Products:
 
 
 def read_products(source: Part21) -> Products:
-    """Return everything the text says of products."""
+    """Read everything that the text says about products."""
     facts = {pd: ProductFacts(*names_of(source, a)) for pd, a in source.of(*_DEFINITIONS)}
     for pd, material, density, problem in stated_materials(source):
         if pd in facts:
@@ -426,7 +427,7 @@ def _is_body(source: Part21, item: int) -> bool:
 
 
 def _is_linked(source: Part21, item: int) -> bool:
-    """Report the triangles of an exact body, which are no other body."""
+    """Return True for the triangles of an exact body, which are no other body."""
     return source.keywords[item] == "TESSELLATED_SOLID" and ref(source.arguments(item), 2) is not None
 
 
@@ -438,7 +439,7 @@ def _within(values: tuple[Value, ...]) -> Iterator[int]:
 def _bodies(source: Part21, facts: dict[int, ProductFacts], owners: dict[int, int]) -> tuple[int, ...]:
     """Put bodies and unit of length into the facts of each product.
 
-    Returns the bodies that belong to none, and that no other body is made from.
+    Returns the bodies that belong to no product, and that are part of no other body.
     """
     hidden = set(_hidden(source))
     mapped = {n: next(iter(source.references(n)[1:]), 0) for n in source.listed("REPRESENTATION_MAP")}
@@ -490,7 +491,7 @@ def _bodies(source: Part21, facts: dict[int, ProductFacts], owners: dict[int, in
 
 
 def _hidden(source: Part21) -> Iterator[int]:
-    """Yield what INVISIBILITY names, itself and over styles and layers."""
+    """Yield the entities that INVISIBILITY hides: directly, or through styles and layers."""
     for entity in source.listed("INVISIBILITY"):
         for number_ in source.references(entity):
             yield number_
@@ -502,7 +503,7 @@ def _hidden(source: Part21) -> Iterator[int]:
 
 
 def _unit_of(source: Part21, context: tuple[int, ...], kind: str) -> float | None:
-    """Return a unit of a representation's context in m or rad, None if it states none that is understood."""
+    """Return a unit of a representation's context in m or rad; None if it has none that we understand."""
     for part in (part for number_ in context for part in source.arguments(number_)):
         if isinstance(part, Typed) and part.name == "GLOBAL_UNIT_ASSIGNED_CONTEXT":
             for unit in _within(part.values):
@@ -513,7 +514,7 @@ def _unit_of(source: Part21, context: tuple[int, ...], kind: str) -> float | Non
 
 
 def _representation_owners(source: Part21) -> dict[int, int]:
-    """Return representation id → PRODUCT_DEFINITION id, also over SHAPE_REPRESENTATION_RELATIONSHIPs."""
+    """Map representation id → PRODUCT_DEFINITION id, also through SHAPE_REPRESENTATION_RELATIONSHIPs."""
     shapes = {n: next(iter(source.references(n)), 0) for n in source.listed("PRODUCT_DEFINITION_SHAPE")}
     owner: dict[int, int] = {}
     for _, arguments in source.of("SHAPE_DEFINITION_REPRESENTATION"):
@@ -544,9 +545,9 @@ def _uses(source: Part21, facts: dict[int, ProductFacts]) -> Iterator[tuple[int,
 
 
 def count_placed(products: Products) -> int:
-    """Return how many placed parts the file's structure amounts to.
+    """Count the placed parts in the file's structure.
 
-    InputError if a product contains itself.
+    Raises InputError if a product contains itself.
     """
     children: dict[int, list[Child]] = {pd: [] for pd in products.facts}
     use = {pd: Child("", str(pd), IDENTITY) for pd in products.facts}
@@ -565,9 +566,7 @@ def count_placed(products: Products) -> int:
 
 
 def _documents(source: Part21) -> dict[int, tuple[str, ...]]:
-    """Return PRODUCT_DEFINITION id → names of the files said to hold its geometry (AP214 external
-    references).
-    """
+    """Map PRODUCT_DEFINITION id → names of the files that hold its geometry (AP214 external references)."""
     files = {n: text(a, 0) or text(a, 1) for n, a in source.of("DOCUMENT_FILE")}
     if not files:
         return {}
@@ -579,12 +578,12 @@ def _documents(source: Part21) -> dict[int, tuple[str, ...]]:
     by_document = {
         ref(a, 2): by_formation.get(ref(a, 3), ()) for _, a in source.of("DOCUMENT_PRODUCT_EQUIVALENCE")
     }
-    result: dict[int, tuple[str, ...]] = {}
+    documents: dict[int, tuple[str, ...]] = {}
     for _, arguments in source.of("APPLIED_DOCUMENT_REFERENCE"):
         names = by_document.get(ref(arguments, 0), ())
         for pd in refs(arguments[2]) if len(arguments) > 2 else ():
-            result[pd] = result.get(pd, ()) + names
-    return result
+            documents[pd] = documents.get(pd, ()) + names
+    return documents
 
 
 _PREFIXES = {
@@ -596,7 +595,7 @@ _SI = {".METRE.": 1.0, ".GRAM.": 1e-3, ".RADIAN.": 1.0}
 
 
 def stated_materials(source: Part21) -> list[tuple[int, str | None, float | None, str]]:
-    """Return (PRODUCT_DEFINITION id, material name, density [kg/m^3], what is wrong with it) as they come."""
+    """List (PRODUCT_DEFINITION id, material name, density [kg/m^3], what is wrong with it) in file order."""
     made_from = defaultdict(list)
     for _, arguments in source.of("MAKE_FROM_USAGE_OPTION"):
         part, raw = ref(arguments, 3), ref(arguments, 4)
@@ -660,7 +659,7 @@ def _density(source: Part21, item: tuple[Value, ...]) -> tuple[float | None, str
 
 
 def _unit(source: Part21, unit: int, depth: int = 0) -> float | None:
-    """Return the unit in SI (kg, m), None if it is not made of masses and lengths."""
+    """Return the unit in SI (kg, m); None if it does not consist of masses and lengths."""
     if depth > 8:
         return None
     arguments = source.arguments(unit)
@@ -679,9 +678,8 @@ def _unit(source: Part21, unit: int, depth: int = 0) -> float | None:
 
 
 def _named_unit(source: Part21, parts: tuple[Value, ...], depth: int) -> float | None:
-    """Return a complex unit.
-
-    ``(LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.))`` or a converted one.
+    """Return in SI the unit ``(LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.))``, or a converted
+    one.
     """
     for part in parts:
         if not isinstance(part, Typed):

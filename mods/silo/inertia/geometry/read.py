@@ -65,9 +65,9 @@ _WORKER = "from silo.inertia.geometry.read import main; main()"
 
 
 def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] = (), **env: str) -> None:
-    """Read ``path`` in a child process; the stored geometry is at ``result`` afterwards.
+    """Read ``path`` in a child process, which stores the geometry at ``result``.
 
-    ``command`` starts another child than the usual worker, speaking like it; ``env`` is set for it.
+    ``command`` starts another child than the usual worker, with the same protocol; ``env`` is set for it.
 
     Raises DocumentError (bad file, crash, time or memory limit), ConfigError (kernel not installed) and
     CancelledError.
@@ -97,7 +97,7 @@ def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] =
 
 
 def _talk(process: subprocess.Popen[bytes], path: Path, options: ReadOptions) -> dict[str, Any] | None:
-    """Return the child's last word, None if it ended without one."""
+    """Pass on the child's progress, and return its last message; None if it ended without one."""
     lines: queue.Queue[bytes | None] = queue.Queue()
     threading.Thread(target=_pump, args=(process.stdout, lines), daemon=True).start()
     deadline = time.monotonic() + options.timeout_s if options.timeout_s else None
@@ -152,7 +152,7 @@ def _child(
 
 
 def python() -> str:
-    """Return a Python interpreter to start. Inside FreeCAD ``sys.executable`` is FreeCAD itself."""
+    """Find a Python interpreter to start. Inside FreeCAD ``sys.executable`` is FreeCAD itself."""
     if "python" in Path(sys.executable or "").name.lower():
         return sys.executable
     for path in platform.python_beside(sys.base_exec_prefix):
@@ -194,8 +194,8 @@ _COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
 
 
 def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
-    """Return the geometry of a STEP, BREP, FreeCAD or mesh file: prototypes measured once, and where they
-    are.
+    """Read the geometry of a STEP, BREP, FreeCAD or mesh file: prototypes, each measured once, and their
+    placements.
 
     Example::
 
@@ -203,8 +203,8 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
         for instance in assembly.instances: ...
 
     Raises DocumentError (the file is missing, of no known format, damaged, or beyond the limits), ConfigError
-    (the extra "inertia" is not installed) and CancelledError. What is doubtful but usable is a problem of the
-    assembly or of its prototypes.
+    (the extra "inertia" is not installed) and CancelledError. Doubtful but usable geometry is noted as a
+    problem of the assembly or of its prototypes.
     """
     options = options or ReadOptions()
     path = Path(path)
@@ -238,9 +238,9 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
 
 
 def _content(kind: Format, options: ReadOptions) -> dict[str, Any]:
-    """Return what a result depends on besides the file.
+    """Return everything besides the file on which a result depends.
 
-    For FreeCAD documents also the cards that hold densities.
+    For FreeCAD documents these are also the cards with densities.
     """
     content = options.content_options()
     if kind is not Format.FREECAD:
@@ -251,7 +251,7 @@ def _content(kind: Format, options: ReadOptions) -> dict[str, Any]:
 
 
 def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers) -> GeometryReading:
-    """Read in this process, and in the helpers: what the child does."""
+    """Read in this process and in the helpers; the child does this."""
     try:
         return _reading(path, options, report, helpers)
     except (DocumentError, ConfigError):
@@ -298,11 +298,11 @@ def _reporter(path: Path, options: ReadOptions) -> Report:
 
 
 def main(work: Callable[[dict[str, Any], IO[str], IO[bytes]], None] | None = None) -> None:
-    """Run as the child: read the task from standard input, do it, say how it went. Exit code 0 unless it
-    crashed. ``work`` does the task; it reads the geometry of a file unless given.
+    """Run as the child: read the task from standard input, do it, and report the result. Exit code 0 unless
+    it crashed. ``work`` does the task; by default it reads the geometry of a file.
 
-    Standard output is the line to the parent, so the kernel, which prints there too, gets a file instead;
-    what it wrote is counted and becomes a problem of the assembly.
+    Standard output goes to the parent, so the kernel, which prints there too, gets a file instead; its lines
+    are counted and become a problem of the assembly.
     """
     parent = os.fdopen(os.dup(1), "w", encoding="utf-8")
     task = json.loads(sys.stdin.readline())
@@ -319,9 +319,10 @@ def main(work: Callable[[dict[str, Any], IO[str], IO[bytes]], None] | None = Non
 
 
 def without(*packages: str) -> None:
-    """Keep this process from importing packages that may be installed.
+    """Keep this process from importing packages, even if they are installed.
 
-    trimesh imports these where they are; nothing done here needs them, and they cost half a second and 45 MB.
+    trimesh imports them if they are installed; nothing here needs them, and they cost half a second and 45
+    MB.
     """
     for package in packages:
         sys.modules[package] = None  # type: ignore[assignment]
@@ -329,7 +330,7 @@ def without(*packages: str) -> None:
 
 def limit(memory_mb: int, cpu_s: float) -> None:
     """Set limits of this process, if the platform has them; no core files."""
-    # Time is limited only for the case that the parent died: its own clock is the one that counts.
+    # The limit of time is only for a parent that died; otherwise the parent's clock counts.
     limit_this_process(memory=memory_mb * 1024**2, cpu_s=int(cpu_s) + 30 if cpu_s else 0)
 
 
@@ -349,7 +350,7 @@ def _read(task: dict[str, Any], parent: IO[str], noise: IO[bytes]) -> None:
 
 
 def with_complaints(reading: GeometryReading, lines: list[str]) -> GeometryReading:
-    """Return what the kernel printed, as one problem of the assembly."""
+    """Add what the kernel printed, as one problem of the assembly."""
     if not lines:
         return reading
     problem = Note(
@@ -378,7 +379,7 @@ FORMAT = 2
 
 
 def save(assembly: Assembly, path: Path, extra: dict[str, Any] | None = None) -> None:
-    """Write ``assembly`` to ``path``; ``extra`` is kept beside it (JSON values)."""
+    """Write ``assembly`` to ``path``; ``extra`` is kept with it (JSON values)."""
     prototypes = list(assembly.prototypes.values())
     number = {prototype.key: n for n, prototype in enumerate(prototypes)}
     header = {
@@ -406,10 +407,7 @@ def save(assembly: Assembly, path: Path, extra: dict[str, Any] | None = None) ->
 
 
 def load(path: Path) -> tuple[Assembly, dict[str, Any]]:
-    """Return the assembly in ``path`` and what was kept beside it.
-
-    InputError if the file is not one of ours.
-    """
+    """Read the assembly in ``path``, and what was kept with it. InputError if the file is not one of ours."""
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
             return _assembly_in(arrays)
@@ -466,30 +464,32 @@ MAX_BYTES = 1_000_000_000
 
 
 def default_folder() -> Path:
-    """Return where readings are kept. Nothing is created."""
+    """Return the folder in which readings are kept. Nothing is created."""
     return cache_folder() / "geometry"
 
 
 def key_of(path: Path, options: Mapping[str, Any]) -> str:
-    """Return the key of one reading of one file."""
+    """Return the key under which the reading of a file is kept."""
     return hashlib.sha256("\n".join(key_parts(path, options)).encode("utf-8")).hexdigest()
 
 
 def key_parts(path: Path, options: Mapping[str, Any]) -> list[str]:
-    """Return all that a result depends on. The file's name counts: unnamed parts are called after it."""
+    """List all on which a result depends. The file's name counts, since unnamed parts get it."""
     content, asked = content_hash(path), json.dumps(options, sort_keys=True)
     return [content, path.name, str(FORMAT), _versions(), measured_by(), asked]
 
 
 @cache
 def measured_by() -> str:
-    """Return a fingerprint of the code that reads and measures: another version's numbers are not ours."""
+    """Return a fingerprint of the code that reads and measures, since another version's numbers may
+    differ.
+    """
     package = Path(__file__).resolve().parent
     return fingerprint([*package.rglob("*.py"), package.parent / "model.py"])
 
 
 def fingerprint(paths: Iterable[Path]) -> str:
-    """Return SHA-256 of all these files."""
+    """Hash all these files with SHA-256."""
     digest = hashlib.sha256()
     for path in sorted(paths):
         digest.update(f"{path.name}\0{content_hash(path)}\n".encode())
@@ -514,7 +514,9 @@ class Cache:
     max_bytes: int = MAX_BYTES
 
     def get(self, key: str, source: Path) -> Assembly | None:
-        """Return the stored assembly of ``source`` (as given this time); None if there is none that holds."""
+        """Return the stored assembly of ``source``, under its present path; None if none is stored that is
+        still valid.
+        """
         path = self._path(key)
         if not path.is_file():
             return None
@@ -525,11 +527,11 @@ class Cache:
         if not _holds(extra, source):
             return None
         with suppress(OSError):
-            os.utime(path)  # what is used stays
+            os.utime(path)  # recently used readings stay
         return replace(assembly, source=str(source))
 
     def put(self, key: str, stored: Path) -> None:
-        """Take the stored file ``stored`` in, atomically. A cache that cannot be written is no error."""
+        """Store the file ``stored``, atomically. If the cache cannot be written, that is no error."""
         target = self._path(key)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -540,7 +542,7 @@ class Cache:
             return
 
     def _make_room(self) -> None:
-        """Take out what was not used for longest, until the rest fits."""
+        """Delete the entries that were not used for longest, until the rest fits."""
         kept = []
         for path in self.folder.glob("*/*.npz"):
             with suppress(OSError):
@@ -558,7 +560,9 @@ class Cache:
 
 
 def provenance(reading: GeometryReading, options: ReadOptions) -> dict[str, Any]:
-    """Return what a reading depends on besides its own bytes; kept with it, checked by :meth:`Cache.get`."""
+    """Return everything besides its own bytes on which a reading depends. It is kept with it, and
+    :meth:`Cache.get` checks it.
+    """
     folder = Path(reading.assembly.source).resolve().parent
     return {
         "others": {relative(str(path), str(folder)): content_hash(path) for path in reading.others},
@@ -584,9 +588,10 @@ def _holds(extra: Mapping[str, Any], source: Path) -> bool:
 
 
 def changed_since(begin_ns: int, extra: Mapping[str, Any], source: Path) -> bool:
-    """Report whether a file read beside ``source`` was written after ``begin_ns`` (:func:`time.time_ns`).
+    """Return True if a file read beside ``source`` was written after ``begin_ns`` (:func:`time.time_ns`).
 
-    Or put there: a copy may have an old time of writing, but not an old place in its folder.
+    The same counts for a file that was copied there: a copy may keep the old time of writing, but its entry
+    in the folder is new.
     """
     folder = source.resolve().parent
     for name in extra.get("others", {}):

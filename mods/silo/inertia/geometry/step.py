@@ -87,10 +87,10 @@ def read_step(
     helpers: Helpers,
     text: Callable[[], Prepared] | None = None,
 ) -> GeometryReading:
-    """Return the assembly of a STEP file, with what belongs to it from beside it. Raises DocumentError.
+    """Read the assembly of a STEP file, with the files beside it that belong to it. Raises DocumentError.
 
     text
-        gives what was found in the file's text, if that was begun already.
+        returns what was found in the file's text, if that search was begun already.
     """
     report("reading", 0, 0)
     step = load(path, max_instances=options.max_instances, text=text() if text is not None else None)
@@ -115,7 +115,7 @@ def read_step(
 
 
 def unitless(step: StepFile, prototypes: Mapping[str, Prototype]) -> Iterator[Note]:
-    """Report products whose lengths have no unit: the kernel takes mm, or, in an assembly, reads nothing."""
+    """Note products whose lengths have no unit: the kernel takes mm, or, in an assembly, reads nothing."""
     for read, what in (
         (True, "mm are taken"),
         (False, "their bodies cannot be read; export them with a unit"),
@@ -137,8 +137,8 @@ def _prototype(step: StepFile, key: str, note: Note | None) -> Prototype:
     node, facts, stated, measured = step.nodes[key], step.facts[key], step.stated[key], step.measured[key]
     problems = list(step.problems.get(key, ()))
     if any(problem.code == GeometryCode.BODY_MISSING for problem in problems):  # the surfaces left are of it
-        said = tuple(p for p in measured.problems if p.code != GeometryCode.BODY_MISSING)
-        measured = replace(measured, problems=said)
+        notes = tuple(p for p in measured.problems if p.code != GeometryCode.BODY_MISSING)
+        measured = replace(measured, problems=notes)
     if measured.solids and not node.children:
         whole = combined(measured.solids)
         problems += against_stated(whole.volume_m3, whole.com_m, stated)
@@ -164,9 +164,7 @@ STATED_TOLERANCE = 1e-3
 
 
 def against_stated(volume: float, com: Floats, stated: StatedInStep) -> list[Note]:
-    """Compare a part's volume [m^3] and centre (3,) [m] with the validation properties that the file
-    gives.
-    """
+    """Compare a part's volume [m^3] and centre (3,) [m] with the validation properties in the file."""
     problems = []
     if stated.volume_m3 is not None and abs(volume - stated.volume_m3) > STATED_TOLERANCE * volume:
         problems.append(
@@ -191,7 +189,7 @@ def against_stated(volume: float, com: Floats, stated: StatedInStep) -> list[Not
 
 
 def split_problems(siblings: Siblings) -> list[Note]:
-    """Report which files a split assembly was completed from, and which it lacks."""
+    """Note from which files a split assembly was completed, and which are missing."""
     problems = []
     if siblings.used:
         names = listed([path.name for path in siblings.used])
@@ -215,7 +213,7 @@ def split_problems(siblings: Siblings) -> list[Note]:
 
 
 def stated_totals(step: StepFile, prototypes: Mapping[str, Prototype]) -> list[Note]:
-    """Report assemblies whose stated volume is not what their content adds up to."""
+    """Note assemblies whose stated volume is not the sum of their content."""
     if not any(stated.volume_m3 for stated in step.stated.values()):
         return []
     volumes: dict[str, float] = {}
@@ -275,7 +273,7 @@ class StepFile:
     kept: tuple[Any, ...] = ()
 
     def take_in(self, other: StepFile) -> None:
-        """Add another file's products; its keys must be its own."""
+        """Add another file's products; their keys must be new."""
         for mine, theirs in zip(vars(self).values(), vars(other).values(), strict=True):
             if isinstance(mine, dict | set):
                 mine.update(theirs)
@@ -295,7 +293,7 @@ def load(
     """Read one STEP file. ``prefix`` goes before every key. DocumentError if it cannot be read.
 
     text
-        what :func:`prepare` found, if somebody asked it already.
+        what :func:`prepare` found, if it was called already.
     """
     with scratch_folder("silo-step-") as folder:
         text = text or prepare(path, Path(folder), max_instances)
@@ -381,18 +379,18 @@ class _StepWalk:
         for keys in groups.values():
             # A product of mixed bodies may stand in several leaves: together they have what the text names.
             key, facts = keys[0], file.facts[keys[0]]
-            said = []
+            notes = []
             for number in bodies.dropped(facts.bodies, [s for k in keys for s in file.shapes.get(k, ())]):
                 if (shape := bodies.made(number, facts)) is None:
-                    said.append(bodies.problem(number))
+                    notes.append(bodies.problem(number))
                 else:
                     file.shapes.setdefault(key, []).append(shape)
                     file.nodes[key] = replace(file.nodes[key], has_geometry=True)
             if facts.hidden:
                 what = counted(facts.hidden, "of its bodies is", "of its bodies are")
                 words = f"{what} hidden in the file (INVISIBILITY), and counted like all others"
-                said.append(Note(GeometryCode.HIDDEN, words))
-            file.problems[key] = tuple(said)
+                notes.append(Note(GeometryCode.HIDDEN, words))
+            file.problems[key] = tuple(notes)
 
     def _visit_all(self, top: str, label: Any) -> None:
         waiting = [(top, label, self._fallback)]
@@ -418,7 +416,7 @@ class _StepWalk:
         return Node(key, name, tuple(children), has_geometry=bool(own)), inside
 
     def _inside(self, label: Any) -> tuple[list[Child], list[_Used], list[Any], ProductFacts | None]:
-        """Return uses of products, the products, the shapes that are the label's own, and their facts."""
+        """Return the uses of products, the products, the shapes that are the label's own, and their facts."""
         children: list[Child] = []
         inside: dict[str, _Used] = {}
         own: list[Any] = []
@@ -433,7 +431,7 @@ class _StepWalk:
         return children, list(inside.values()), own, facts
 
     def _components(self, label: Any) -> Iterator[tuple[Any, _Used]]:
-        """Return uses and what they use; groups of our own making are seen through."""
+        """Yield each use and the product that it uses; looks through groups that we made ourselves."""
         if not self._tool.IsAssembly_s(label):
             return
         for component in occt.labels(lambda labels: self._tool.GetComponents_s(label, labels)):
@@ -446,7 +444,7 @@ class _StepWalk:
                 yield component, used
 
     def _used(self, target: Any) -> _Used:
-        # Asked once for every use of a product, and slow to answer.
+        # Called for every use of a product, and slow.
         entry = occt.entry(target)
         if entry not in self._known:
             name = clean(occt.name_of(target))
@@ -475,12 +473,12 @@ class _StepWalk:
 
 
 def _owners(reader: Any, products: Products) -> dict[int, tuple[Any, int]]:
-    """Map the id of the kernel's entity object → that object (kept alive, so that the id stays its own),
-    product.
+    """Map the id of the kernel's entity objects to the object (kept alive, so that its id stays its own) and
+    its product.
     """
     model = reader.Reader().StepModel()
     if model.NbEntities() != products.count:
-        # The kernel left an entity out; from there on its numbers are not ours. Names must do.
+        # The kernel left an entity out, so its numbers are not ours from there on. Names must be enough.
         return {}
     entities = ((model.Entity(ordinal), pd) for ordinal, pd in products.by_ordinal.items())
     return {id(entity): (entity, pd) for entity, pd in entities}
@@ -525,7 +523,7 @@ class Siblings:
         self.missing: list[str] = []
 
     def resolve(self) -> None:
-        """Fill every product without geometry that has a file; note on the others why not."""
+        """Fill every product without geometry that has a file; notes for the others why they stay empty."""
         waiting = self._top.empty
         while waiting:
             by_key = {key: self._find(key) for key in waiting}
@@ -544,7 +542,7 @@ class Siblings:
                     )
 
     def _load(self, wanted: list[Path]) -> None:
-        """Read files that are not read yet, large ones first, by as many processes as help."""
+        """Read the files that are not read yet, large ones first, with as many processes as are useful."""
         paths = [path for path in dict.fromkeys(wanted) if path not in self._loaded]
         paths = paths[: max(self._options.max_siblings - len(self._loaded), 0)]
         sizes = {path: path.stat().st_size for path in paths if path.is_file()}
@@ -592,7 +590,9 @@ class Siblings:
         return self._index
 
     def _fill(self, key: str, path: Path) -> list[str]:
-        """Put the file's content in the product's place; returns products that are empty in turn."""
+        """Put the file's content in the product's place; returns the products in it that are empty
+        themselves.
+        """
         part = self._loaded.get(path)
         if part is None:
             raise DocumentError(
@@ -633,7 +633,9 @@ class Siblings:
 
 
 def part_file(path: Path, prefix: str, eps: float, mesh_check: bool) -> StepFile | str:
-    """Return a part's own file, read and measured, without the kernel's shapes; or what is wrong with it."""
+    """Read and measure a part's own file, and drop the kernel's shapes. Returns a text if something is
+    wrong.
+    """
     try:
         part = load(path, prefix)
     except DocumentError as error:
@@ -660,7 +662,7 @@ _OPERATIONS = {
 
 
 def _given(value: Any) -> Any:
-    # The kernel ends the process where it is handed nothing.
+    # The kernel ends the process if it gets nothing.
     if value is None:
         raise ValueError("the entity is not complete")
     return value
@@ -677,7 +679,7 @@ class Bodies:
         self._left = 0
 
     def dropped(self, bodies: tuple[int, ...], shapes: list[Any]) -> list[int]:
-        """Return those of ``bodies`` that are no solid of ``shapes``."""
+        """Return the ``bodies`` that are missing in the solids of ``shapes``."""
         solids = [solid for shape in shapes for solid in occt.solids_of(shape) if occt.faces_of(solid)]
         if len(solids) == len(bodies) and not 1 < len(solids) <= MOST_ASKED:
             return []
@@ -686,11 +688,11 @@ class Bodies:
         return [number for number in bodies if id(self._entity(number)) not in entity_ids]
 
     def made(self, number: int, facts: ProductFacts) -> Any:
-        """Return the shape of a body that was dropped, None if it cannot be made."""
+        """Make the shape of a body that was dropped; None if that is not possible."""
         factors = StepData_Factors()
         factors.InitializeFactors(facts.unit_mm or 1.0, facts.unit_rad, 1.0)
         self._left = MOST_PARTS
-        # A body of faces that the reader could not close would be none here either.
+        # If the reader could not close the faces of a body, this cannot either.
         if number in facts.mapped or self._products.solids[number][0].endswith(("BREP", "VOIDS")):
             return None
         with occt.Attempt(), suppress(AttributeError, LookupError, TypeError):
@@ -700,7 +702,7 @@ class Bodies:
         return None
 
     def problem(self, number: int) -> Note:
-        """Say that a body is missing."""
+        """Note that a body is missing."""
         entity, keyword = self._entity(number), self._products.solids[number][0]
         name = entity.Name() if hasattr(entity, "Name") else None
         what = f"{keyword} #{number}" + (f" “{name.ToCString()}”" if name and name.Length() else "")
@@ -771,17 +773,17 @@ class Bodies:
 
 
 def _operator(operator: Any, factors: Any) -> gp_Trsf:
-    """Return the transformation of a replica, which may scale and mirror; the kernel's own does neither."""
+    """Make the transformation of a replica, which may scale and mirror; the kernel's own does neither."""
 
     def axis(given: Any, default: int, *across: Floats) -> Floats:
         for axes in ([xyz(StepToGeom.MakeDirection_s(given).Dir())] if given is not None else []) + [
             *np.roll(np.eye(3), -default, axis=0)
         ]:
-            left = np.array(axes) - sum(np.dot(axes, direction) * direction for direction in across)
-            if np.linalg.norm(left) > 1e-6:
+            free = np.array(axes) - sum(np.dot(axes, direction) * direction for direction in across)
+            if np.linalg.norm(free) > 1e-6:
                 break
-        result: Floats = left / np.linalg.norm(left)
-        return result
+        unit: Floats = free / np.linalg.norm(free)
+        return unit
 
     z = axis(operator.Axis3(), 2)
     x = axis(operator.Axis1(), 0, z)

@@ -55,9 +55,11 @@ class Prepared:
 
 
 def begin(path: Path, options: ReadOptions, helpers: Helpers) -> Callable[[], Prepared]:
-    """Look through a STEP file before the kernel is loaded here; of a large one a helper does it meanwhile.
+    """Look through a STEP file before the kernel is loaded here; a helper does that for a large file
+    meanwhile.
 
-    Helpers that are worth their start then load the kernel, too. Raises DocumentError, now or when called.
+    If the file is worth helpers, they then load the kernel, too. DocumentError is raised now, or when the
+    result is asked for.
     """
     large = path.stat().st_size >= WORTH_HELP and helpers.start()
     text = helpers.begin(prepare, path.resolve(), helpers.folder(), options.max_instances)
@@ -80,7 +82,7 @@ def begin(path: Path, options: ReadOptions, helpers: Helpers) -> Callable[[], Pr
 
 
 def _bytes_beside(path: Path, products: Products, options: ReadOptions) -> int:
-    """Report how much geometry may lie in the files of a split assembly; :mod:`siblings` looks closer."""
+    """Estimate how much geometry is in the files of a split assembly; :mod:`siblings` looks closer."""
     wanted = {file_key(name) for name in products.elsewhere()} if options.siblings else None
     if not wanted:
         return 0
@@ -90,7 +92,7 @@ def _bytes_beside(path: Path, products: Products, options: ReadOptions) -> int:
 
 
 def prepare(path: Path, folder: Path, max_instances: int) -> Prepared:
-    """Look through a STEP file; if it is rewritten, the copy lies in ``folder``. Raises DocumentError."""
+    """Look through a STEP file; if it is rewritten, the copy is in ``folder``. Raises DocumentError."""
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
         text = scan(data, WANTED | HIDING if data.find(b"INVISIBILITY") > 0 else WANTED)
         if not text.complete:
@@ -158,9 +160,10 @@ class _Flat:
 
 
 def regrouped(source: Part21, products: Products) -> tuple[bytes | None, int]:
-    """Return the text with groups in its flat assemblies, and how many entities were added at its end.
+    """Put groups into the flat assemblies of a text. Returns the new text, and how many entities were added
+    at its end.
 
-    (None, 0) if no assembly is flat, or nothing can be done.
+    Returns (None, 0) if no assembly is flat, or if nothing can be done.
     """
     counts: dict[int, int] = defaultdict(int)
     for assembly, _ in products.uses:
@@ -209,7 +212,7 @@ REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{12})SHAPE_REPRESENTATION_RELAT
 
 
 def _group(flat: _Flat, uses: Sequence[_Use], first: int) -> list[str]:
-    """Return the entities of one more sub-assembly at the origin of ``flat``, numbered from ``first``."""
+    """Write the entities of one more sub-assembly at the origin of ``flat``, numbered from ``first``."""
     items = dict.fromkeys((first + 7, *(item for use in uses for item in use.items)))
     text = _GROUP.format(
         *range(first, first + 15),
@@ -225,7 +228,7 @@ def _group(flat: _Flat, uses: Sequence[_Use], first: int) -> list[str]:
 
 
 def _flat(source: Part21, definition: int) -> _Flat | None:
-    """Return what is needed of one assembly; None if anything is not as the recommended practice has it."""
+    """Read what is needed of one assembly; None if anything differs from the recommended practice."""
     arguments = source.arguments(definition)
     formation = source.arguments(ref(arguments, 2) or 0)
     product = source.arguments(ref(formation, 2) or 0)
@@ -255,7 +258,7 @@ def _flat(source: Part21, definition: int) -> _Flat | None:
 
 
 def _ends_of(source: Part21, keyword: str, least: int) -> Iterator[tuple[int, tuple[int, ...]]]:
-    """Yield entities of one kind with what they refer to, at least ``least`` of it."""
+    """Yield the entities of one kind that have at least ``least`` references, with these."""
     for number in source.listed(keyword):
         references = source.references(number)
         if len(references) >= least:
@@ -263,7 +266,7 @@ def _ends_of(source: Part21, keyword: str, least: int) -> Iterator[tuple[int, tu
 
 
 def _replaced(source: Part21, number: int, old: int, new: int) -> Iterator[tuple[int, int, bytes]]:
-    """Yield edits that make entity ``number`` refer to ``new`` where it refers to ``old``."""
+    """Yield edits that make entity ``number`` refer to ``new`` instead of ``old``."""
     start = source.starts[number]
     for match in _REFERENCE.finditer(source.body(number)):
         if match[1] is not None and int(match[1]) == old:

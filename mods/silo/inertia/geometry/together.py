@@ -59,42 +59,42 @@ class Mesh:
 
     @property
     def extents(self) -> Floats:
-        """Return (3,) [m], sizes of the axis-aligned box; zeros for no triangles."""
+        """Return the sizes (3,) [m] of the axis-aligned box; zeros if there are no triangles."""
         if not len(self.vertices):
             return np.zeros(3)
         size: Floats = np.ptp(self.vertices, axis=0)
         return size
 
     def moved(self, matrix: Floats) -> Mesh:
-        """Return the same triangles after a placement ((4, 4) [m]); one that mirrors turns them over."""
+        """Move the triangles by a placement ((4, 4) [m]); one that mirrors also turns them over."""
         mirrored = np.linalg.det(matrix[:3, :3]) < 0
         faces = self.faces[:, ::-1] if mirrored else self.faces
         return Mesh(self.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces)
 
 
 def exact_box(about: Sequence[Any], exact: Callable[[int], Any]) -> Box:
-    """Return the box around shapes; about each there is a box that may be too large.
+    """Find the exact box around shapes; ``about`` has a box for each that may be too large.
 
-    Only a shape that may reach beyond the others is looked at in full: that takes a minute for all faces of
-    a circuit board, and a second for those at its border.
+    Only a shape that may reach beyond the others is measured exactly: for a circuit board, that takes a
+    second for the faces at its border, but a minute for all faces.
     """
     if not about:
         return np.zeros(3), np.zeros(3)
     reach = np.array([[*np.negative(low), *high] for low, high in about])
-    result, seen = np.full(6, -np.inf), set[int]()
+    extent, seen = np.full(6, -np.inf), set[int]()
     for axis in range(6):
         for number in np.argsort(-reach[:, axis]):
-            if reach[number, axis] <= result[axis]:
+            if reach[number, axis] <= extent[axis]:
                 break
             if number not in seen:
                 seen.add(number)
                 low, high = exact(number)
-                result = np.maximum(result, [*np.negative(low), *high])
-    return -result[:3], result[3:]
+                extent = np.maximum(extent, [*np.negative(low), *high])
+    return -extent[:3], extent[3:]
 
 
 def joined(parts: list[Mesh]) -> Mesh:
-    """Return several meshes as one, in order."""
+    """Join several meshes into one, in order."""
     if not parts:
         return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     starts = np.cumsum([0, *(len(p.vertices) for p in parts)])
@@ -105,7 +105,7 @@ def joined(parts: list[Mesh]) -> Mesh:
 def mesh_volume(mesh: Mesh) -> float:
     """Return the signed volume [m^3]; negative if the faces look inwards.
 
-    Without trimesh, which FreeCAD lacks.
+    Needs no trimesh, which FreeCAD lacks.
     """
     if not len(mesh):
         return 0.0
@@ -114,9 +114,9 @@ def mesh_volume(mesh: Mesh) -> float:
 
 
 def about_enclosed(mesh: Mesh) -> float:
-    """Return roughly the volume [m^3] that an open surface would have if it closed: cones from its middle.
+    """Estimate the volume [m^3] that an open surface would have if it closed: cones from its middle.
 
-    A flat one has none, wherever it lies.
+    A flat surface has none, wherever it is.
     """
     corners = mesh.vertices[mesh.faces]
     a, b, c = np.moveaxis(corners, 1, 0)
@@ -128,10 +128,10 @@ def about_enclosed(mesh: Mesh) -> float:
 
 
 def mesh_solid(mesh: Mesh) -> SolidProps:
-    """Return the volume, centre and tensor of a closed mesh (exact for its polyhedron), the sign turned if
-    need be.
+    """Integrate the volume, centre and tensor of a closed mesh (exact for its polyhedron). A negative volume
+    is made positive.
 
-    A mesh without volume has its middle as centre, and no tensor.
+    A mesh without volume gets its middle as centre, and a zero tensor.
     """
     from trimesh.triangles import mass_properties
 
@@ -155,7 +155,7 @@ def _centred(mesh: Mesh) -> tuple[Floats, Floats]:
 
 
 def distinct(rows: NDArray[Any]) -> tuple[Indices, Indices]:
-    """Return the index of the first row of each kind, kinds in order, and for each row its kind.
+    """Return the index of the first row of each kind, with the kinds in order, and the kind of each row.
 
     ``np.unique`` of rows compares them one by one and takes twenty times as long.
     """
@@ -169,9 +169,9 @@ def distinct(rows: NDArray[Any]) -> tuple[Indices, Indices]:
 
 
 def welded(vertices: Floats, faces: Indices) -> Mesh:
-    """Make equal vertices one (an STL repeats each six times); leave out triangles without area.
+    """Merge equal vertices (an STL repeats each six times), and leave out triangles without area.
 
-    Where edges are open then, vertices closer than a millionth of the mesh are made one as well.
+    If edges are open then, vertices closer than a millionth of the mesh are merged as well.
     """
     mesh = _merged(vertices, faces)
     if not len(mesh) or not open_edges(mesh):
@@ -191,9 +191,10 @@ def _merged(vertices: Floats, faces: Indices) -> Mesh:
 
 
 def without_doubled(mesh: Mesh) -> tuple[Mesh, int]:
-    """Return the mesh with each triangle once, and how many were repeated.
+    """Remove repeated triangles from the mesh, and count them.
 
-    Triangles that stand there twice are a copy; a triangle and the same turned over enclose nothing.
+    If a triangle is there twice, one is a copy; a triangle and the same one turned over enclose nothing, and
+    both go.
     """
     order = np.argsort(mesh.faces, axis=1)
     rows = np.take_along_axis(mesh.faces, order, axis=1)
@@ -216,7 +217,7 @@ _EVEN = [0 * 9 + 1 * 3 + 2, 1 * 9 + 2 * 3 + 0, 2 * 9 + 0 * 3 + 1]
 
 
 def open_edges(mesh: Mesh) -> int:
-    """Return how many edges are not used exactly twice, once in each direction."""
+    """Count the edges that are not used exactly twice, once in each direction."""
     directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     ends = np.sort(directed, axis=1)
     number = distinct(ends)[1]
@@ -227,9 +228,9 @@ def open_edges(mesh: Mesh) -> int:
 
 
 def components(mesh: Mesh, most: int) -> list[Mesh]:
-    """Return the mesh cut into pieces that share no edge; whole if there are more than ``most``.
+    """Divide the mesh into pieces that share no edge; if there are more than ``most``, it stays whole.
 
-    Pieces that touch in a corner only are two: each may be inside out by itself.
+    Pieces that touch only in a corner are separate: each of them may be inside out.
     """
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     rows = distinct(edges)[1].reshape(-1, 3)
@@ -246,7 +247,7 @@ def _compact(vertices: Floats, faces: Indices) -> Mesh:
 
 
 def _labels(rows: Indices, count: int) -> Indices:
-    """Return (count,) for each thing the lowest one that it is connected to by ``rows`` (n, 3)."""
+    """Return (count,): for each thing, the lowest one to which ``rows`` (n, 3) connect it."""
     labels = np.arange(count)
     while True:
         lowest = labels[rows].min(axis=1)
@@ -260,9 +261,10 @@ def _labels(rows: Indices, count: int) -> Indices:
 
 
 def winding_number(mesh: Mesh, point: Floats) -> float:
-    """Return how often the mesh goes round ``point`` ((3,) [m]): 1 inside a closed outward mesh, 0 outside.
+    """Return how often the mesh winds around ``point`` ((3,) [m]): 1 inside a closed outward mesh, 0 outside.
 
-    The generalised winding number: the solid angles of all triangles, added (Van Oosterom and Strackee 1983).
+    It is the generalised winding number: the sum of the solid angles of all triangles (Van Oosterom and
+    Strackee 1983).
     """
     a, b, c = (mesh.vertices[mesh.faces[:, i]] - point for i in range(3))
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
@@ -277,16 +279,16 @@ def winding_number(mesh: Mesh, point: Floats) -> float:
 
 
 def is_inside(inner: Mesh, outer: Mesh) -> bool:
-    """Report whether ``inner`` begins inside ``outer`` (their surfaces are taken not to cross)."""
+    """Return True if ``inner`` begins inside ``outer`` (assuming that their surfaces do not cross)."""
     point = inner.vertices[inner.faces[0]].mean(axis=0)
     return abs(winding_number(outer, point)) > 0.5
 
 
 def simplified(mesh: Mesh, most: int) -> Mesh:
-    """Return the mesh for a picture, with about ``most`` triangles at most: near vertices made one
+    """Simplify the mesh for a picture to at most about ``most`` triangles: near vertices become one
     (clustering).
 
-    Its volume is not to be trusted any more; small meshes are left as they are.
+    Do not trust the volume of the result. Small meshes stay unchanged.
     """
     cells = 512
     while len(mesh) > most and cells >= 8:
@@ -359,12 +361,12 @@ class Together:
 
     @property
     def mixed(self) -> bool:
-        """Report whether some bodies are inside out and some are not."""
+        """Return True if some bodies are inside out and some are not."""
         return self.cavities > 0 or 0 < self.turned < len(self.solids)
 
 
 def together(bodies: Sequence[Body], common: Common, problems: list[Note]) -> Together:
-    """Return the solids of one product; what is wrong with them is added to ``problems``."""
+    """Combine the bodies of one product into its solids, and add what is wrong with them to ``problems``."""
     bodies = _without_copies(bodies, problems)
     if len(bodies) < 2:
         return Together(tuple(b.props for b in bodies), 0, sum(b.props.reversed for b in bodies))
@@ -465,7 +467,7 @@ class _Relations:
 
 
 def _close_pairs(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
-    """Yield pairs whose boxes share more than a face."""
+    """Yield the pairs of bodies whose boxes share more than a face."""
     low = np.array([body.low for body in bodies])
     high = np.array([body.high for body in bodies])
     for index in range(len(bodies) - 1):
@@ -476,8 +478,8 @@ def _close_pairs(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
 
 
 def _roles(bodies: Sequence[Body], holders: list[list[int]]) -> tuple[list[_Role], list[int]]:
-    """Return what each body is, and the number of the body around it, its own for those that nothing
-    holds.
+    """Find the role of each body, and the number of the body around it; its own number if nothing holds
+    it.
     """
     roles: list[_Role] = []
     hosts: list[int] = []
@@ -528,7 +530,7 @@ def _minus(body: SolidProps, cavity: SolidProps) -> SolidProps:
 
 
 def combined(solids: Sequence[SolidProps]) -> SolidProps:
-    """Return all solids as one; no volume at the origin if there is none."""
+    """Combine all solids into one; without any, the result has no volume, at the origin."""
     if not solids:
         return NOTHING
     whole = combine_arrays(
@@ -578,16 +580,16 @@ def _closed(body: Body) -> Any:
 
 
 def without(mesh: Mesh, cut: Mesh) -> Mesh | None:
-    """Return what is left of a mesh when another one is cut away; None if one of them does not close."""
+    """Cut another mesh away from a mesh; None if one of them is not closed."""
     body, other = _closed(_body(mesh)), _closed(_body(cut))
     if body is None or other is None:
         return None
-    left = (body - other).to_mesh64()
-    return Mesh(left.vert_properties[:, :3], left.tri_verts.astype(np.int64))
+    remaining = (body - other).to_mesh64()
+    return Mesh(remaining.vert_properties[:, :3], remaining.tri_verts.astype(np.int64))
 
 
 def enclosed(mesh: Mesh, problems: list[Note]) -> SolidProps:
-    """Return the moments of a part's triangles; every doubt is added to ``problems``."""
+    """Measure a part's triangles, and add every doubt to ``problems``."""
     mesh, repeated = without_doubled(mesh)
     if repeated:
         what = counted(repeated, "of its triangles is", "of its triangles are")
@@ -618,9 +620,9 @@ def _body(piece: Mesh) -> Body:
 
 
 def _not_closed(mesh: Mesh, edges: int) -> Note:
-    """Report holes, or triangles that disagree.
+    """Note holes, or triangles that disagree.
 
-    Either way the volume depends on the point that it is taken from.
+    In both cases the volume depends on the point from which it is taken.
     """
     undirected = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     if (np.unique(undirected, axis=0, return_counts=True)[1] == 2).all():

@@ -105,11 +105,11 @@ class MaterialTable:
     _known: dict[str, MaterialHit | MaterialMiss] = field(default_factory=dict, init=False, repr=False)
 
     def find(self, text: str) -> MaterialHit | MaterialMiss:
-        """Return the material that ``text`` names: equal first, then whole words, then FreeCAD's cards by
-        name.
+        """Find the material that ``text`` names: first an equal name, then whole words, then the name of a
+        FreeCAD card.
 
-        Never by parts of words, and never by likeness. A card fills a gap of the tables; it replaces a guess
-        with a word, and never what the tables know.
+        It never uses parts of words, nor similarity. A card fills a gap of the tables; it replaces a guess by
+        one word, but never what the tables know.
         """
         if text not in self._known:
             self._known[text] = self._look_up(text)
@@ -202,15 +202,14 @@ class _Index:
 
     def _nothing(self, tokens: Words, text: Words) -> MaterialMiss:
         if text != tokens and not _not_understood(text):
-            # Most parts that only their plating is known of are of steel.
+            # Most parts of which only the plating is known are of steel.
             reason = "it names what lies on the part, and not what the part is made of"
             return MaterialMiss(reason, self.exact.get(("steel",)))
         return MaterialMiss("it is in no table", self._alike(tokens))
 
     def _alike(self, tokens: Words) -> Material | None:
-        """Return the row with the most similar spelling and the same digits.
-
-        6063 is another alloy than 6061.
+        """Find the row with the most similar spelling and the same digits, since 6063 is another alloy than
+        6061.
         """
         wanted = " ".join(tokens)
         near = self._suggester.near(wanted, 1) if len(wanted) > 3 else ()  # "Air" is not like "acier"
@@ -226,9 +225,8 @@ class _Index:
 
 
 def load_materials(paths: Iterable[Path | str] = (), *, freecad: bool = True) -> MaterialTable:
-    """Return the usual table.
-
-    ``paths``: user tables, the last one wins; ``freecad``: look at installed cards.
+    """Load the usual table with the user tables at ``paths``, of which the last one wins; ``freecad``: and
+    the cards of installed FreeCADs.
     """
     layers = [user_rows(path) for path in paths]
     layers.reverse()
@@ -254,7 +252,7 @@ _FINISHES = (("black", "oxide"), ("oxide", "finish"), ("hot", "dip"), ("hot", "d
 
 
 def words(text: str) -> Words:
-    """Return the words of a material's name in plain characters, case-folded; a percent sign is one."""
+    """Split a material's name into words of plain characters, case-folded; a percent sign is a word."""
     # The only symbol that is another material without its capitals.
     return tuple(_WORD.findall(plain_text(re.sub(r"\bTiN\b", "titanium nitride", text)).casefold()))
 
@@ -262,7 +260,7 @@ def words(text: str) -> Words:
 def _uncovered(text: Words, covered: Set[str]) -> Words:
     """Leave out platings: ("zinc", "plated", "steel") → ("steel",), ("zinc", "plated") → ().
 
-    known
+    covered
         words that name a material by themselves.
     """
     kept: list[str] = []
@@ -292,7 +290,7 @@ def _uncovered(text: Words, covered: Set[str]) -> Words:
 
 
 def _not_understood(rest: Words) -> Words:
-    """Return the words that may make something else of a material: no colour, form, treatment or grade."""
+    """Return the words that may mean another material: those that are no colour, form, treatment or grade."""
     return tuple(
         word
         for word in rest
@@ -302,12 +300,12 @@ def _not_understood(rest: Words) -> Words:
 
 
 def _contradiction(name: str, hit: Words, density: float, text: Words, rest: Words) -> str:
-    """Return why the words around a material deny it, in words that end a sentence; "" if they do not.
+    """Say why the words around a material contradict it, as the end of a sentence; "" if they do not.
 
     name, hit, density
-        the material [kg/m^3], and the words that it was found by.
+        the material, the words by which it was found, and its density [kg/m^3].
     text, rest
-        all words, and those that are not ``hit`` and no platings.
+        all words, and those that are neither ``hit`` nor platings.
     """
     words_around = set(rest)
     for kind, wrong in ((_MEANING["plastic"], density > 2300), (_MEANING["metal"], density < 1700)):
@@ -354,7 +352,7 @@ class DensityCell(NamedTuple):
 
 
 def checked_density(value: float) -> float:
-    """Return a density that a caller gives as a number [kg/m^3]. InputError if it is not that of a solid."""
+    """Check a density [kg/m^3] that a caller gives as a number. InputError if no solid has it."""
     if UNIT_NEEDED_BELOW <= value <= DENSEST:
         return value
     hint = f"; {value:g} g/cm³ are {value * 1000:g} kg/m³" if 0.01 < value < UNIT_NEEDED_BELOW else ""
@@ -364,16 +362,16 @@ def checked_density(value: float) -> float:
 
 
 def density_factor(unit: str) -> float | None:
-    """Return the kg/m^3 per ``unit`` ("g/cm^3"); None if it is no unit of density."""
+    """Return how many kg/m^3 a ``unit`` such as "g/cm^3" is; None if it is no unit of density."""
     match = _SHAPE.fullmatch(f"1 {_plain_density(unit)}")
     return _factor_of(match) if match else None
 
 
 def read_density(text: str, factor: float = 1.0, *, points_are_decimal: bool = False) -> DensityCell:
-    """Return a density that a person wrote: "7.85 g/cm³", "7850". ``factor``: of a number without a unit.
+    """Read a density that a person wrote: "7.85 g/cm³", "7850". ``factor``: for a number without a unit.
 
-    "7,850 g/cm3" is 7.85, for nothing is denser than a metal; "7,850 kg/m3" is refused with both readings.
-    What no solid weighs is refused.
+    "7,850 g/cm3" is 7.85, since nothing is denser than a metal; "7,850 kg/m3" is refused, and both readings
+    are named. A density that no solid has is refused.
     """
     cell = _plain_density(text)
     match = _SHAPE.fullmatch(cell)
@@ -402,7 +400,7 @@ def read_density(text: str, factor: float = 1.0, *, points_are_decimal: bool = F
 def parse_density(text: str) -> float | None:
     """Read the density [kg/m^3] that a program wrote, as in a material card; points are decimal marks.
 
-    None if it cannot be read, or no solid weighs that.
+    Returns None if it cannot be read, or if no solid has it.
     """
     return read_density(text, points_are_decimal=True).value
 
@@ -421,19 +419,18 @@ def _factor_of(match: re.Match[str]) -> float | None:
 
 @cache
 def package_rows() -> tuple[Material, ...]:
-    """Return the table that comes with the package (``materials/table.csv``)."""
+    """Read the table that comes with the package (``materials/table.csv``)."""
     text = (files(__package__) / "table.csv").read_text("utf-8")
     return _csv_rows(text, "table.csv")
 
 
 def user_rows(path: Path | str) -> tuple[Material, ...]:
-    """Return a user's table, by suffix.
+    """Read a user's table; its suffix is the format.
 
     ``.csv``: columns ``name``, ``density`` (kg/m^3, or as the header says: ``density (g/cm3)``; a cell may
-    carry its own unit), optional ``aliases`` (separated by ``;``), ``source``, ``family``, ``spread`` (by how
-    many percent the density varies).
-    ``.toml``: ``[materials]`` with ``"My alloy" = 2810``, ``= "2.81 g/cm3"`` or
-    ``= { density = …, aliases = […] }``.
+    have its own unit), optional ``aliases`` (separated by ``;``), ``source``, ``family``, ``spread`` (by how
+    many percent the density varies). ``.toml``: ``[materials]`` with ``"My alloy" = 2810``, ``= "2.81
+    g/cm3"`` or ``= { density = …, aliases = […] }``.
 
     All bad rows are reported together, in one ConfigError.
     """
@@ -461,7 +458,7 @@ def _csv_rows(text: str, source: str) -> tuple[Material, ...]:
         heads.setdefault(re.sub(r"[\W_].*", "", head.strip()).casefold(), head)
     if not {"name", "density"} <= heads.keys():
         raise ConfigError(f"{source}: wanted columns “name” and “density”, got {reader.fieldnames}")
-    # "density (g/cm3)", "Density [g/cm3]", "density_g/cm3": whatever stands behind the word is the unit.
+    # "density (g/cm3)", "Density [g/cm3]", "density_g/cm3": everything after the word is the unit.
     unit = heads["density"].strip()[len("density") :].strip(" _:,-()[]")
     factor = density_factor(unit) if unit else None
     if unit and factor is None:
@@ -486,7 +483,7 @@ def _toml_records(text: str, source: str) -> Iterator[_Record]:
 
 
 def _checked(records: Iterable[_Record], factor: float | None, source: str) -> tuple[Material, ...]:
-    """Return the rows. ``factor``: kg/m^3 per unit of the header, None if it states none."""
+    """Check the rows. ``factor``: kg/m^3 per unit of the header, None if it states no unit."""
     rows: list[Material] = []
     problems: list[str] = []
     for where, cells in records:
@@ -507,7 +504,7 @@ def _checked(records: Iterable[_Record], factor: float | None, source: str) -> t
 
 
 def _material(cells: Mapping[str, Any], factor: float | None, source: str) -> Material | str:
-    """Return a row, or in words what is wrong with it."""
+    """Read a row, or say what is wrong with it."""
     name, density, spread = (str(cells.get(key, "")).strip() for key in ("name", "density", "spread"))
     if not name:
         return f"wanted a name, got none for the density “{density}”"
@@ -567,30 +564,32 @@ class Card:
 
 @cache
 def all_cards() -> tuple[Card, ...]:
-    """Return cards of every FreeCAD found on this machine, in the order of :func:`card_folders`."""
+    """Read the cards of every FreeCAD on this machine, in the order of :func:`card_folders`."""
     return tuple(cards_in(card_folders()))
 
 
 @cache
 def installed_cards() -> tuple[Material, ...]:
-    """Return the cards with a density; the first of a name wins."""
+    """Return the materials of all cards with a density; of equal names the first wins."""
     return tuple(materials_of(all_cards()))
 
 
 @cache
 def card_of(uuid: str) -> Card | None:
-    """Return the card with this id, None if there is none; the first one wins."""
+    """Return the first card with this id; None if there is none."""
     return next((card for card in all_cards() if card.uuid == uuid.casefold()), None)
 
 
 def card_folders() -> tuple[Path, ...]:
-    """Return the folders that hold material cards here: FREECAD_MATERIALS first, then the usual places."""
+    """Return the folders with material cards on this machine: FREECAD_MATERIALS first, then the usual
+    places.
+    """
     given = [Path(p) for p in os.environ.get("FREECAD_MATERIALS", "").split(os.pathsep) if p]
     return tuple(folder for folder in (*given, *material_folders()) if folder.is_dir())
 
 
 def cards_fingerprint() -> str:
-    """Return a text that changes with every card that is added, removed or edited; caches keep it."""
+    """Return a text that changes whenever a card is added, removed or edited. Caches keep it."""
     seen = hashlib.sha256()
     for folder in card_folders():
         for path in sorted(folder.rglob("*.FCMat")):
@@ -603,7 +602,9 @@ def cards_fingerprint() -> str:
 
 
 def materials_of(cards: Iterable[Card]) -> list[Material]:
-    """Return all cards with a density, by name and by file name, in order; the first of a name wins."""
+    """Make a material of each card with a density, by its name and its file name; of equal names the first
+    wins.
+    """
     materials: dict[str, Material] = {}
     for card in cards:
         if card.density is not None:
@@ -616,7 +617,7 @@ def materials_of(cards: Iterable[Card]) -> list[Material]:
 
 
 def cards_in(folders: Iterable[Path]) -> list[Card]:
-    """Return all cards below ``folders`` (``.FCMat``, both formats), in path order."""
+    """Read all cards below ``folders`` (``.FCMat``, both formats), in path order."""
     texts = [(path, text, _own_uuid(text)) for folder in folders for path, text in _texts(folder)]
     by_uuid: dict[str, str] = {}
     for _, text, uuid in texts:

@@ -89,7 +89,7 @@ class Attempt:
 
 
 def quiet() -> None:
-    """Take the kernel's printers away: it reports to standard output otherwise."""
+    """Switch the kernel's printers off, which write to standard output."""
     messenger = Message.DefaultMessenger_s()
     for printer in list(messenger.Printers()):
         messenger.RemovePrinter(printer)
@@ -110,13 +110,13 @@ def entry(label: Any) -> str:
 
 
 def name_of(label: Any) -> str:
-    """Return the label's name, "" if it has none."""
+    """Return the label's name; "" if it has none."""
     attribute = attribute_of(label, TDataStd_Name)
     return str(attribute.Get().ToExtString()) if attribute is not None else ""
 
 
 def attribute_of(label: Any, kind: Any) -> Any | None:
-    """Return the label's attribute of class ``kind``, or None.
+    """Return the label's attribute of class ``kind``; None if it has none.
 
     Asked with IsAttribute first: FindAttribute on a label without the attribute ends the process with a
     segmentation fault for some classes (seen in 7.9 and 8.0).
@@ -139,39 +139,39 @@ def faces_of(shape: Any) -> list[Any]:
 
 
 def edges_of(shape: Any) -> list[Any]:
-    """Return all edges of a face or a solid, each as often as it is used: a seam twice."""
+    """Return all edges of a face or a solid, each as often as it is used; a seam twice."""
     return [TopoDS.Edge(edge) for edge in _explored(shape, TopAbs_EDGE)]
 
 
 def loose_shells_of(shape: Any) -> list[Any]:
-    """Return the shells of a shape that stand in no solid, placed."""
+    """Return the shells of a shape that belong to no solid, placed."""
     return _explored(shape, TopAbs_SHELL, TopAbs_SOLID)
 
 
 def loose_faces_of(shape: Any) -> list[Any]:
-    """Return the faces of a shape that stand in no shell, placed and oriented."""
+    """Return the faces of a shape that belong to no shell, placed and oriented."""
     return [TopoDS.Face(face) for face in _explored(shape, TopAbs_FACE, TopAbs_SHELL)]
 
 
 def has_edges(shape: Any) -> bool:
-    """Report whether there is any edge, in a face or alone."""
+    """Return True if there is any edge, in a face or alone."""
     return not shape.IsNull() and TopExp_Explorer(shape, TopAbs_EDGE).More()
 
 
 def has_surface(face: Any) -> bool:
-    """Report whether a face has more than triangles (tessellated STEP)."""
+    """Return True if a face has more than triangles (unlike those of tessellated STEP)."""
     return BRep_Tool.Surface_s(face) is not None
 
 
 def is_elementary(face: Any) -> bool:
-    """Report whether it is a plane, a cylinder, a cone, a sphere or a torus."""
+    """Return True if it is a plane, a cylinder, a cone, a sphere or a torus."""
     return BRepAdaptor_Surface(face, False).GetType() in _ELEMENTARY
 
 
 def is_plain(solid: Any) -> bool:
-    """Report whether all faces are elementary, and all edges straight or round in them.
+    """Return True if all faces are elementary, and all edges straight or round in them.
 
-    Integrals are exact.
+    Its integrals are then exact.
     """
     for face in faces_of(solid):
         surface = BRepAdaptor_Surface(face, False).GetType()
@@ -185,15 +185,17 @@ def is_plain(solid: Any) -> bool:
 
 
 def is_flat(solid: Any) -> bool:
-    """Report whether all faces are planes and all edges straight: its triangles are the very solid."""
+    """Return True if all faces are planes and all edges straight: then its triangles are exactly the
+    solid.
+    """
     planes = (BRepAdaptor_Surface(face, False).GetType() == GeomAbs_Plane for face in faces_of(solid))
     return all(planes) and all(BRepAdaptor_Curve(edge).GetType() == GeomAbs_Line for edge in edges_of(solid))
 
 
 def inside(shape: Any) -> Iterator[Any]:
-    """Yield what lies directly in a shape, placed and oriented.
+    """Yield the direct parts of a shape, placed and oriented.
 
-    The kernel's iterator does not keep the shape that it reads: this frame does.
+    The kernel's iterator does not keep the shape that it reads alive, but this frame does.
     """
     iterator = TopoDS_Iterator(shape, True, True)
     while iterator.More():
@@ -205,11 +207,11 @@ def _explored(shape: Any, kind: Any, outside: Any = TopAbs_SHAPE) -> list[Any]:
     if shape is None or shape.IsNull():
         return []
     explorer = TopExp_Explorer(shape, kind, outside)
-    result = []
+    shapes = []
     while explorer.More():
-        result.append(explorer.Current())
+        shapes.append(explorer.Current())
         explorer.Next()
-    return result
+    return shapes
 
 
 MM = 1e-3
@@ -233,14 +235,14 @@ FINE_ENOUGH = 30_000
 def cross_check(
     solid: Any, volume_m3: float | None, *, small: bool = False
 ) -> tuple[Mesh, float | None, int]:
-    """Compare meshes of a solid with ``volume_m3`` (> 0; None: nothing to compare), as few as are needed.
+    """Compare meshes of a solid with ``volume_m3`` (> 0; None: nothing to compare), as few meshes as needed.
 
-    ``small``: the solid is hardly seen in its product's picture, so a coarse mesh of it is tried first.
+    ``small``: the solid is hardly visible in its product's picture, so a coarse mesh is tried first.
 
-    The mesher fails now and then where the geometry does not: a face without triangles at one fineness is
-    there at another, and thin curved wires lose several per cent to chords. So one closed mesh that agrees
-    clears a solid, and so does what two closed ones converge to, their chord error going with the square of
-    the angle. Bad geometry is as wrong at every fineness.
+    The mesher sometimes fails although the geometry is good: a face without triangles at one fineness has
+    some at another, and thin curved wires lose several per cent to chords. So one closed mesh that agrees
+    proves a solid right, and so does the limit of two closed meshes, whose chord error goes with the square
+    of the angle. Bad geometry is equally wrong at every fineness.
 
     Returns a mesh for the picture, the relative deviation of the best closed mesh (None if none is
     closed), and how many faces have no triangles in the picture's mesh.
@@ -266,13 +268,13 @@ def cross_check(
 
 
 def tessellated(shape: Any, level: Level = PICTURE) -> tuple[Mesh, int]:
-    """Return the triangles of a shape in m, and how many of its faces could not be meshed."""
+    """Mesh a shape. Returns its triangles [m], and how many of its faces could not be meshed."""
     mesh_faces(shape, level)
     return triangles(shape)
 
 
 def mesh_faces(shape: Any, level: Level, least: float = 0.1) -> None:
-    """Put triangles on the faces of a shape; no edge is divided below ``least`` of their distance to it."""
+    """Mesh the faces of a shape; no edge is divided below ``least`` of their distance to it."""
     BRepTools.Clean_s(shape)
     wanted = IMeshTools_Parameters()
     wanted.Deflection, wanted.Angle = max(level[0] * box(shape)[1], 1e-7), level[1]
@@ -281,14 +283,14 @@ def mesh_faces(shape: Any, level: Level, least: float = 0.1) -> None:
 
 
 def triangles(shape: Any) -> tuple[Mesh, int]:
-    """Return the triangles that lie on a shape's faces already, in m, and how many faces have none."""
+    """Collect the existing triangles [m] of a shape's faces, and count the faces without any."""
     parts = list(face_meshes(shape))
     meshes = [part for part in parts if part is not None]
     return joined(meshes), len(parts) - len(meshes)
 
 
 def face_meshes(shape: Any) -> Iterator[Mesh | None]:
-    """Yield the triangles that lie on each face already, in m; None for a face that has none."""
+    """Yield the existing triangles [m] of each face; None for a face that has none."""
     meshes: dict[Any, tuple[Floats, Any]] = {}  # a face may stand in many places
     place, matrix = TopLoc_Location(), np.eye(4)  # of the last face: those of a body follow each other
     for face in faces_of(shape):
@@ -312,7 +314,7 @@ def face_meshes(shape: Any) -> Iterator[Mesh | None]:
 
 
 def box(shape: Any) -> tuple[Floats, float]:
-    """Return the middle (3,) and diagonal [mm] of the shape's box."""
+    """Return the middle (3,) and the diagonal [mm] of the shape's box."""
     low, high = bounds(shape)
     return (low + high) / 2, float(np.linalg.norm(high - low))
 
@@ -323,7 +325,7 @@ def bounds(shape: Any) -> Box:
 
 
 def exact_bounds(shapes: Sequence[Any]) -> Box:
-    """Return the corners [mm] of the box around shapes as their surfaces have it; zeros if they are empty."""
+    """Return the corners [mm] of the box around the surfaces of shapes; zeros if they are empty."""
     while len(shapes) == 1 and shapes[0].ShapeType() not in _BARE:
         shapes = list(inside(shapes[0]))
     about = [(shape, _boxed(shape, BRepBndLib.Add_s)) for shape in shapes]
@@ -356,12 +358,12 @@ def _corners(corners: Any) -> Box:
 
 
 def xyz(point: Any) -> tuple[float, float, float]:
-    """Return a kernel point or vector as numbers."""
+    """Return the coordinates of a kernel point or vector."""
     return point.X(), point.Y(), point.Z()
 
 
 def trsf_matrix(trsf: Any) -> Floats:
-    """Return a kernel transformation as (4, 4), lengths in mm as the kernel has them."""
+    """Return a kernel transformation as (4, 4), with lengths in mm as the kernel has them."""
     value = trsf.Value
     rows = [[value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)]
     return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])

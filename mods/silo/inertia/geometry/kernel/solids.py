@@ -143,7 +143,7 @@ PLAIN_ERROR = 1e-12
 
 
 def solid_moments(solid: Any, eps: float, notes: list[Note]) -> Moments:
-    """Return the volume, centre and tensor of a solid near its own origin, in mm.
+    """Measure the volume, centre and tensor of a solid near its own origin, in mm.
 
     ``eps`` is relative to the volume.
     """
@@ -161,8 +161,8 @@ def solid_moments(solid: Any, eps: float, notes: list[Note]) -> Moments:
         ours = moments(solid, abs(kernel.volume), eps)
     if ours is None:
         return kernel
-    # An open or torn shell has no volume that both could agree on; then the doubt stays the kernel's.
-    # Where faces close, it is the kernel that may be that far off: closed splines drawn along a line.
+    # The two cannot agree on the volume of an open or torn shell; then the kernel's doubt stays.
+    # If the faces close, the kernel may be that far off: for closed splines drawn along a line.
     apart = abs(ours.volume - kernel.volume) / abs(kernel.volume)
     if ours.error > CONVERGED or (apart > MESH_TOLERANCE and ours.drift > STATED):
         return ours if ours.error < kernel.error and apart <= MESH_TOLERANCE else kernel
@@ -176,14 +176,14 @@ def solid_moments(solid: Any, eps: float, notes: list[Note]) -> Moments:
 
 
 def by_kernel(solid: Any, eps: float) -> Moments:
-    """Return the kernel's integration with a tolerance, relative to the volume."""
+    """Let the kernel integrate a solid with the tolerance ``eps``, relative to the volume."""
     system = GProp_GProps()
     error = float(BRepGProp.VolumeProperties_s(solid, system, eps, False, False))
     return _moments_of(system, error)
 
 
 def _usual(solid: Any) -> Moments:
-    """Return the kernel's integration without any control."""
+    """Let the kernel integrate a solid without any tolerance."""
     system = GProp_GProps()
     BRepGProp.VolumeProperties_s(solid, system)
     return _moments_of(system, PLAIN_ERROR)
@@ -196,7 +196,7 @@ def _moments_of(system: Any, error: float) -> Moments:
 
 
 def _difference(own: Moments, other: Moments) -> float:
-    """Return the difference of volumes and tensors, relative to the latter."""
+    """Return the larger relative difference of volumes and of tensors."""
     tensor = float(np.abs(own.inertia - other.inertia).max() / max(np.abs(other.inertia).max(), 1e-300))
     return max(abs(own.volume / other.volume - 1), tensor)
 
@@ -212,7 +212,7 @@ _ROUND = (GeomAbs_Circle, GeomAbs_Ellipse)
 
 
 def moments(solid: Any, volume: float, eps: float) -> Moments:
-    """Return the moments of a solid in mm; ``volume`` is a rough one, not 0."""
+    """Integrate the moments of a solid in mm; ``volume`` is an estimate, not 0."""
     centre, size = box(solid)
     faces = [_face(face) for face in occt.faces_of(solid)]
     return integrate(faces, centre=centre, size=max(size / 2, 1e-9), volume=volume, eps=eps)
@@ -223,7 +223,7 @@ def _face(face: Any) -> Face:
 
 
 def _edges(face: Any) -> Iterator[Any]:
-    """Return the edges with the face's own orientation; a seam twice, as it stands in the wire."""
+    """Yield the edges with the face's own orientation; a seam twice, as the wire has it."""
     for wire in occt.inside(face):
         if wire.ShapeType() == TopAbs_WIRE:
             for edge in occt.inside(wire):
@@ -257,13 +257,13 @@ def _curve(face: Any, edge: Any) -> Curve:
 
 
 def _fitted(asked: Callable[[Floats], Floats], basis: Basis) -> Callable[[Floats], Floats]:
-    """Return a line, circle or ellipse, from a few of its points."""
+    """Find the line, circle or ellipse through a few of its points."""
     coefficients = np.linalg.solve(basis.at(basis.samples), asked(basis.samples))
     return lambda t: basis.at(t) @ coefficients
 
 
 def _surface(face: Any) -> Surface:
-    """Return the quickest form of the face's surface that is the same surface."""
+    """Find the form of the face's surface that is the same surface and quickest to evaluate."""
     adaptor = BRepAdaptor_Surface(face, True)
     kind = adaptor.GetType()
     u_range = (adaptor.FirstUParameter(), adaptor.LastUParameter())
@@ -354,7 +354,7 @@ class KernelCommon:
         self._spent = 0.0
 
     def __call__(self, body: Body, other: Body) -> SolidProps | None:
-        """Return the moments of what both have in common; None if that is not known."""
+        """Return the moments of what both have in common; None if they cannot be found."""
         if body.mesh is not None and other.mesh is not None:
             solid_props = _by_distance(body, other, body.mesh, other.mesh)
             if solid_props is not None:
@@ -376,7 +376,9 @@ class KernelCommon:
 
 
 def _by_distance(body: Body, other: Body, mesh: Mesh, small: Mesh) -> SolidProps | None:
-    """Return nothing, or all of the smaller body, if the surfaces do not come near each other; else None."""
+    """Return nothing, or the whole smaller body, if the surfaces do not come near each other; otherwise
+    None.
+    """
     margin = 0.02 * max(float(np.linalg.norm(mesh.extents)), float(np.linalg.norm(small.extents)))
     low, high = np.maximum(body.low, other.low) - margin, np.minimum(body.high, other.high) + margin
     here, there = _within(mesh, low, high), _within(small, low, high)
@@ -388,7 +390,7 @@ def _by_distance(body: Body, other: Body, mesh: Mesh, small: Mesh) -> SolidProps
 
 
 def _within(mesh: Mesh, low: Floats, high: Floats) -> np.ndarray:
-    """Return (n,) bool: triangles whose boxes reach into the box."""
+    """Return (n,) bool: True for triangles whose boxes reach into the box."""
     corners = mesh.vertices[mesh.faces]
     inside: np.ndarray = ((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)).all(axis=1)
     return inside
@@ -417,14 +419,14 @@ MOST_FACES_LOOSE = 20_000
 
 
 def open_edges_of(solid: Any) -> int | None:
-    """Return how many edges of a solid are open, 0 if only its faces disagree; None if its faces close."""
+    """Count the open edges of a solid; 0 if only its faces disagree, None if it is closed."""
     if _is_closed(solid):
         return None
     middle, size = box(solid)
     sewing = _sewn(occt.faces_of(solid), MEETING * size)
     edges = sewing.NbFreeEdges() + sewing.NbMultipleEdges() if sewing is not None else 0
     if sewing is not None and not edges:
-        # Closed anyway; but faces that disagreed on what is outside were turned for it.
+        # It is closed; but faces that disagreed on what is outside were turned over.
         sewn = abs(_flux(sewing.SewedShape(), middle))
         if abs(sewn - abs(_flux(solid, middle))) <= CONVERGED * sewn:
             return None
@@ -432,11 +434,11 @@ def open_edges_of(solid: Any) -> int | None:
 
 
 def beside_edges(solid: Any, volume: float) -> float:
-    """Return how much of ``volume`` [mm^3] may lie between faces and their own edges, relative; 0 where
-    they meet.
+    """Estimate how much of ``volume`` [mm^3] lies between faces and their own edges, relative; 0 if they
+    meet.
 
-    A file may say that a face lies where its edges are not. The kernel then widens the edges' tolerances
-    until both agree, and finds the shape valid. So only wide edges are looked at.
+    In a file, a face may be at another place than its edges. The kernel then widens the edges' tolerances
+    until both agree, and finds the shape valid. So only wide edges are checked.
     """
     least = STATED * abs(volume) / max(box(solid)[1], 1e-9) ** 2
     beside = 0.0
@@ -453,10 +455,10 @@ def beside_edges(solid: Any, volume: float) -> float:
 
 
 def _gap_and_length(edge: Any, face: Any) -> tuple[float, float]:
-    """Return the mean distance [mm] of an edge's curve in the face from its curve in space, and its rough
+    """Return the mean distance [mm] between an edge's curve in the face and in space, and its approximate
     length.
 
-    Distance across the curve: points that lag behind along it open no gap.
+    It is the distance across the curve: points that are only shifted along it make no gap.
     """
     if BRep_Tool.Degenerated_s(edge):
         return 0.0, 0.0
@@ -478,7 +480,7 @@ def _gap_and_length(edge: Any, face: Any) -> tuple[float, float]:
 
 
 def closed_shells(shapes: list[Any]) -> tuple[list[Any], list[Any]]:
-    """Return the surfaces of ``shapes`` in no solid: those that close, as solids, and the others."""
+    """Divide the surfaces of ``shapes`` in no solid into closed ones, made into solids, and the others."""
     closed: list[Any] = []
     left: list[Any] = []
     for shape in shapes:
@@ -501,7 +503,7 @@ def closed_shells(shapes: list[Any]) -> tuple[list[Any], list[Any]]:
 def _is_closed(shape: Any) -> bool:
     """Judge by the edges that its faces share; a sphere's pole and a cylinder's seam are no open edges.
 
-    Faces that hold triangles only (tessellated STEP) have no edges; their triangles do.
+    Faces with nothing but triangles (tessellated STEP) have no edges; their triangles have.
     """
     if not all(occt.has_surface(face) for face in occt.faces_of(shape)):
         mesh, missing = triangles(shape)
@@ -526,7 +528,7 @@ def _solid(shell: Any) -> Any:
 
 
 def _flux(shape: Any, point: Floats) -> float:
-    """Return the volume [mm^3] as it is seen from ``point`` ((3,) [mm]), by the kernel's usual integration.
+    """Integrate the volume [mm^3] as it is seen from ``point`` ((3,) [mm]), with the kernel's usual rule.
 
     The kernel's own sum for a shape is taken from a point of its own choice.
     """
@@ -546,9 +548,9 @@ NEAR = 50.0
 
 
 def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
-    """Return all solids of ``shapes``, in their common axes.
+    """Measure all solids of ``shapes``, in their common axes.
 
-    Shells that close count as solids, with a word.
+    Closed shells count as solids, with a note.
     """
     problems: list[Note] = []
     bodies: list[Body] = []
@@ -591,7 +593,7 @@ class _Picture:
 
     @classmethod
     def of(cls, shapes: list[Any], solids: int) -> _Picture:
-        """Allow each solid four times its share, for most need less."""
+        """Allow each solid four times its share, since most need less."""
         share = 4 * PICTURE_TRIANGLES // max(solids, 1)
         return cls(max((box(shape)[1] for shape in shapes), default=0.0), max(share, 500))
 
@@ -629,7 +631,7 @@ def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _M
 
 
 def _placed(bare: _MeasuredSolid, solid: Any) -> list[Body]:
-    """Return the solid where it stands, with our own algebra; empty if it has no volume."""
+    """Move a measured solid to its place, by our own calculation; [] if it has no volume."""
     if bare.props is None:
         return []
     props, mesh = bare.props, bare.mesh
@@ -670,8 +672,8 @@ def _rebuilt(shape: Any, offset: Floats) -> Any:
 
 
 def _triangulated_solid(solid: Any, notes: list[Note]) -> tuple[SolidProps | None, Mesh | None]:
-    """Return a solid whose faces are triangles without surfaces (AP242 tessellated), judged as a mesh file
-    is.
+    """Measure a solid whose faces are triangles without surfaces (AP242 tessellated), as a mesh file is
+    measured.
     """
     mesh, missing = triangles(solid)
     if missing or not len(mesh):
@@ -696,7 +698,7 @@ def _checked_mesh(solid: Any, props: SolidProps | None, picture: _Picture, notes
 
 
 def load_shape(path: Path, named: str) -> Any:
-    """Return the shape in a file, text or binary. ``named`` is what a DocumentError calls it."""
+    """Read the shape in a file, text or binary. A DocumentError calls the file ``named``."""
     shape = TopoDS_Shape()
     if is_binary_brep(path):
         done = BinTools.Read_s(shape, str(path))
@@ -708,7 +710,7 @@ def load_shape(path: Path, named: str) -> Any:
 
 
 def read_brep(path: Path, options: ReadOptions, report: Report) -> GeometryReading:
-    """Return one part from a .brep file, in mm as the kernel writes them. Raises DocumentError."""
+    """Read a .brep file as one part, in mm as the kernel writes them. Raises DocumentError."""
     report("reading", 0, 0)
     shape = load_shape(path, str(path))
     report("measuring", 1, 1)
@@ -725,10 +727,10 @@ def measure_all(
     helpers: Helpers,
     done: Callable[[int, int], Any],
 ) -> list[Measured]:
-    """Return what is measured of each product's shapes, here and by the helpers that run.
+    """Measure the shapes of each product, here and in the running helpers.
 
-    Always from their stored form: its placements differ from the kernel's own in the last bit, and the
-    numbers must not depend on which process measures.
+    All are measured from their stored form, whose placements differ from the kernel's own in the last bit:
+    the numbers must not depend on the process that measures.
     """
     numbers = count()
 
