@@ -46,7 +46,7 @@ class State(StrEnum):
 
 
 def new_key() -> str:
-    """Return a name for a commit."""
+    """Make a key for a commit."""
     return str(uuid4())
 
 
@@ -140,12 +140,12 @@ class InFile:
     user: str = ""
 
     def to_json(self) -> str:
-        """Return it as text, for :attr:`Commit.document`."""
+        """Write it as text, for :attr:`Commit.document`."""
         return json.dumps([[list(item) for item in self.items], self.own, self.user])
 
     @classmethod
     def of(cls, text: str) -> InFile:
-        """Return what :meth:`to_json` wrote; nothing for ""."""
+        """Read what :meth:`to_json` wrote; nothing for ""."""
         items, own, user = json.loads(text) if text else ((), False, "")
         return cls(tuple((str(identity), str(name)) for identity, name in items), bool(own), str(user))
 
@@ -195,12 +195,12 @@ class Entry(Said):
 
     @property
     def item(self) -> str:
-        """Return what orders entries: those of one item go one after another."""
+        """Return the key of the item by which entries are ordered: those of one item go one after another."""
         return (self.identity or self.part_number).casefold()
 
     @property
     def keys(self) -> set[str]:
-        """Return the names of its item."""
+        """Return all names of the entry's item, case-folded."""
         return {self.item, self.part_number.casefold()} - {""}
 
     @property
@@ -209,7 +209,7 @@ class Entry(Said):
         return bool(self.copy)
 
     def is_away(self, here: str) -> bool:
-        """Return True if it is meant for another server than the one in use; ``here`` may be ""."""
+        """Return True if the entry is meant for another server than the one in use; ``here`` may be ""."""
         return bool(here) and self.server not in ("", here)
 
 
@@ -279,7 +279,7 @@ CREATE TABLE known (
 );
 """
 
-# All but what may be large.
+# All columns but those that may be large.
 _COLUMNS = ", ".join(field.name for field in fields(Entry) if field.name != "superseded")
 SELECT = f"""SELECT {_COLUMNS}, EXISTS (
     SELECT 1 FROM sent s WHERE s.server = e.server AND s.item IN (e.identity, e.part_number) AND s.item <> ''
@@ -290,7 +290,7 @@ _FLAGS = ("file_left", "bom_left", "allow_missing", "superseded")
 
 
 def entry_of(row: sqlite3.Row) -> Entry:
-    """Return what a row of :data:`SELECT` says."""
+    """Make an entry from a row of :data:`SELECT`."""
     values = dict(row)
     values["state"] = State(values["state"])
     values["newer"] = json.loads(values["newer"]) if values["newer"] else {}
@@ -298,9 +298,7 @@ def entry_of(row: sqlite3.Row) -> Entry:
 
 
 def on_top(comment: str, newer: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a commit says that a person sends on top of a revision that they saw: the fields of a
-    commit.
-    """
+    """Return the fields of a commit that a person sends on top of a newer revision that they saw."""
     number = newer["revision_number"]
     if not newer.get("set_back"):  # a server that was set back has nothing of a colleague
         who = f" by {newer['created_by']}" if newer.get("created_by") else ""
@@ -318,8 +316,8 @@ class Words:
 
 
 def words(entry: Entry, here: str, *, is_paused: bool, translate: Translate = english) -> Words:
-    """Return how an entry stands, for the pane and the command line. ``here``: the address in use, "" for
-    none.
+    """Say in words how an entry stands, for the pane and the command line. ``here``: the address in use, ""
+    for none.
     """
     reason, urgent = entry.reason, entry.state is State.HELD or entry.is_away(here)
     if entry.is_away(here):
@@ -342,14 +340,14 @@ def words(entry: Entry, here: str, *, is_paused: bool, translate: Translate = en
 
 
 def parts(entry: Entry, translate: Translate = english) -> str:
-    """Return what of an entry is not in Silo yet."""
+    """Say which part of an entry is not in Silo yet."""
     if entry.file_left and entry.bom_left:
         return translate("Silo", "file and BOM")
     return translate("Silo", "BOM") if entry.bom_left else translate("Silo", "file")
 
 
 def pause_text(pause: Pause, server: str, now: float, translate: Translate = english) -> str:
-    """Return why nothing is sent to a server now, and until when."""
+    """Say why nothing is sent to a server now, and until when."""
     text = translate("Silo", "Nothing is sent to {host} before you retry: {reason}")
     if not math.isinf(left := pause.left(now)):
         text = translate("Silo", "Nothing is sent to {host} for {time}: {reason}")
@@ -359,5 +357,5 @@ def pause_text(pause: Pause, server: str, now: float, translate: Translate = eng
 
 
 def host_of(address: str) -> str:
-    """Return an address as people read it."""
+    """Return the host of an address, for people."""
     return urlsplit(address).netloc or address

@@ -102,7 +102,7 @@ class Sent:
 
     @property
     def page(self) -> str:
-        """Return where a person looks at it on the server."""
+        """Return the address of the page for it on the server."""
         return f"/items/{self.number}/bom" if self.number else f"/documents/{self.part_number}"
 
 
@@ -129,7 +129,7 @@ class Report:
 
 
 def went_alone(entry: Entry) -> list[str]:
-    """Say which half of a commit with file and BOM the server has, where the other one was refused."""
+    """Say which half of a commit with file and BOM the server has, if it refused the other half."""
     if not entry.has_file or entry.file_left == entry.bom_left:
         return []
     there, left = ("BOM", "file") if entry.file_left else ("file", "BOM")
@@ -152,8 +152,9 @@ def send_all(
 ) -> Report:
     """Send what waits for this client's server, oldest first, in order per item; nothing in a pause.
 
-    Never raises for what the server or the network does: the report says it. An error of all is a pause of
-    the server and touches no entry; an error in passing of one item is a pause of that item.
+    Never raises for an error of the server or the network; the report has it. An error that concerns all
+    entries is a pause of the server and changes no entry; a passing error of one item is a pause of that
+    item.
 
     force
         end all pauses of this server first: a person pressed the button.
@@ -274,7 +275,9 @@ class _SendRun:
             self._later(entry, error, str(error))
 
     def _later(self, entry: Entry, error: SiloError, reason: str) -> None:
-        """Let an entry that failed alone, in passing, wait with its reason; later ones of its item too."""
+        """Let an entry that failed alone, for a while, wait with its reason; later entries of its item wait
+        too.
+        """
         self._pause(error, entry.item)
         self.store.update(entry.id, reason=reason)
         now = self.store.entry(entry.id) or entry
@@ -292,9 +295,9 @@ class _SendRun:
     # -- one entry --------------------------------------------------------------------------------------
 
     def _send(self, entry: Entry, refused: list[SiloError]) -> Sent | None:
-        """Bring an entry to the server; None where it must wait for an older one of the same item.
+        """Bring an entry to the server; None if it must wait for an older one of the same item.
 
-        A file that is refused does not keep the BOM, nor the other way round: both say why in ``refused``.
+        If the file is refused, the BOM is sent anyway, and the other way round; ``refused`` has the reasons.
         """
         extraction, request = self.store.bom(entry.id)
         resolved = self._resolved(entry, extraction) if extraction and entry.bom_left else None
@@ -342,8 +345,8 @@ class _SendRun:
         return summary
 
     def _is_there(self, entry: Entry) -> bool:
-        """Return False if a file that was sent is gone, and its BOM would go alone: the server was
-        restored.
+        """Return False if the server no longer has a file that was sent, so that its BOM would go alone: it
+        was restored.
         """
         try:
             revisions = self.client.revisions(entry.part_number)
@@ -354,7 +357,7 @@ class _SendRun:
         return is_there(revisions, entry.file_name, entry.sha256, entry.revision)
 
     def _again(self, entry: Entry) -> Entry:
-        """Send the file once more; what was seen of the server may no longer be true."""
+        """Send the file once more, since what was seen of the server may no longer be true."""
         again: dict[str, Any] = {"file_left": True, "base_revision": None, "revision": None}
         self.store.update(entry.id, **again)
         return replace(entry, **again)
@@ -366,7 +369,7 @@ class _SendRun:
             raise InputError(f"{entry.label}: its BOM cannot be read any more; commit it again") from error
 
     def _number(self, entry: Entry) -> str:
-        """Return the item or document that the file goes to; "" for an attachment of the assembly that needs
+        """Find the item or document to which the file goes; "" for an attachment of the assembly that needs
         it.
         """
         within = InFile.of(entry.document)
@@ -426,7 +429,7 @@ class _SendRun:
             revisions = self._revisions(sent.part_number)
             self._check_name(entry, revisions)
             base = self._base(entry, revisions)
-            # What the server had before us. Without this note, a file that equals an older revision could
+            # Note what the server had before us. Otherwise, a file that equals an older revision could
             # not be distinguished from our own that had already arrived.
             self.store.update(entry.id, base_revision=newest_number(revisions))
         else:
@@ -450,8 +453,9 @@ class _SendRun:
         return replace(entry, revision=number)
 
     def _base(self, entry: Entry, revisions: Sequence[Revision]) -> int | None:
-        """Return the revision that the file was made from; None if nobody asks. NewerRevisionError if sending
-        it would undo a colleague's; the server looks again, for somebody may commit before the upload.
+        """Return the revision from which the file was made; None if nothing is to be checked. Raises
+        NewerRevisionError if sending it would undo a colleague's; the server checks again, since somebody may
+        commit before the upload.
         """
         if not entry.origin:
             return None
@@ -461,8 +465,9 @@ class _SendRun:
         return max(stands.base_number, 0)
 
     def _check_set_back(self, entry: Entry, stands: Standing) -> None:
-        """Say so where the server has lost the revision that the file was made from, and its newest one is an
-        older one that is known here: nothing of a colleague would be undone."""
+        """Raise NewerRevisionError if the server has lost the revision from which the file was made, and its
+        newest revision is an older one that is known here. Nothing of a colleague would be undone.
+        """
         newest, made_from = stands.newer, entry.origin
         if newest is None or not checksum_of(newest):
             return
@@ -513,7 +518,7 @@ class _SendRun:
             raise self._unreadable(entry, error.strerror or str(error)) from error
 
     def _unreadable(self, entry: Entry, reason: str) -> _PassingError:
-        # This is the disk, and not damage: the hash of a damaged copy differs.
+        # This is an error of the disk, not damage: the hash of a damaged copy differs.
         text = f"the copy kept for sending cannot be read ({reason})"
         return _PassingError(f"{entry.path or entry.file_name}: {text}")
 
@@ -535,7 +540,8 @@ class _SendRun:
     def _check_name(self, entry: Entry, revisions: Sequence[Revision]) -> None:
         """Refuse a file that has another name than the item's: "Save As" copies the identity along.
 
-        Sent unasked, the copy would become the newest revision of the part that it was made from.
+        If it were sent without a question, the copy would become the newest revision of the part from which
+        it was made.
         """
         before = other_name(entry.file_name, revisions) if entry.identity else ""
         if before and entry.renamed != SAME_PART:
@@ -565,7 +571,7 @@ class _SendRun:
             if before is not None and before != wanted.document:
                 # It was sent so; the server knows that name with another content.
                 wanted = wanted.model_copy(update={"sync_id": new_key()})
-            # As it is sent now it is sent again: the server knows a merge by its sync_id and its content.
+            # A repeat must be the same as now: the server knows a merge by its sync_id and its content.
             self.store.update(entry.id, request=wanted.model_dump_json(by_alias=True, exclude_none=True))
             result = self.client.merge_bom(sent.part_number, wanted, cancelled=self.cancelled)
         except NewerRevisionError as error:
@@ -586,7 +592,7 @@ class _SendRun:
         return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
 
     def _at_revision(self, entry: Entry) -> Entry:
-        """Return an entry without a file, with the revision that its document is or was made from."""
+        """Give an entry without a file the revision that its document is, or was made from."""
         if entry.has_file or not entry.origin or entry.revision is not None:
             return entry
         revisions = self._revisions(entry.part_number)
@@ -599,7 +605,7 @@ class _SendRun:
         )
 
     def _named(self, entry: Entry, request: str) -> MergeRequest:
-        """Return the request with its name and its document, where it does not have them yet."""
+        """Give the request a name and a document, if it has none yet."""
         try:
             wanted = MergeRequest.model_validate_json(request)
         except ValidationError as error:
@@ -615,12 +621,12 @@ class _SendRun:
 
 
 def _refuse(error: SiloError, refused: list[SiloError], *, alone: bool) -> None:
-    """Note an error that concerns one half of a commit ``alone``; any other ends the entry's turn."""
+    """Note an error that concerns only one half of a commit; any other error ends the entry's turn."""
     if not alone or isinstance(error, _PassingError | OutboxError | CancelledError):
         raise error
     refused.append(error)
 
 
 def _waits(error: SiloError) -> bool:
-    """Return True for the refusal of one half that may be over by itself."""
+    """Return True if the refusal of one half may end by itself."""
     return isinstance(error, ReadOnlyError) or judge(error, lambda: None).then is Then.RETRY

@@ -90,7 +90,7 @@ class QueueDatabase:
         self.clock = clock
         self.copies = path.parent / f"{path.stem}-files"
         self._kept_aside = path.parent / "kept-aside"
-        self.closed = ""  # why nothing can be written there, where reading found that
+        self.closed = ""  # why nothing can be written there, if reading found that
         self._lock = threading.Lock()
         self._is_ready = False
 
@@ -103,7 +103,7 @@ class QueueDatabase:
 
     @contextmanager
     def send_lock(self) -> Iterator[bool]:
-        """Yield True to the one process and thread that may send now; the lock ends with its process."""
+        """Yield True in the one process and thread that may send now. The lock ends with its process."""
         self._make_ready()
         with self._translated():
             lock = hold_lock(self.path.with_suffix(".lock"))
@@ -112,7 +112,7 @@ class QueueDatabase:
 
     @contextmanager
     def _open(self) -> Iterator[sqlite3.Connection]:
-        """Open the database to read it: a copy of it in a folder that takes nothing."""
+        """Open the database for reading; or a copy of it, if its folder cannot be written."""
         with self._translated(), ExitStack() as stack:
             try:
                 self._make_ready()
@@ -153,7 +153,7 @@ class QueueDatabase:
             ) from error
 
     def _make_ready(self) -> None:
-        """Make folders and file when they are first needed: not where FreeCAD has only just started."""
+        """Make folders and file when they are first needed, so not when FreeCAD has only just started."""
         with self._lock:
             if not self._is_ready:
                 self._prepare()
@@ -208,7 +208,9 @@ class QueueDatabase:
                 return False
 
     def _make_anew(self) -> None:
-        """Make the database from the descriptions and what can be read of the old file, which is kept."""
+        """Make the database again from the descriptions and from what can be read of the old file, which is
+        kept.
+        """
         old = {name: self._readable(name) for name in _TABLE_NAMES}
         for end in ("", "-wal", "-shm"):
             file = self.path.with_name(self.path.name + end)
@@ -226,16 +228,14 @@ class QueueDatabase:
                 db.execute(f"PRAGMA user_version = {VERSION}")
 
     def _readable(self, table: str) -> list[dict[str, Any]]:
-        result: list[dict[str, Any]] = []
+        rows: list[dict[str, Any]] = []
         with suppress(sqlite3.DatabaseError), closing(self._connect()) as db:
             for row in db.execute(f"SELECT * FROM {table}"):  # noqa: S608
-                result.append(dict(row))  # what comes before the damage counts
-        return result
+                rows.append(dict(row))  # what comes before the damage counts
+        return rows
 
     def aside(self, path: str) -> Path:
-        """Return a new place for a copy of a file; its folder is there. DocumentError if it cannot be
-        made.
-        """
+        """Choose a new place for a copy of a file, and make its folder. DocumentError if that fails."""
         folder = self._kept_aside / time.strftime("%Y-%m-%d")
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -249,13 +249,13 @@ class QueueDatabase:
         return self.copies / f"{key}.json"
 
     def _describe(self, db: sqlite3.Connection, key: str) -> None:
-        """Write a row beside its copy; called before the transaction ends."""
+        """Write the description of a row beside its copy; called before the transaction ends."""
         for row in db.execute("SELECT * FROM entry WHERE key = ?", (key,)):  # none: discarded meanwhile
             with replacing(self._described(key)) as file:
                 file.write(json.dumps(dict(row)).encode())
 
     def _end(self, db: sqlite3.Connection, entry: Entry) -> None:
-        """Forget a commit; its files go once the transaction is on disk."""
+        """Forget a commit; its files are removed after the transaction is on disk."""
         db.execute("DELETE FROM entry WHERE id = ?", (entry.id,))
         with suppress(FileNotFoundError):
             replace_patiently(self._described(entry.key), self.copies / f"{entry.key}.gone")
@@ -264,10 +264,10 @@ class QueueDatabase:
     def _reconcile(
         self, db: sqlite3.Connection, old: Mapping[str, Iterable[Mapping[str, Any]]] | None = None
     ) -> None:
-        """Make rows and descriptions agree: what a crash or a lost database has left out is made.
+        """Make rows and descriptions agree: add what a crash or a lost database has left out.
 
         old
-            table → rows of a database that is given up; a description is newer than a row.
+            table → rows of a database that is no longer used; a description is newer than a row.
         """
         names = sorted(name for name in os.listdir(self.copies) if not name.startswith("."))
         gone = {_key_of(name) for name in names if name.endswith(".gone")}
@@ -306,7 +306,7 @@ def _keys(db: sqlite3.Connection) -> set[str]:
 
 
 def _insert(db: sqlite3.Connection, table: str, values: Mapping[str, Any]) -> None:
-    """Insert what this format knows of a row, unless it is there."""
+    """Insert those fields of a row that this format knows, unless the row is there."""
     columns = {str(row["name"]) for row in db.execute(f"PRAGMA table_info({table})")}
     row = {name: value for name, value in values.items() if name in columns}
     if "id" in row and db.execute("SELECT 1 FROM entry WHERE id = ?", (row["id"],)).fetchone():
@@ -321,10 +321,10 @@ class FileOrigins(QueueDatabase):
     """What files were made from, as far as it is known here."""
 
     def origin_of(self, sha256: str) -> str:
-        """Return the SHA-256 of the committed file that a file with this content was made from, as far as is
-        known here; the content itself where it was never saved over.
+        """Return the SHA-256 of the committed file from which a file with this content was made, if that is
+        known here; the content's own hash if it was never saved over.
 
-        A file that was saved first and committed then is a committed one itself, also while it waits.
+        A file that was saved first and committed later is a committed file itself, even while it waits.
         """
         with self._open() as db:
             row = db.execute(
@@ -344,9 +344,7 @@ class FileOrigins(QueueDatabase):
             db.execute("DELETE FROM derived WHERE at < ?", (self.clock() - _REMEMBERED,))
 
     def known_revision(self, server: str, sha256: str, item: str) -> int | None:
-        """Return the revision that a file is, for servers that keep no checksums; None if that is not
-        known.
-        """
+        """Return the revision that a file is, for servers that keep no checksums; None if it is not known."""
         with self._open() as db:
             row = db.execute(
                 "SELECT revision FROM known WHERE server = ? AND sha256 = ? AND item = ?",
@@ -363,7 +361,7 @@ class FileOrigins(QueueDatabase):
             db.execute("INSERT OR REPLACE INTO known VALUES (?, ?, ?, ?)", row)
 
     def forget_aside(self) -> None:
-        """Remove the copies of the days that are over :data:`KEPT_ASIDE_DAYS` ago; nothing else in there.
+        """Remove the copies of days before :data:`KEPT_ASIDE_DAYS` ago, and nothing else there.
 
         The newest days that have copies stay: the clock may be months ahead.
         """
@@ -376,9 +374,9 @@ class FileOrigins(QueueDatabase):
                     shutil.rmtree(folder, ignore_errors=True)
 
     def keep_aside(self, path: str) -> Path | None:
-        """Keep a copy of a file that is about to be replaced; where it is, None where there is no file.
+        """Keep a copy of a file that is about to be replaced; returns its place, None if there is no file.
 
-        Raises DocumentError where the disk does not take it.
+        Raises DocumentError if it cannot be written.
         """
         target = self.aside(path)
         try:
@@ -403,10 +401,10 @@ def _transaction(db: sqlite3.Connection) -> Iterator[None]:
 
 
 _BLOCK = 1 << 20
-# A second name that no row has is one for which a commit may just be coming.
+# If no row has a second name, its commit may just be on the way.
 _HELD_AGE = 3600.0
 
-# The folder of a second name that is a copy, where the disk has no second names.
+# The folder of a second name that is a copy, if the disk has no second names.
 _COPIED = "copied"
 
 _PAUSE = "until, reason, code, failures, told"
@@ -431,10 +429,10 @@ class Store(FileOrigins):
     # -- a commit comes in ------------------------------------------------------------------------------
 
     def hold(self, path: str, key: str) -> Path | None:
-        """Keep a file's present content, by a second name, which takes no time, else by a copy; None where
-        the disk takes neither.
+        """Keep a file's present content: by a second name, which takes no time, else by a copy. None if the
+        disk can do neither.
 
-        FreeCAD writes a new file at each save and renames it, so the old content lives on under this name.
+        FreeCAD writes a new file at each save and renames it, so the old content stays under this name.
         """
         held = self._held / key / os.path.basename(path)
         try:
@@ -454,7 +452,7 @@ class Store(FileOrigins):
         return held
 
     def _second(self, key: str) -> Path | None:
-        """Return what :meth:`hold` has kept for a commit."""
+        """Return the file that :meth:`hold` has kept for a commit."""
         paths = (path for path in (self._held / key).rglob("*") if path.is_file())
         return next((path for path in paths if not path.name.endswith(".part")), None)
 
@@ -476,7 +474,7 @@ class Store(FileOrigins):
         try:
             with self.transaction() as db:
                 if commit.file is not None:
-                    # What has a second name may be copied by any program, even if this one does not end.
+                    # Any program may copy a file with a second name, even while this one runs.
                     self._coming[commit.key] = None
                     if self._held not in commit.file.parents:
                         self._held.mkdir(mode=0o700, exist_ok=True)
@@ -497,7 +495,9 @@ class Store(FileOrigins):
                 remove_patiently(self._coming_lock(key))
 
     def is_coming(self, key: str) -> bool:
-        """Return True if a living program is about to copy a commit's file: nobody else does it then."""
+        """Return True if a running program is about to copy a commit's file; no other program does it
+        then.
+        """
         if key in self._coming:
             return True
         path = self._coming_lock(key)
@@ -512,12 +512,12 @@ class Store(FileOrigins):
     def finish(self, key: str, source: Path | None = None, origin: str = "") -> str:
         """Make the copy of a staged commit's file, from its second name rather than from ``source``.
 
-        Where the disk does not take it, a commit with a second name stays and is tried again later. One
-        without is forgotten, and DocumentError says so. With an OutboxError the commit stays. A file that
-        was written since the commit is not sent.
+        If the copy cannot be written, a commit with a second name stays and is tried again later. A commit
+        without one is forgotten, and DocumentError says so. After an OutboxError the commit stays. A file
+        that was written since the commit is not sent.
 
         ``origin`` replaces that of the commit: the commit before it may have been copied only now. Returns
-        the file's SHA-256, "" where there is no copy of it.
+        the file's SHA-256, "" if there is no copy of it.
         """
         try:
             self._finish(key, source, origin)
@@ -531,7 +531,7 @@ class Store(FileOrigins):
         if entry is None or not entry.file_left or entry.sha256:
             return
         held, copy = self._second(key), self.copies / entry.copy
-        # A copy that has its name is whole: only its row was not written any more.
+        # A copy that has its final name is complete: only its row was not written.
         content = copy if copy.exists() else held or source
         if content is None:
             text = "its file was not copied in time; commit it again, then discard this"
@@ -570,7 +570,7 @@ class Store(FileOrigins):
         return DocumentError(str(content), f"{reason}; nothing was kept, commit it again")
 
     def add(self, commit: Commit, server: str = "") -> Entry:
-        """Add row and copy at once: both are on disk when it returns."""
+        """Add row and copy; both are on disk when it returns."""
         self.stage(commit, server)
         self.finish(commit.key, commit.file)
         entry = self.by_key(commit.key)
@@ -581,10 +581,10 @@ class Store(FileOrigins):
     # -- what a person decides --------------------------------------------------------------------------
 
     def retry(self, entry_id: int, server: str | None = None) -> None:
-        """Let an entry go again with the next sending; ``server`` sends it there instead (the server moved).
+        """Let an entry be sent with the next run; ``server`` sends it there instead (the server moved).
 
-        For a file of another name than the item's this is a person's word that it is the same part. Raises
-        :class:`ConflictError` where something newer of the same item has arrived since.
+        For a file with another name than the item's, the person confirms that it is the same part. Raises
+        :class:`ConflictError` if something newer of the same item has arrived since.
         """
         entry = self._existing(entry_id)
         if entry.superseded:
@@ -598,11 +598,11 @@ class Store(FileOrigins):
         if entry.newer:
             changed |= {"newer": "", **on_top(entry.comment, entry.newer)}
         if server is not None and canonical(server) != entry.server:
-            # What was seen of the old server says nothing of the new one.
+            # What was seen of the old server is not true of the new one.
             changed |= {"server": canonical(server), "base_revision": None, "on_top_of": ""}
             changed |= {"revision": None, "comment": entry.comment}
         if self.bom(entry_id)[0]:
-            # What was refused is made again: the missing part may have its number now.
+            # A refused request is made again, since the missing part may have its number now.
             changed["request"] = ""
         self.update(entry_id, **changed)
         self.set_pause(changed.get("server", entry.server), None, entry.item)
@@ -622,7 +622,7 @@ class Store(FileOrigins):
         self._drop_files(entry)
 
     def save_copy(self, entry_id: int, target: Path) -> None:
-        """Write an entry's file somewhere else, as it is, also where it is damaged."""
+        """Write an entry's file to another place, as it is, even if it is damaged."""
         entry = self._existing(entry_id)
         held = self._second(entry.key)
         try:
@@ -634,7 +634,7 @@ class Store(FileOrigins):
     # -- pauses -----------------------------------------------------------------------------------------
 
     def pause(self, server: str, item: str = "") -> Pause | None:
-        """Return the last pause of a server, or of one item there; None if all went well since."""
+        """Return the last pause of a server, or of one item there; None if all went well since then."""
         where = (canonical(server), item)
         with self._open() as db:
             row = db.execute(f"SELECT {_PAUSE} FROM pause WHERE server = ? AND item = ?", where).fetchone()  # noqa: S608
@@ -650,7 +650,7 @@ class Store(FileOrigins):
                 db.execute(f"INSERT INTO pause (server, item, {_PAUSE}) VALUES (?, ?, ?, ?, ?, ?, ?)", row)  # noqa: S608
 
     def resume(self, server: str, *, told: bool = True) -> None:
-        """End all pauses of a server; ``told``: also those that the server named."""
+        """End all pauses of a server; ``told``: also those that the server asked for."""
         with self.transaction() as db:
             db.execute("DELETE FROM pause WHERE server = ? AND told <= ?", (canonical(server), told))
 
@@ -662,20 +662,22 @@ class Store(FileOrigins):
             return tuple(entry_of(row) for row in db.execute(f"{SELECT} ORDER BY e.id"))
 
     def entry(self, entry_id: int) -> Entry | None:
-        """Return one entry, None if it is gone."""
+        """Return one entry; None if it is gone."""
         return self._entry_where("e.id = ?", entry_id)
 
     def by_key(self, key: str) -> Entry | None:
-        """Return the entry of a commit, None if it is gone."""
+        """Return the entry of a commit; None if it is gone."""
         return self._entry_where("e.key = ?", key)
 
     def next_due(self, server: str, after: int) -> Entry | None:
-        """Return the oldest entry for a server that is newer than ``after`` and no person has to look at."""
+        """Return the oldest entry after ``after`` that may be sent to a server without a decision of a
+        person.
+        """
         where = "e.state <> 'held' AND e.server IN ('', ?) AND e.id > ? ORDER BY e.id LIMIT 1"
         return self._entry_where(where, canonical(server), after)
 
     def bom(self, entry_id: int) -> tuple[str, str]:
-        """Return extraction and merge request of an entry, as JSON; "" if there is none."""
+        """Return the extraction and the merge request of an entry, as JSON; "" if there is none."""
         with self._open() as db:
             row = db.execute("SELECT extraction, request FROM entry WHERE id = ?", (entry_id,)).fetchone()
         return (str(row[0]), str(row[1])) if row else ("", "")
@@ -697,12 +699,12 @@ class Store(FileOrigins):
         base: int | None = None,
         note: bool = True,
     ) -> None:
-        """Note that the server has its file or its BOM. An entry of which nothing is left is removed, with
-        its copy; until then a server that is restored from a backup may need the copy once more.
+        """Note that the server has an entry's file or its BOM. If nothing remains to be sent, the entry is
+        removed with its copy; until then, a server that is restored from a backup may need the copy again.
 
         base
-            the revision that the file was made from. A BOM of that one which a person still has to look at
-            may be sent although its file is no longer the newest: all that is newer comes from here.
+            the revision that the file was made from. A BOM of that revision that still waits for a person may
+            be sent although its file is no longer the newest, because everything newer comes from here.
         note
             False: it was not sent, and makes nothing older out of date.
         """
@@ -734,8 +736,8 @@ class Store(FileOrigins):
     # -- copies -----------------------------------------------------------------------------------------
 
     def verified(self, entry: Entry) -> Path:
-        """Return the copy, after its hash was looked at. InputError if it is damaged, OSError if it cannot be
-        read.
+        """Check the hash of the copy, and return its path. InputError if it is damaged, OSError if it cannot
+        be read.
         """
         path = self.copies / entry.copy
         if content_hash(path) != entry.sha256:
@@ -746,7 +748,7 @@ class Store(FileOrigins):
         return path
 
     def sweep(self) -> None:
-        """Make rows and descriptions agree, and remove what ended and what was kept aside long ago."""
+        """Make rows and descriptions agree, and remove what has ended or was kept aside long ago."""
         with self.transaction() as db:
             self._reconcile(db)
             keys = _keys(db)
@@ -778,7 +780,7 @@ class Store(FileOrigins):
         return digest.hexdigest(), size
 
     def _drop_files(self, entry: Entry) -> None:
-        """Remove what the row had; what cannot be removed now is swept up later."""
+        """Remove the files of a row; those that cannot be removed now are swept up later."""
         self._drop(entry.key)
         shutil.rmtree(self._held / entry.key, ignore_errors=True)
 
@@ -802,7 +804,7 @@ class Store(FileOrigins):
 
 
 def _place(copy: Path, path: str) -> dict[str, str]:
-    """Return where the file is and what it links to; nothing where it is not a FreeCAD file."""
+    """Find the file's place and its links; {} if it is not a FreeCAD file."""
     if not path:
         return {}
     from silo.fcstd.linked import place_of
@@ -815,11 +817,13 @@ def _place(copy: Path, path: str) -> dict[str, str]:
 
 
 def _key_of(copy: str) -> str:
-    """Return whose copy it is; one that is being made, or was cut off, has a point before its name."""
+    """Return the key of the commit that owns a copy. While it is written, or if it was cut off, its name
+    begins with a point.
+    """
     return copy.lstrip(".").split(".")[0]
 
 
 def _ending(file: Path) -> str:
-    """Return the ending of a copy; never that of a description."""
+    """Return the ending for a copy, which never is that of a description."""
     ending = file.suffix[:20]
     return f"{ending}.copy" if ending.casefold() in (".json", ".gone") else ending

@@ -88,9 +88,9 @@ class RegistrationApi(Protocol):
     def archive_item(self, part_number: str, /) -> None: ...
 
 
-# Writes an identity into the component's file: (entry, uuid). Raises DocumentError where it cannot.
+# Writes an identity into the component's file: (entry, uuid). Raises DocumentError if it cannot.
 Stamp = Callable[[BomEntry, str], None]
-# Raises DocumentError where an identity could not be written, before anything is made on the server.
+# Raises DocumentError if an identity could not be written, before anything is made on the server.
 Check = Callable[[BomEntry], None]
 # Which of these items an interrupted run made for the component: one of them, or None for a new item.
 Ask = Callable[[Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None]
@@ -112,14 +112,14 @@ class Registration:
 
 
 def component_key(entry: BomEntry) -> str:
-    """Return how the journal names a component; a path may be no text, and SQLite keeps text only."""
+    """Return the name of a component in the journal. A path may be no text, but SQLite keeps only text."""
     path = entry.doc_path.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
     return f"{path}#{entry.object_name}"
 
 
 def on_disk(entry: BomEntry, *, shares_file: bool = False) -> tuple[str, str]:
-    """Return FreeCAD's UUID of the component's document, and the component's identity, as they are on disk;
-    "" for none, and where the file cannot be read.
+    """Read from disk FreeCAD's UUID of the component's document, and the component's identity; "" for none,
+    and if the file cannot be read.
     """
     from silo.fcstd import Library
 
@@ -136,8 +136,9 @@ def on_disk(entry: BomEntry, *, shares_file: bool = False) -> tuple[str, str]:
 
 
 def finished(record: RegistrationRecord, journal: Journal) -> bool:
-    """Return whether the component's file names its item by now, which another computer may have written; the
-    journal knows it then."""
+    """Note in the journal, and return True, if the component's file names its item by now; another computer
+    may have written it.
+    """
     path, _, name = record.component.rpartition("#")
     uid, identity = on_disk(BomEntry(path, object_name=name))
     if identity.lower() not in (record.item_id.lower(), record.wanted.lower()):
@@ -147,7 +148,7 @@ def finished(record: RegistrationRecord, journal: Journal) -> bool:
 
 
 def unclear(proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Return the answer if nobody can be asked: an error that names the items."""
+    """Refuse to choose, if no person can be asked. Raises ConflictError that names the items."""
     numbers = ", ".join(str(item["part_number"]) for item in matches)
     raise ConflictError(
         f"{proposal.name}: {numbers} may be its item: made by an interrupted run, or registered from this "
@@ -175,9 +176,9 @@ def register(
     check, ask
         see :data:`Check` and :data:`Ask`.
     copy
-        the identity that it carries is another part's; it gets its own.
+        the component carries the identity of another part; it gets its own.
     tell
-        gets who else registers in the file's folder, while that is waited for.
+        receives who else registers in the file's folder, while this waits.
     """
     try:
         with journal.turn(proposal.entry.doc_path, component_key(proposal.entry), tell) as turn:
@@ -203,7 +204,9 @@ class _ItemRun:
     ask: Ask
 
     def item(self, check: Check, copy: bool) -> tuple[Mapping[str, Any], bool]:
-        """Return the component's item, which its file names, and whether it was there already."""
+        """Find or make the component's item, write its identity into the file, and return it; also, if it
+        existed already.
+        """
         entry = self.proposal.entry
         uid, now = on_disk(entry, shares_file=self.proposal.shares_file)
         carried = entry.silo_uuid or ""
@@ -215,10 +218,10 @@ class _ItemRun:
             self.stamp(entry, str(item["id"]))
             self.turn.done(uid)
             return item, True
-        wanted = "" if copy else as_uuid(carried)  # what is none gives its item another
+        wanted = "" if copy else as_uuid(carried)  # a text that is no UUID cannot be the item's
         intent, begun = self.turn.begin(wanted, uid)
         if self.turn.unseen and not wanted:
-            # Where others see the file alone, it has the identity before the item is made.
+            # If others see only the file, it gets the identity before the item is made.
             wanted = intent.wanted
             self.stamp(entry, wanted)
             _, now = on_disk(entry, shares_file=self.proposal.shares_file)
@@ -234,7 +237,7 @@ class _ItemRun:
         return item, existing
 
     def _registered_meanwhile(self, identity: str) -> Mapping[str, Any]:
-        """Return the item that somebody gave the component since it was read."""
+        """Return the item that somebody gave the component after it was read."""
         entry = self.proposal.entry
         item = self.api.get_item_by_uuid(identity)
         if item is None:
@@ -247,8 +250,8 @@ class _ItemRun:
         return item
 
     def _lost(self, uid: str) -> Mapping[str, Any] | None:
-        """Return the item of a document that was registered before and lost its identity, if a person says
-        so: FreeCAD saved over it, or a copy lies in its place, which has the same UUID.
+        """Return the item of a document that was registered and lost its identity, if a person agrees.
+        FreeCAD saved over it, or a copy with the same UUID is in its place.
         """
         record = self.turn.journal.find(self.turn.component)
         if record is None or not record.finished or not uid or record.document_uid != uid:
@@ -257,7 +260,7 @@ class _ItemRun:
         return None if item is None else self.ask(self.proposal, (item,))
 
     def _made(self, intent: RegistrationRecord, begun: bool, wanted: str) -> tuple[Mapping[str, Any], bool]:
-        """Return the component's item, and whether it was there already."""
+        """Find or make the component's item; also return if it existed already."""
         proposal, api = self.proposal, self.api
         item = self._made_before(intent) if begun or wanted else None
         was_there = item is not None
@@ -289,16 +292,16 @@ class _ItemRun:
         except ConflictError:
             raise
         except SiloError:
-            raise error from None  # The way is still broken: the first reason says more.
+            raise error from None  # The connection is still broken: the first reason says more.
         if item is None:
             raise error
         return item
 
     def _made_before(self, intent: RegistrationRecord) -> Mapping[str, Any] | None:
-        """Return the item that this intent made, if it came that far."""
+        """Find the item that this intent made, if it came that far."""
         api = self.api
-        for fromkey in dict.fromkeys((intent.item_id, intent.wanted)):
-            item = api.get_item_by_uuid(fromkey)
+        for identity in dict.fromkeys((intent.item_id, intent.wanted)):
+            item = api.get_item_by_uuid(identity)
             if item is not None:
                 return item
         if getattr(api, "keeps_item_ids", False):
@@ -324,7 +327,9 @@ def _may_have_arrived(error: SiloError) -> bool:
 
 
 def _of_the_same_name(proposal: Proposal, api: RegistrationApi, since: float) -> Iterator[Mapping[str, Any]]:
-    """Yield the items of this description made since then, each once; by search, then by the whole list."""
+    """Yield the items with this description made since then, each once; those of a search first, then those
+    of the whole list.
+    """
     name, seen = proposal.name.casefold(), set()
     for item in _all_items(proposal.name, api):
         if str(item["id"]) in seen:
@@ -353,7 +358,7 @@ def _all_items(name: str, api: RegistrationApi) -> Iterator[Mapping[str, Any]]:
 
 
 def _mark(api: RegistrationApi, item: Mapping[str, Any]) -> str | None:
-    """Return the registration that an item names; None if it names none that can be read."""
+    """Read the registration that an item names; None if it names none that can be read."""
     mark = (item.get("properties") or {}).get(REGISTRATION_PROPERTY)
     if mark is None:
         try:
@@ -374,9 +379,9 @@ def _time(value: Any) -> float | None:
 def register_standard(
     proposal: Proposal, api: RegistrationApi, *, schema: str, memory: Memory | None = None
 ) -> Registration:
-    """Register a standard part: join the item that the server has, else make one. No file is written.
+    """Register a standard part: join the item that the server has, or make one. Writes no file.
 
-    A repeat is harmless: the derived UUID is the key of the request.
+    Repeating it is harmless, because the derived UUID is the key of the request.
     """
     entry = proposal.entry
     uuid, designation = entry.silo_uuid or "", entry.standard or ""
@@ -456,26 +461,28 @@ class Journal:
         self._clock, self._patience = clock, patience
 
     def pending(self) -> dict[str, str]:
-        """Return ``file#object`` → the UUID that its item was to get, or has."""
+        """Return ``file#object`` → the UUID that its item has, or will get."""
         return {record.component: record.item_id for record in self.unfinished()}
 
     def unfinished(self) -> list[RegistrationRecord]:
-        """Return the registrations whose file does not name its item yet, oldest first."""
+        """Return the registrations whose file does not name its item yet, the oldest first."""
         return self._records("finished_at IS NULL ORDER BY begun_at")
 
     def find(self, component: str) -> RegistrationRecord | None:
-        """Return what is known of a component."""
+        """Return the registration of a component; None if there is none."""
         return next(iter(self._records("component = ?", component)), None)
 
     def begin(
         self, component: str, carried: str = "", beside: RegistrationRecord | None = None
     ) -> tuple[RegistrationRecord, bool]:
-        """Return the intent for a component's item, and whether an earlier run had already begun with it.
+        """Begin the registration of a component, or continue an earlier one; also return if it was begun
+        before.
 
         carried
-            the identity that its file has from elsewhere, and that the item shall have.
+            the identity that its file has from elsewhere, and that the item gets.
         beside
-            what another computer has begun (:func:`begun_beside`). It comes before what this one began.
+            what another computer has begun (:func:`begun_beside`). It has precedence over what this computer
+            began.
         """
         for registration_record in (beside, self.find(component)):
             if (
@@ -510,17 +517,17 @@ class Journal:
         self._write("DELETE FROM registrations WHERE component = ?", component)
 
     def item_ids(self) -> frozenset[str]:
-        """Return the items of all components that are known here."""
+        """Return the items of all components in this journal."""
         return frozenset(record.item_id for record in self._records("TRUE"))
 
     @contextmanager
     def turn(
         self, path: str, component: str, tell: Callable[[str], object] = lambda _text: None
     ) -> Iterator[Turn]:
-        """Hold the folder of a component's file while the component is registered, on any computer: two
-        processes never make an item for the same one, and nobody waits for another project's server.
+        """Hold the folder of a component's file while the component is registered, on any computer, so that
+        two processes never make an item for the same component. Nobody waits for another project's server.
 
-        ``tell`` gets who else does it, if that takes long. Raises InputError.
+        ``tell`` receives who else registers there, if that takes long. Raises InputError.
         """
         folder = os.path.dirname(path)
         with folder_lock(folder, ".silo-register.lock", "registered", self._patience, tell) as unseen:
@@ -612,10 +619,10 @@ class Turn:
 
 
 def begun_beside(path: str, component: str, document_uid: str) -> RegistrationRecord | None:
-    """Return what a computer has begun with a component, and says so in the folder of its file.
+    """Read what a computer began for a component, from the note in the folder of its file.
 
     document_uid
-        FreeCAD's own UUID of the file as it is now: another file of the same name continues nothing.
+        FreeCAD's own UUID of the present file; another file of the same name continues nothing.
 
     Raises InputError.
     """
@@ -632,7 +639,7 @@ def _beside(path: str) -> str:
 
 
 def _reserved(path: str) -> dict[str, dict[str, Any]]:
-    """Return what is begun in a folder, by ``file#object``."""
+    """Read the registrations begun in a folder, by ``file#object``."""
     try:
         with open(path, encoding="utf-8") as file:
             reserved = json.load(file)

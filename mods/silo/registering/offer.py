@@ -49,7 +49,7 @@ from silo.registering.items import component_key
 ITEM_TYPES = ("part", "assembly", "consumable", "tool")
 # Servers without a request for many are asked for each; beyond this many nobody reads them in a dialog.
 MOST_LOOKED_UP = 100
-# What a single file may offer.
+# How much a single file may offer.
 MOST_MODELLED = 200
 # Components that are looked up in one go, between two words of progress.
 _IN_ONE = 500
@@ -64,7 +64,7 @@ class RegisterControl(Protocol):
     def progress(self, detail: str = "", fraction: float | None = None) -> None: ...
 
     def check(self) -> None:
-        """Raise CancelledError where somebody wants the job to stop."""
+        """Raise CancelledError if somebody wants the job to stop."""
 
 
 class ComponentState(StrEnum):
@@ -122,7 +122,9 @@ class Learnt:
         self._folders = read_memory(self._path)
 
     def of(self, entry: BomEntry, name: str) -> LearntChoice | None:
-        """Return the choice for a part whose words are all in this name; the longest, of those the newest."""
+        """Find the learnt choice for a part whose words are all in this name; the longest, and of those the
+        newest.
+        """
         words = set(stems(name))
         fitting = [
             choice
@@ -187,8 +189,8 @@ class Candidate:
 
     @property
     def decided(self) -> bool:
-        """Return True for what is modelled in the assembly's file and a component already, or said to be no
-        part.
+        """Return True if the component is modelled in the assembly's file, and a person has decided
+        about it.
         """
         return self.article is not None and self.article.decided
 
@@ -198,8 +200,8 @@ class Candidate:
 
     @property
     def foreign(self) -> bool:
-        """Return True if the file carries an identity that the server does not know, from another server or
-        from another computer's run.
+        """Return True if the file carries an identity that the server does not know: of another server, or of
+        another computer's run.
         """
         has_one = bool(self.entry.silo_uuid) and not self.entry.is_standard
         return has_one and not self.same_as and self.article is None
@@ -210,7 +212,7 @@ class Candidate:
 
     @property
     def wanted(self) -> bool:
-        """Return True if it is checked to begin with, so if no person has to look first."""
+        """Return True if it is checked at the beginning, since no person has to look at it first."""
         fine = self.state.usable and self.state is not ComponentState.ELSEWHERE
         if self.proposal.is_guess or self.article is not None or self.foreign:
             return False
@@ -230,7 +232,7 @@ class CandidateFiles:
             same.append(candidate)
 
     def twin(self, candidate: Candidate) -> Candidate | None:
-        """Return the first candidate with the same content in another file."""
+        """Find the first candidate with the same content in another file."""
         same = self._by_sha256.get(candidate.sha256, ()) if candidate.sha256 else ()
         return next(
             (component for component in same if component.entry.doc_path != candidate.entry.doc_path),
@@ -264,7 +266,7 @@ class Offer:
 
 
 def copied(extraction: Extraction) -> tuple[BomEntry, ...]:
-    """Return the components that carry an identity which another file carries too."""
+    """Return the components with an identity that another file carries too."""
     places = {
         (place.doc_path, place.obj)
         for finding in extraction.findings
@@ -286,15 +288,15 @@ def offer(
     own_file: bool = True,
     learnt: Learnt | None = None,
 ) -> Offer:
-    """Return what can be registered of an assembly; a part is an extraction without entries.
+    """Find what can be registered of an assembly; a part is an extraction without entries.
 
     most
-        look-alikes are searched for so many components; None for all.
+        for how many components look-alikes are searched; None for all.
     own_file
         with what is modelled in the assembly's own file.
     begun
-        registrations that were interrupted (:meth:`Journal.pending`): the item that such a
-        one made is no look-alike of the component, it is its own.
+        interrupted registrations (:meth:`Journal.pending`): an item that they made is the component's own,
+        not a look-alike.
     """
     from silo.bom_sync import resolve
 
@@ -337,7 +339,7 @@ def offer(
 
 
 def _perhaps_copies(extraction: Extraction, numbers: Mapping[str, str], api: Any) -> tuple[BomEntry, ...]:
-    """Return the copied ones, and the document itself where its item's file has another name."""
+    """Return the copied components, and the document itself if its item's file has another name."""
     entries, top = copied(extraction), extraction.assembly
     number = numbers.get((top.silo_uuid or "").lower())
     if number is None or any(entry.key == top.key for entry in entries):
@@ -361,7 +363,7 @@ def _candidate(
     learnt: Learnt,
     copied: Mapping[str, str],
 ) -> Candidate:
-    """Make a candidate. ``copied``: the number of each identity that another file carries too."""
+    """Make a candidate. ``copied``: the part number of each identity that another file carries too."""
     proposal, same_as = (
         propose(entry, categories, shares_file=entry.doc_path in crowded),
         copied.get((entry.silo_uuid or "").lower(), ""),
@@ -389,7 +391,9 @@ def _candidate(
 def _modelled(
     extraction: Extraction, seen: Mapping[str, OpenedFile], categories: Mapping[str, str]
 ) -> list[Candidate]:
-    """Return what the saved file of the assembly holds that could be declared, or is; those come last."""
+    """Find what the saved file of the assembly holds that is declared, or could be; decided ones come
+    last.
+    """
     top = extraction.assembly
     look = seen.get(top.doc_path, OpenedFile(ComponentState.MISSING))
     try:
@@ -405,8 +409,7 @@ def _modelled(
 
 
 def changed_since(entry: BomEntry, saved_at: str) -> bool:
-    """Return True if the file is not the one that was opened: saved by somebody else, or registered
-    meanwhile.
+    """Return True if the file is no longer the one that was opened: somebody saved or registered it.
 
     saved_at
         the open document's own time stamp.
@@ -421,7 +424,7 @@ def changed_since(entry: BomEntry, saved_at: str) -> bool:
 
 
 def fingerprint(path: str) -> str:
-    """Return what changes whenever FreeCAD saves a file, and stays when an identity is stamped; "" if
+    """Return a text that changes whenever FreeCAD saves a file, but not when an identity is stamped; "" if
     unknown.
     """
     head, content = _look_into(path)
@@ -430,8 +433,8 @@ def fingerprint(path: str) -> str:
 
 
 def _look_into(path: str) -> tuple[bytes, list[tuple[str, int]]]:
-    """Return the document's own properties, which come first (a hostile file may never end), and what is
-    beside.
+    """Read the document's own properties, which come first (a hostile file may never end), and list the other
+    entries.
     """
     try:
         with zipfile.ZipFile(path) as file, file.open("Document.xml") as xml:
@@ -446,7 +449,7 @@ def _look_into(path: str) -> tuple[bytes, list[tuple[str, int]]]:
 
 
 def picture_in(path: str) -> bytes:
-    """Return the picture that FreeCAD keeps in a file (PNG); nothing where it has none."""
+    """Read the picture that FreeCAD keeps in a file (PNG); b"" if it has none."""
     try:
         with zipfile.ZipFile(path) as file, file.open("thumbnails/Thumbnail.png") as picture:
             return picture.read(1 << 20)
@@ -455,7 +458,7 @@ def picture_in(path: str) -> bytes:
 
 
 def sha256_or_nothing(path: str) -> str:
-    """Return the hash of a file's content; "" if it cannot be read."""
+    """Hash a file's content; "" if it cannot be read."""
     try:
         return content_hash(path)
     except OSError:
@@ -469,7 +472,9 @@ def _with_look_alikes(
     begun: Mapping[str, str],
     most: int | None,
 ) -> tuple[list[Candidate], str]:
-    """Return the candidates with what they may be already; why nobody knows, where the server did not say."""
+    """Add to the candidates the items that they may be; also say why nobody knows, if the server did not
+    answer.
+    """
     # An item of a standard part's designation is joined, no matter who made it.
     asked = [
         component
@@ -479,14 +484,14 @@ def _with_look_alikes(
     look_alikes: dict[tuple[str, str], list[Any]] = {}
     try:
         for start in range(0, len(asked), _IN_ONE):
-            some = asked[start : start + _IN_ONE]
+            group = asked[start : start + _IN_ONE]
             control.check()
-            control.progress(some[0].proposal.name, start / len(asked))
-            look_alikes |= api.find_look_alikes(_searched(component) for component in some)
+            control.progress(group[0].proposal.name, start / len(asked))
+            look_alikes |= api.find_look_alikes(_searched(component) for component in group)
     except CancelledError:
         raise
     except SiloError as error:
-        # Registering must not fail for want of suggestions; but that there are none is no news of the server.
+        # Registering must not fail without suggestions; but then nobody knows that there are none.
         return list(candidates), str(error)
 
     def of(candidate: Candidate) -> tuple[Similar, ...]:
@@ -516,7 +521,7 @@ def _next_numbers(candidates: Iterable[Candidate], api: Any, schema: str) -> dic
 
 
 def next_number(api: Any, schema: str, category: str) -> str:
-    """Return the number that the next item of a category would get; "" if the server does not say."""
+    """Ask for the number that the next item of a category would get; "" if the server does not tell it."""
     try:
         return str(api.generate_part_number(api.find_schema(schema), category))
     except SiloError:
@@ -560,7 +565,7 @@ class Modelled:
         return self.entry.silo_uuid is not None
 
     def apart(self) -> tuple[Modelled, ...]:
-        """Return each object as an article of its own; the quantity of each is not known then."""
+        """Make each object an article of its own; the quantity of each is then unknown."""
         return tuple(
             replace(
                 self, entry=replace(self.entry, object_name=name, label=name, quantity=1), objects=(name,)
@@ -570,7 +575,7 @@ class Modelled:
 
 
 def modelled(path: str, assembly: str | None = None) -> list[Modelled]:
-    """Return what is modelled in the file of an assembly, read without FreeCAD. DocumentError, InputError."""
+    """Find what is modelled in the file of an assembly, without FreeCAD. DocumentError, InputError."""
     with Library() as library:
         return modelled_in(choose_assembly(library.open(path), assembly), _shape_of)
 
@@ -583,8 +588,8 @@ def _shape_of(obj: object) -> str:
 
 
 def chosen(articles: Sequence[Modelled], names: Iterable[str], *, apart: bool = False) -> list[Modelled]:
-    """Return the articles that these names (or labels) mean, each once. InputError for a name that means
-    none.
+    """Return the articles with these names (or labels), each once. InputError for a name that no
+    article has.
     """
     by_chain: dict[tuple[str, ...], Modelled] = {}
     for name in names:
@@ -601,9 +606,7 @@ def chosen(articles: Sequence[Modelled], names: Iterable[str], *, apart: bool = 
 
 
 def source_identity(article: Modelled) -> str | None:
-    """Return the identity of the file that A2plus imported an article from; None if there is none to be
-    read.
-    """
+    """Read the identity of the file from which A2plus imported an article; None if there is none."""
     if not article.source or not os.path.isfile(article.source):
         return None
     try:
@@ -614,11 +617,10 @@ def source_identity(article: Modelled) -> str | None:
 
 
 def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
-    """Return the articles modelled in the file of an assembly (or of a single part); what is decided comes
-    last.
+    """Find the articles modelled in the file of an assembly (or of a single part); decided ones come last.
 
     shape_of
-        something equal for equal shapes wherever they are placed; "" where that is not known.
+        a text that is equal for equal shapes, wherever they are placed; "" if that is not known.
     """
     contents = silent_reader().contents(top)
     shown: dict[str, tuple[Any, int]] = {}
@@ -648,10 +650,10 @@ def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
 
 
 def label_stem(label: str, labels: Set[str]) -> str:
-    """Return a label without the number that FreeCAD gives to copies; "" if that says nothing.
+    """Cut the number that FreeCAD gives to copies from a label; "" if the rest says nothing.
 
     labels
-        all labels: a number is FreeCAD's only where the label without it is there too.
+        all labels: a number is from FreeCAD only if the label without it exists too.
     """
     stem = _NUMBER.sub("", label)
     stem = stem if stem in labels else label
@@ -659,7 +661,7 @@ def label_stem(label: str, labels: Set[str]) -> str:
 
 
 def _alike(objects: Iterable[Any], shape_of: Callable[[Any], str]) -> list[tuple[list[Any], str]]:
-    """Group equal objects: those of one shape, and those of one label whose shapes do not differ."""
+    """Group equal objects: those with one shape, and those with one label whose shapes do not differ."""
     groups: list[tuple[list[Any], str]] = []
     by_shape: dict[tuple[str, str], int] = {}
     by_stem: dict[str, int] = {}

@@ -96,7 +96,7 @@ class Order:
 
     @classmethod
     def of(cls, candidate: Candidate) -> Order:
-        """Return a row as it was proposed."""
+        """Make an order of a candidate, as it was proposed."""
         return cls(candidate, **{name: getattr(candidate.proposal, name) for name in CHOSEN})
 
     @property
@@ -105,13 +105,13 @@ class Order:
 
     @property
     def teaches(self) -> bool:
-        """Return True if a person chose something that the next part of such a name shall have too."""
+        """Return True if a person chose something that is proposed for the next part with such a name."""
         before, entry = self.candidate.proposal, self.candidate.entry
         changed = (self.category, self.sourcing) != (before.category, before.sourcing)
         return changed and not entry.is_standard and not entry.is_assembly and self.existing is None
 
     def retyped(self, item_type: str, categories: Mapping[str, str]) -> Order:
-        """Return the order with another type; the category follows where it is still one that was proposed.
+        """Change the type of the order; the category follows if it is one that was proposed.
 
         categories
             code → description, as the schema has them.
@@ -127,14 +127,16 @@ class Order:
 
 # Writes an identity into the component's document and saves it: (candidate, identity).
 Write = Callable[[Candidate, str], None]
-# Raises DocumentError where that could not be done, before anything is made on the server.
+# Raises DocumentError if that could not be done, before anything is made on the server.
 Check = Callable[[Candidate], None]
 # Which of the items that fit an interrupted run made: one of them, or None for a new item.
 AskOrder = Callable[[Order, Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None]
 
 
 def seen_before(order: Order, proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> None:
-    """Return None (make a new item) if the person saw these items in the dialog and took none of them."""
+    """Allow a new item if the person saw all these items in the dialog and took none of them. Raises
+    ConflictError otherwise.
+    """
     shown = {similar.item_id for similar in order.candidate.similar}
     if not all(str(item["id"]) in shown for item in matches):
         unclear(proposal, matches)
@@ -152,9 +154,9 @@ def carry_out(
     check: Check = lambda _candidate: None,
     ask: AskOrder = seen_before,
 ) -> None:
-    """Register one after another; ``done`` is called with each result. Worker.
+    """Register one component after another; ``done`` is called with each result. Worker.
 
-    One item's failure does not stop the rest. An error that concerns all of them does: a token that is not
+    One item's failure does not stop the rest. An error that concerns all items does: a token that is not
     accepted, a server that is gone or busy (:mod:`silo.api.policy`).
     """
     from silo.api.policy import ends_run
@@ -184,15 +186,15 @@ def take_back(
     control: RegisterControl,
     back: Callable[[Order, SiloError | None], object],
 ) -> None:
-    """Undo registrations, the last one first: files as they were, and new items archived. Worker.
+    """Undo registrations, the last one first: files as they were before, and new items archived. Worker.
 
     restore
         gives a component's file the identity that it had before, or none.
     back
-        called with each, and with what kept it from being taken back.
+        called with each order, and with the error that kept it from being undone.
 
-    The items of standard parts stay, for other projects have them too, and so do those of another server's
-    identities, which the files had before.
+    The items of standard parts stay, because other projects have them too. Items with identities of another
+    server, which the files had before, stay as well.
     """
     for number, (order, result) in enumerate(reversed(done)):
         control.check()
@@ -256,7 +258,8 @@ class _OrderRun:
         return Registration(candidate.proposal, part_number=number, item_id=item_id, found=True)
 
     def _declare(self, order: Order, article: Modelled) -> Registration:
-        """Give all objects of an article one identity: of the file it was imported from, else of a new item.
+        """Give all objects of an article one identity: that of the file from which it was imported, or of a
+        new item.
 
         An error of one copy leaves the others as they are.
         """
@@ -274,7 +277,7 @@ class _OrderRun:
         return replace(done[0], proposal=order.proposal, part_number=numbers)
 
     def _as_imported(self, candidate: Candidate, article: Modelled) -> Registration | None:
-        """Register with the identity of the file that A2plus imported it from; None where Silo has no such
+        """Register with the identity of the file from which A2plus imported it; None if Silo has no such
         item.
         """
         try:
@@ -307,7 +310,7 @@ _NOBODY = _Nobody()
 def whole_folder(
     plan: Plan, reading: VaultReader, base: str, *, hardware: bool = True
 ) -> tuple[Extraction, frozenset[str]]:
-    """Return all components of a folder's assemblies, and the files that no assembly uses."""
+    """Read all components of a folder's assemblies, and the files that no assembly uses."""
     from silo.vault.reading import Question
 
     entries: dict[tuple[str, str], BomEntry] = {}
@@ -329,7 +332,7 @@ def whole_folder(
 
 
 def seen_on_disk(paths: Iterable[str], *, even_if_open: bool) -> dict[str, OpenedFile]:
-    """Return how the files of components stand."""
+    """Find out how the files of components stand."""
     opened = None if even_if_open else open_in_any()
     return {path: OpenedFile(_state(path, opened)) for path in paths}
 
@@ -343,7 +346,9 @@ def _state(path: str, opened: OpenInFreecad | None) -> ComponentState:
 
 
 def is_own(candidate: Candidate) -> bool:
-    """Return True if the look-alike is its own item, made by a run that was interrupted or undone."""
+    """Return True if the look-alike is the candidate's own item, made by a run that was interrupted or
+    undone.
+    """
     entry, component = candidate.entry, component_key(candidate.entry)
     uid = on_disk(entry)[0]
     record = Journal().find(component) or begun_beside(entry.doc_path, component, uid)
@@ -364,10 +369,10 @@ def carry_out_on_disk(
     done: list[Registration] | None = None,
     control: RegisterControl = _NOBODY,
 ) -> list[Registration]:
-    """Register, with the identities written into the files; ``done`` grows with each.
+    """Register the components, and write their identities into the files; ``done`` grows with each.
 
     even_if_open
-        also files that a running FreeCAD has open; else they are left alone, and are an error.
+        also write files that a running FreeCAD has open; otherwise they are left alone, and are an error.
     """
     results: list[Registration] = [] if done is None else done
 
@@ -384,7 +389,7 @@ def carry_out_on_disk(
             stamp(candidate.entry.doc_path, identity, object_name=own, item_object=item, replace=again)
 
     def check(candidate: Candidate) -> None:
-        # Looked at again for each file: people open files while a long run is under way.
+        # Checked again for each file: people open files during a long run.
         if not even_if_open and open_in_any().has_file(candidate.entry.doc_path):
             raise DocumentError(candidate.entry.doc_path, OPEN)
         for own, item in places(candidate):
@@ -406,7 +411,7 @@ def carry_out_on_disk(
 
 
 def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> list[Proposal]:
-    """Return what to register: the components without an item, parts first, and the assembly itself last."""
+    """Propose items for the components without one, parts first; the assembly itself comes last."""
     wanted = resolve(extraction, client).unregistered
     tree = (extraction.assembly, *extraction.entries)
     return propose_all(wanted, tree, client.categories(schema)) if wanted else []
@@ -454,44 +459,46 @@ Key = tuple[str, str]
 
 
 def key_of(candidate: Candidate, base: str) -> Key:
-    """Return how a table names a component."""
+    """Return the name of a component in a table."""
     entry = candidate.entry
     return ("", entry.standard) if entry.standard else (relative(entry.doc_path, base), entry.object_name)
 
 
 def doubts(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
-    """Return why it may be an item already; ``earlier``: the candidates before it, which get theirs first."""
-    result = [
+    """List why a candidate may be an item already; ``earlier``: the candidates before it, which get their
+    items first.
+    """
+    reasons = [
         f"Silo has this very file as {similar.part_number}"
         if similar.same_file
         else f"Silo has {similar.part_number} with the same name"
         for similar in candidate.similar
     ]
     if twin := earlier.twin(candidate):
-        result.append(f"the same content as {twin.proposal.name}")
+        reasons.append(f"the same content as {twin.proposal.name}")
     if candidate.same_as:
-        result.append(f"carries the identity of {candidate.same_as}, as another file does")
+        reasons.append(f"carries the identity of {candidate.same_as}, as another file does")
     if candidate.foreign:
-        result.append("carries an identity of another server, or of another computer's run")
-    return result
+        reasons.append("carries an identity of another server, or of another computer's run")
+    return reasons
 
 
 def remarks(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
-    """Return what a person should know of a row."""
-    result = doubts(candidate, earlier)
+    """List what a person should know about a row."""
+    texts = doubts(candidate, earlier)
     if candidate.proposal.is_guess:
-        result.append("the category is a guess")
+        texts.append("the category is a guess")
     if candidate.learnt:
-        result.append("the category is the one chosen before in this folder")
+        texts.append("the category is the one chosen before in this folder")
     if candidate.article is not None:
-        result.append("modelled in the assembly's own file, not counted")
+        texts.append("modelled in the assembly's own file, not counted")
     if words := _FILES.get(candidate.state):
-        result.append(words)
-    return result
+        texts.append(words)
+    return texts
 
 
 def write_table(offer: Offer, wanted: Callable[[Candidate], bool], base: str) -> bytes:
-    """Return the table (RFC 4180, UTF-8 with a mark that spreadsheets want); ``wanted``: what says
+    """Write the table (RFC 4180, UTF-8 with the mark that spreadsheets need); ``wanted``: True for rows with
     ``yes``.
     """
     out = io.StringIO()
@@ -527,12 +534,14 @@ def _as_text(cell: str) -> str:
 
 
 def _as_written(cell: str) -> str:
-    """Return what :func:`_as_text` was given."""
+    """Return the text from which :func:`_as_text` made a cell."""
     return cell[1:] if cell.startswith("'") and _NO_TEXT.fullmatch(cell) else plain_cell(cell)
 
 
 def _fingerprint(candidate: Candidate) -> str:
-    """Return a letter first: sixteen digits alone are a number to a spreadsheet, which rounds it."""
+    """Return the fingerprint after a letter: a spreadsheet takes sixteen digits for a number, and
+    rounds it.
+    """
     checksum = "" if candidate.entry.is_standard else fingerprint(candidate.entry.doc_path)
     return checksum and f"x{checksum}"
 
@@ -552,7 +561,7 @@ class TableRow:
 
 
 def read_table(data: bytes, name: str) -> list[TableRow]:
-    """Return the rows of a table, as a spreadsheet or an editor saved it. InputError lists all that is
+    """Read the rows of a table, as a spreadsheet or an editor saved it. InputError lists all that is
     wrong.
     """
     text = _decoded(data, name)
@@ -574,7 +583,7 @@ def read_table(data: bytes, name: str) -> list[TableRow]:
             if len(cells) != len(header):
                 problems.append(f"line {line}: wanted {len(header)} cells as in the header, got {len(cells)}")
                 continue
-            # The name of a file may begin with a space; what people write does not.
+            # The name of a file may begin with a space; a text that a person writes does not.
             row = dict.fromkeys(_SUPPLY, "")
             row |= {c: _as_written(t) for c, t in zip(header, cells, strict=True)}
             rows.append(TableRow(line, {c: t if c in _AS_THEY_ARE else t.strip() for c, t in row.items()}))
@@ -614,7 +623,7 @@ class Planned:
 
 
 def orders_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name: str) -> Planned:
-    """Return the orders of a table. InputError lists all problems with their lines; then nothing is
+    """Make the orders of a table. InputError lists all problems with their lines; then nothing is
     registered.
     """
     candidates = {
@@ -693,7 +702,7 @@ def _order(
 
 
 def _joined_before(order: Order, earlier: list[Order]) -> list[str]:
-    """Find a number that was copied down a column, which makes one item of several parts."""
+    """Find a number that was copied down a column, which would make one item of several parts."""
     others = [other for other in earlier if other.candidate.sha256 != order.candidate.sha256]
     earlier.append(order)
     number = order.existing.part_number if order.existing else ""
@@ -709,7 +718,7 @@ def _changed(before: str, candidate: Candidate) -> bool:
 
 
 def wrong_name(name: str, candidate: Candidate) -> str:
-    """Return what is wrong with an item's name; "" if nothing is."""
+    """Say what is wrong with an item's name; "" if nothing is."""
     if not name:
         return "name: it is empty"
     if candidate.entry.standard and name != candidate.entry.standard:
@@ -726,7 +735,7 @@ def wrong_name(name: str, candidate: Candidate) -> str:
 
 
 def find_item(number: str, candidate: Candidate, api: Any) -> Similar:
-    """Return the item that a component shall join. InputError if it cannot."""
+    """Find the item that a component joins. InputError if it cannot."""
     if candidate.entry.is_standard:
         raise InputError("a standard part has its item by its designation; leave this empty")
     try:

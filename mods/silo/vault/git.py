@@ -42,9 +42,9 @@ class Range:
 
 
 def parse_range(repository: str, text: str) -> Range:
-    """Return ``A..B``, ``A...B`` (from where B branched off A), or ``A`` (against the work tree).
+    """Parse ``A..B``, ``A...B`` (from where B branched off A), or ``A`` (compared with the work tree).
 
-    Raises InputError where git does not know a revision.
+    Raises InputError if git does not know a revision.
     """
     for dots in ("...", ".."):
         if dots in text:
@@ -57,10 +57,10 @@ def parse_range(repository: str, text: str) -> Range:
 
 
 def top_of(folder: Path | str) -> tuple[str, str, bool]:
-    """Return the repository that a folder lies in, the folder below it with ``/`` ("" for the top itself),
-    and whether there is a work tree.
+    """Find the repository of a folder, the folder's path in it with ``/`` ("" for the top), and if it has a
+    work tree.
 
-    The folder may be gone: a revision may have it. Raises InputError.
+    The folder need not exist now: an older revision may have it. Raises InputError.
     """
     wanted = real = os.path.realpath(folder)
     while not os.path.isdir(real) and os.path.dirname(real) != real and not os.path.lexists(real):
@@ -84,9 +84,9 @@ def lay_out(
     """Write what a reader needs of a revision below ``target``: FreeCAD files, links, ``.siloignore``.
 
     laid
-        blob → where it lies already; such a file is linked, not written again.
+        blob → the place where it was written already; such a file is linked, not written again.
 
-    Returns path and reason of what is not there. Raises InputError, OSError.
+    Returns the path of each missing file, and the reason. Raises InputError, OSError.
     """
     laid = {} if laid is None else laid
     lost: list[tuple[str, str]] = []
@@ -129,7 +129,7 @@ def lay_out(
 
 
 def _listed(repository: str, revision: str) -> Iterator[tuple[bytes, str, str]]:
-    """Yield mode, object and path of what is to be laid out."""
+    """Yield mode, object and path of each file that is laid out."""
     for record in _git(repository, "ls-tree", "-r", "-z", "--full-tree", revision).split(b"\0"):
         head, _, raw = record.partition(b"\t")
         name = os.fsdecode(raw)
@@ -163,7 +163,7 @@ def _submodule(
 
 
 def _lay_link(path: Path, to: str, target: Path) -> None:
-    """Make a symbolic link that stays inside. If a system makes no links, its file is missing."""
+    """Make a symbolic link, if it stays inside. If the system cannot make links, its file is missing."""
     meant = os.path.join(os.path.dirname(path), to)
     inside = _is_below(path.parent, target) and _is_below(Path(os.path.normpath(meant)), target)
     if inside and not os.path.isabs(to) and not os.path.lexists(path):
@@ -209,7 +209,7 @@ def _content(ask: BinaryIO, answer: BinaryIO, blob: str, name: str) -> bytes:
 
 
 def _copy(ask: BinaryIO, answer: BinaryIO, blob: str, name: str, file: BinaryIO) -> None:
-    """Write what git has of an object. DocumentError if it lacks that one, InputError if git ended."""
+    """Write git's content of an object. DocumentError if git lacks the object, InputError if git ended."""
     try:
         ask.write(blob.encode() + b"\n")
         ask.flush()
@@ -231,7 +231,7 @@ def _copy(ask: BinaryIO, answer: BinaryIO, blob: str, name: str, file: BinaryIO)
 
 
 def _take_from_lfs(objects: Path, path: Path) -> None:
-    """Replace a pointer by its file, where that was fetched."""
+    """Replace a pointer by its file, if that was fetched."""
     if path.stat().st_size > _POINTER_SIZE or (match := _POINTER.match(path.read_bytes())) is None:
         return
     oid = match[1].decode()
@@ -270,11 +270,11 @@ def _git(repository: str, *words: str) -> bytes:
 
 
 def _no_answer(repository: str, words: Sequence[str]) -> str:
-    """Return why git may have said nothing."""
-    said = "there is no common ancestor" if words[0] == "merge-base" else "it does not know this revision"
+    """Say why git may have answered nothing."""
+    reason = "there is no common ancestor" if words[0] == "merge-base" else "it does not know this revision"
     if _git(repository, "rev-parse", "--is-shallow-repository").strip() == b"true":
-        said += "; the clone is shallow, so fetch more of it (git fetch --unshallow)"
-    return said
+        reason += "; the clone is shallow, so fetch more of it (git fetch --unshallow)"
+    return reason
 
 
 def _last(words: Sequence[str]) -> str:

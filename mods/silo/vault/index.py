@@ -98,7 +98,7 @@ class IndexDatabase:
             self._guard.close()
 
     def select(self, statement: str, *values: str) -> list[Any]:
-        """Return rows; none where the database fails."""
+        """Return the rows; [] if the database fails."""
         try:
             return self._database.execute(statement, values).fetchall()
         except sqlite3.Error as error:
@@ -108,12 +108,12 @@ class IndexDatabase:
     def select_in(self, statement: str, paths: Sequence[str], *values: str) -> Iterator[Any]:
         """Yield rows whose path is one of these; ``statement`` ends with ``IN``."""
         for at in range(0, len(paths), _VARIABLES):
-            some = paths[at : at + _VARIABLES]
-            marks = ",".join("?" * len(some))
-            yield from self.select(f"{statement} ({marks})", *values, *some)
+            group = paths[at : at + _VARIABLES]
+            marks = ",".join("?" * len(group))
+            yield from self.select(f"{statement} ({marks})", *values, *group)
 
     def write(self, *changes: tuple[str, Sequence[tuple[Any, ...]]]) -> bool:
-        """Carry out statements, each for its rows, all or nothing. True where it was done."""
+        """Carry out statements, each for its rows, all or nothing. Returns True if that succeeded."""
         if not self.writes:
             return False
         try:
@@ -173,7 +173,7 @@ class IndexDatabase:
 
 
 def _empty() -> sqlite3.Connection:
-    """Return a database of this process alone, on disk where it grows large."""
+    """Make a database for this process alone; SQLite moves it to the disk if it grows large."""
     database = sqlite3.connect("", isolation_level=None)
     database.executescript(_TABLES)
     return database
@@ -184,7 +184,7 @@ class _Unusable(Exception):
 
 
 def _connected(path: Path) -> sqlite3.Connection:
-    """Return an open database of our format. Raises _Unusable, sqlite3.OperationalError (locked, full, no
+    """Open a database of our format, or make it. Raises _Unusable, sqlite3.OperationalError (locked, full, no
     right).
     """
     database = sqlite3.connect(path, timeout=_BUSY_S, isolation_level=None)
@@ -215,7 +215,7 @@ def _connected(path: Path) -> sqlite3.Connection:
 
 
 def _removed(path: Path) -> bool:
-    """Delete a database that nobody has open; True where it is gone."""
+    """Delete a database that nobody has open; returns True if it is gone."""
     guard = hold_lock(f"{path}.lock")
     if guard is None:
         return False
@@ -226,9 +226,7 @@ def _removed(path: Path) -> bool:
 
 
 def _may_replace(path: Path) -> bool:
-    """Return True for a path where nothing is, and for a database of ours, however damaged behind its
-    head.
-    """
+    """Return True if the path is free, or holds a database of ours, even if it is damaged behind its head."""
     try:
         with path.open("rb") as file:
             head = file.read(72)
@@ -245,7 +243,7 @@ _SETTLED_NS = 2_500_000_000  # FAT has ticks of 2 s, the coarsest in use
 
 @cache
 def engine() -> str:
-    """Return a name for the code that reads documents: another one where any of it differs."""
+    """Return a name for the code that reads documents; it changes with that code."""
     digest = sha256(f"{FORMAT}".encode())
     for package in (silo.bom, silo.fcstd):
         for folder in package.__path__:
@@ -266,7 +264,7 @@ class SeenFile(NamedTuple):
 
     @classmethod
     def of(cls, content: Content | Remembered) -> SeenFile:
-        """Return what was read."""
+        """Make the record of a file that was read."""
         state = content.state
         return cls(
             content.digest,
@@ -279,8 +277,8 @@ class SeenFile(NamedTuple):
 
     @classmethod
     def unread(cls, error: FcstdError) -> SeenFile | None:
-        """Return what could not be read: known by its state, so that any change of it counts. None without
-        one.
+        """Make the record of a file that could not be read, with its state, so that any change counts. None
+        if it has no state.
         """
         state = error.state
         if not isinstance(state, FileState):
@@ -289,17 +287,17 @@ class SeenFile(NamedTuple):
         return cls(content, state.inode, state.size, state.modified_ns, 0, 0)
 
     def text(self) -> str:
-        """Return the key for the index."""
+        """Write it as a key for the index."""
         return f"{self.inode} {self.size} {self.modified_ns} {self.changed_ns} {self.read_ns} {self.content}"
 
     @classmethod
     def from_text(cls, text: str) -> SeenFile:
-        """Return what :meth:`text` wrote."""
+        """Read what :meth:`text` wrote."""
         *numbers, content = text.split(" ", 5)
         return cls(content, *map(int, numbers))
 
     def still(self, status: os.stat_result) -> bool:
-        """Return True if the file certainly is what it was then."""
+        """Return True if the file certainly has not changed since."""
         then = (self.inode, self.size, self.modified_ns, self.changed_ns)
         now = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
         return then == now and max(self.modified_ns, self.changed_ns) + _SETTLED_NS < self.read_ns
@@ -327,7 +325,7 @@ class StoredAnswer(NamedTuple):
 
     @classmethod
     def found_in(cls, library: Library, answer: Any) -> StoredAnswer:
-        """Return an answer that was found in a session which did nothing else."""
+        """Make the record of an answer and of the files read for it; the session did nothing else."""
         seen: dict[str, SeenFile] = {}
         lasting = True
         for path, document in library.documents.items():
@@ -353,14 +351,12 @@ class StoredAnswer(NamedTuple):
 
     @property
     def is_of_one_file(self) -> bool:
-        """Return True if nothing but the very file that was asked about was read, and no link followed."""
+        """Return True if only the file in question was read, and no link was followed."""
         return not self.trail.startswith("[")
 
     @property
     def links(self) -> frozenset[str]:
-        """Return the files that links lead to, counted or not; of those that are not there what is
-        recorded.
-        """
+        """Return the files to which links lead, counted or not; for a missing file the recorded path."""
         if self.is_of_one_file:
             return frozenset()
         files, lookups = json.loads(self.trail)
@@ -395,7 +391,7 @@ _ANSWERS = "SELECT path, answer, trail, mark FROM answers"
 
 
 def default_path() -> Path:
-    """Return the user's index."""
+    """Return the path of the user's index."""
     return cache_folder() / "documents.sqlite3"
 
 
@@ -404,7 +400,7 @@ def _mark(*texts: str) -> int:
 
 
 def _facts_mark(path: str, facts: str) -> bytes:
-    """Return the mark of the code that made the facts; what other code recorded must never be used."""
+    """Return a mark of the code that made the facts, since those of other code must never be used."""
     text = f"{engine()}\0{path}\0{facts}"
     return blake2b(text.encode("utf-8", "surrogateescape"), digest_size=16).digest()
 
@@ -436,7 +432,7 @@ class Index:
 
     @property
     def trouble(self) -> str:
-        """Return why nothing is kept; "" if all is well."""
+        """Say why nothing is kept; "" if all is well."""
         return self._database.trouble
 
     def __enter__(self) -> Index:
@@ -453,11 +449,11 @@ class Index:
     # --- answers ----------------------------------------------------------------------------------------
 
     def recall(self, path: str, question: str) -> StoredAnswer | None:
-        """Return the answer to a question about a file; None if it must be read (again)."""
+        """Return the kept answer to a question about a file; None if the file must be read (again)."""
         return next(self.recall_all([(path, question)]))
 
     def recall_all(self, asked: Sequence[tuple[str, str]]) -> Iterator[StoredAnswer | None]:
-        """Yield the same for several questions, in their order."""
+        """Yield the kept answers to several questions, in their order."""
         rows: dict[tuple[str, str], tuple[str, str, int]] = {}
         for question in dict.fromkeys(question for _, question in asked):
             paths = [_text(path) for path, wanted in asked if wanted == question]
@@ -486,7 +482,7 @@ class Index:
         return True
 
     def remember(self, path: str, question: str, answer: StoredAnswer) -> None:
-        """Keep an answer; on disk with the next :meth:`save`."""
+        """Keep an answer; the next :meth:`save` writes it to disk."""
         if not answer.lasting:
             return
         for file, seen in answer.seen.items():
@@ -515,7 +511,7 @@ class Index:
             self.save()
 
     def facts(self, paths: Sequence[str]) -> dict[str, str]:
-        """Return the facts of these files, of those that are what they were then."""
+        """Return the facts of those of these files that have not changed since."""
         facts_by_path = {path: self._facts[path] for path in paths if path in self._facts}
         rows = {
             path: (facts, mark)
@@ -533,7 +529,9 @@ class Index:
         }
 
     def content(self, path: str) -> str | None:
-        """Return what lies at a path without symlinks now, as the trails name it; None if nobody can say."""
+        """Return the content that is at a path without symlinks now, as the trails name it; None if it is
+        unknown.
+        """
         if path not in self._now:
             self._now[path] = self._look(path)
         seen = self._now[path]
@@ -557,14 +555,14 @@ class Index:
         return seen
 
     def _leads(self, folders: tuple[str, ...], recorded: str) -> str:
-        """Return where a link leads now."""
+        """Find where a link leads now."""
         key = (folders, recorded)
         if (now := self._led.get(key)) is None:
             now = self._led[key] = led_to(self._locator.find(recorded, folders))
         return now
 
     def untouched(self, path: str) -> bool:
-        """Return True if a file is still in the state in which this run found it. From any thread."""
+        """Return True if a file has not changed since this run first looked at it. From any thread."""
         seen = self._now.get(path)
         try:
             status = os.stat(path)
@@ -576,12 +574,12 @@ class Index:
     # --- where items were -------------------------------------------------------------------------------
 
     def places(self, vault: str) -> dict[str, set[str]]:
-        """Return identity → files that carried it when the vault was last read."""
-        result: dict[str, set[str]] = {}
+        """Return identity → the files that carried it when the vault was last read."""
+        files: dict[str, set[str]] = {}
         rows = self._database.select("SELECT uuid, path FROM places WHERE vault = ?", _text(vault))
         for uuid, path in rows:
-            result.setdefault(uuid, set()).add(os.fsdecode(path))
-        return result
+            files.setdefault(uuid, set()).add(os.fsdecode(path))
+        return files
 
     def keep_places(self, vault: str, places: Iterable[tuple[str, str]]) -> None:
         """Replace what is known of a vault."""
@@ -592,19 +590,19 @@ class Index:
         )
 
     def told(self, vault: str) -> frozenset[str] | None:
-        """Return what the last report about the vault said; None if there was none."""
+        """Return the sentences of the last report about the vault; None if there was none."""
         rows = self._database.select("SELECT sentence FROM told WHERE vault = ?", _text(vault))
         return frozenset(os.fsdecode(sentence) for (sentence,) in rows) - {""} if rows else None
 
     def keep_told(self, vault: str, sentences: Iterable[str]) -> None:
-        """Remember what the report of this run says."""
+        """Remember the sentences of this run's report."""
         rows = [(_text(vault), os.fsencode(sentence)) for sentence in {"", *sentences}]
         self._database.write(
             ("DELETE FROM told WHERE vault = ?", [(_text(vault),)]), ("INSERT INTO told VALUES (?, ?)", rows)
         )
 
     def forget(self, folder: str, but: Collection[str]) -> None:
-        """Forget the files of a folder but these, and what older code has recorded."""
+        """Forget all files of a folder but these, and what older code has recorded."""
         rows = self._database.select("SELECT path FROM files WHERE path >= ? AND path < ?", *_below(folder))
         kept = {path for path in but if path.isascii()} | {_text(path) for path in but if not path.isascii()}
         gone = [path for (path,) in rows if path not in kept]
@@ -672,7 +670,7 @@ class Index:
 
 
 def _below(folder: str) -> tuple[str, str]:
-    """Return two texts, between which lie the paths below a folder, in the order of the database."""
+    """Return two texts between which the database sorts the paths below a folder."""
     begin = _text(os.path.join(folder, ""))
     return begin, begin[:-1] + chr(ord(os.sep) + 1)
 

@@ -83,9 +83,9 @@ def read_folder(
     """Read all assemblies below a folder. ``root``: no file outside of it is read.
 
     lost
-        file and reason of what is known not to be there.
+        each file that is known to be missing, and the reason.
 
-    Raises InputError where there is no such folder. A file that cannot be read is reported in the result.
+    Raises InputError if there is no such folder. A file that cannot be read is reported in the result.
     """
     base = os.path.realpath(folder)
     if not os.path.isdir(base):
@@ -114,9 +114,7 @@ def read_folder(
 
 
 def _without(message: str, base: str, root: Path | str | None) -> str:
-    """Return a message whose paths begin at the folder, also those beside it: the root may be a temporary
-    one.
-    """
+    """Shorten the paths in a message, also those beside the folder, since the root may be a temporary one."""
     message = shorten(message, base)
     if root is None or (top := os.path.realpath(root)) == base:
         return message
@@ -124,12 +122,12 @@ def _without(message: str, base: str, root: Path | str | None) -> str:
 
 
 def _users_first(paths: Sequence[str], library: Library) -> list[str]:
-    """Return files that no other links to come first, so that what they use is walked once, as part of
+    """Put files to which no other links first, so that the files that they use are walked once, as part of
     them.
     """
     used: set[str] = set()
     for path in paths:
-        with suppress(SiloError):  # reported where it is read
+        with suppress(SiloError):  # reported when it is read
             used.update(os.path.basename(recorded).lower() for recorded in library.open(path).linked())
     return sorted(paths, key=lambda path: os.path.basename(path).lower() in used)
 
@@ -137,7 +135,7 @@ def _users_first(paths: Sequence[str], library: Library) -> list[str]:
 def _extractions(
     library: Library, path: str, assemblies: dict[tuple[str, str], ComparedAssembly]
 ) -> Iterator[Extraction]:
-    """Yield the BOMs of a file's assemblies, without those that were read as part of another one."""
+    """Yield the BOMs of a file's assemblies, but not those that were read as part of another one."""
     document = library.open(path)
     for top in _tops(document):
         if (document.FileName, top.Name) not in assemblies:
@@ -147,7 +145,7 @@ def _extractions(
 def _tops(document: Any) -> Iterable[Any]:
     try:
         return (choose_assembly(document),)
-    except InputError:  # several are equally likely: here all of them count
+    except InputError:  # if several are equally likely, all of them count here
         return find_assemblies(document)
 
 
@@ -233,18 +231,20 @@ class Plan:
     _files: dict[str, str] = field(default_factory=dict)
 
     def extraction(self, node: PlannedAssembly, reading: VaultReader) -> Extraction:
-        """Return what an assembly holds, with all that the whole plan knows of it. Raises SiloError."""
-        error = reading.ask(node.question).found
-        if isinstance(error, SiloError):
-            raise error
+        """Return what an assembly holds, with everything that the whole plan knows about it. Raises
+        SiloError.
+        """
+        found = reading.ask(node.question).found
+        if isinstance(found, SiloError):
+            raise found
         entries = tuple(
             replace(entry, is_assembly=self._assemblies.get(entry.key, entry.is_assembly))
-            for entry in error.entries
+            for entry in found.entries
         )
-        findings = dict.fromkeys(self._with_suggestion.get(finding, finding) for finding in error.findings)
+        findings = dict.fromkeys(self._with_suggestion.get(finding, finding) for finding in found.findings)
         for key in (node.key, *(entry.key for entry in entries)):
             findings.update(dict.fromkeys(self.findings.get(key, ())))
-        return replace(error, entries=entries, findings=tuple(findings))
+        return replace(found, entries=entries, findings=tuple(findings))
 
 
 @collecting_seldom()
@@ -262,11 +262,11 @@ def make_plan(
     """Read all files and put their assemblies in order.
 
     each
-        the assemblies of a file that has several are all meant.
+        if a file has several assemblies, read all of them.
     recursive
-        with the sub-assemblies, also where no file of ``tops`` has them.
+        with the sub-assemblies, even if no file of ``tops`` has them.
     skip_parts
-        files without components of other files, and unregistered libraries of parts, are left alone.
+        leave out files without components of other files, and unregistered libraries of parts.
     """
     plan = Plan(list(tops))
     several: dict[Key, str] = {}
@@ -332,14 +332,14 @@ _Rows = tuple[_Row, list[_Row]]
 
 
 def _rows(plain: Mapping[str, Any]) -> _Rows:
-    """Return the assembly, and its components."""
+    """Return the rows of the assembly and of its components."""
     table = plain["table"]
     return whole_row(table[plain["assembly"]]), [whole_row(table[number]) for number in plain["entries"]]
 
 
 def _is_part(plain: Mapping[str, Any], head: _Row, entries: Sequence[_Row]) -> bool:
-    """Return True if it is no assembly: nothing in it, or an unregistered file of screws or parts for others
-    to link.
+    """Return True if it is no assembly: it is empty, or an unregistered file of screws or parts for others to
+    link.
     """
     if any(finding["severity"] == Severity.ERROR for finding in plain["findings"]):
         return False
@@ -436,8 +436,8 @@ def _put_in_order(plan: Plan) -> None:
 
 
 def _report_rings(plan: Plan, keys: Sequence[Key]) -> None:
-    """Report assemblies that contain themselves, and those above them: nobody knows how many pieces that
-    makes.
+    """Report assemblies that contain themselves, and those above them, since their number of pieces is
+    unknown.
     """
     rings = Rings({key: plan.nodes[key].below for key in plan.nodes})
     for key in keys:
@@ -448,7 +448,7 @@ def _report_rings(plan: Plan, keys: Sequence[Key]) -> None:
 
 
 def _find_copies(plan: Plan) -> None:
-    """Find files that claim to be one item: fine where they hold the same, else no BOM of that item is
+    """Find files that claim to be the same item: fine if they hold the same, else no BOM of that item is
     right.
     """
     users: dict[str, list[PlannedAssembly]] = {}
@@ -488,7 +488,7 @@ def _tell(plan: Plan, key: Key, code: FindingCode, message: str, where: Iterable
 
 
 def _find_meant(plan: Plan, reading: VaultReader) -> None:
-    """Find the files that were meant if some are missing; read the project's files once for all of it."""
+    """Find the files that were meant by missing ones; reads the project's files once for all."""
     broken = [node for node in plan.nodes.values() if node.broken]
     if not broken:
         return
@@ -511,9 +511,9 @@ NAME = ".silo-sync.lock"
 
 @contextmanager
 def only_job(folder: str) -> Iterator[str]:
-    """Keep a second job away from a folder; gives what the lock cannot prevent, "" for nothing.
+    """Keep a second job away from a folder; yields what the lock cannot prevent, "" for nothing.
 
-    Raises InputError with the name of the first one.
+    Raises InputError with the name of the first job.
     """
     with folder_lock(folder, NAME, "synced") as problem:
         yield problem and (
@@ -553,7 +553,7 @@ class SyncJob:
         self._sent: dict[str, Future[Outcome]] = {}
 
     def results(self) -> Iterator[TopResult]:
-        """Yield the result of each file, as soon as it is known; files that could not be read first."""
+        """Yield the result of each file as soon as it is known; files that could not be read come first."""
         for top, error in self.plan.errors.items():
             yield TopResult(top, self._base(top), error=error)
         try:
@@ -577,7 +577,7 @@ class SyncJob:
         return self.base or os.path.dirname(os.path.realpath(top))
 
     def _known_items(self) -> Known:
-        """Return what the server knows of everything in the plan, as far as it is needed."""
+        """Look up the items of everything in the plan, and keep what is needed of them."""
         items = known_items(self.plan.uuids, self.plan.standards.values(), self.api)
         return {
             key: {name: item.get(name) for name in _KEPT} for key, item in items.items() if item is not None
@@ -612,14 +612,12 @@ class SyncJob:
         ]
 
     def _with_suggestion(self, resolved: Resolved, lines: Lines) -> Resolved:
-        """Return missing files, with those that have the identity which the server knows from the last
-        sync.
-        """
+        """Add to findings of missing files the file that has the identity known from the last sync."""
         line = lines.get(resolved.assembly.part_number or "", ())
         return suggest_by_identity(resolved, [(resolved, line)], self._files_with if self.base else None)
 
     def _files_with(self, identities: Iterable[str]) -> set[str]:
-        """Return the files of the folder that have one of these identities: all were read, none is read
+        """Return the files of the folder that have one of these identities. All were read; none is read
         again.
         """
         wanted = {identity.lower() for identity in identities}
@@ -658,7 +656,9 @@ class SyncJob:
         return outcome
 
     def _source(self, resolved: Resolved) -> SourceDocument:
-        """Return the file of a BOM that is about to be sent; it must still be the one that was read."""
+        """Describe the file of a BOM that is about to be sent. DocumentError if it changed since it was
+        read.
+        """
         if not self.reading.index.untouched(resolved.assembly.doc_path):
             raise DocumentError(
                 resolved.assembly.doc_path, "it was changed while the job ran; the next run takes it"
@@ -666,12 +666,14 @@ class SyncJob:
         return source_document(resolved.assembly)
 
     def _stop_for(self, error: SiloError) -> None:
-        """End the job for an error that concerns every request; the others get it as their error."""
+        """End the job for an error that concerns every request; the remaining assemblies get it as their
+        error.
+        """
         if self.stopped is None and ends_run(error, self.api):
             self.stopped = error
 
 
 def _as_the_first(resolved: Resolved, first: Outcome) -> Outcome:
-    """Return what became of a copy: what became of the file that was sent for both."""
+    """Make the outcome of a copy from that of the file that was sent for both."""
     status = Status.UNCHANGED if first.status is Status.MERGED else first.status
     return replace(first, resolved=resolved, status=status, result=None)

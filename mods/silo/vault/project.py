@@ -90,7 +90,7 @@ class ProjectFile:
 
     @property
     def base(self) -> str:
-        """Return the content that it was made from, as far as the project remembers; "" if it does not."""
+        """Return the content from which the file was made, if the project remembers it; otherwise ""."""
         is_same_document = self.kept is not None and self.kept.document.lower() == self.document.lower()
         return self.kept.sha256 if is_same_document and self.kept is not None else ""
 
@@ -128,10 +128,10 @@ class FileStanding:
 
 
 def find_project(tops: Sequence[str], root: str | None = None) -> Project:
-    """Return the project that files or folders belong to.
+    """Find the project of files or folders.
 
     It is the given root, else the folder above them that is marked as one, else the folder that was named,
-    else the folder that holds all that the file links to. Raises InputError.
+    else the folder that holds all files to which the file links. Raises InputError.
     """
     if root is not None:
         if not os.path.isdir(root):
@@ -162,7 +162,7 @@ def find_project(tops: Sequence[str], root: str | None = None) -> Project:
 
 
 def read_project(tops: Sequence[str], project: Project, *, hardware: bool = True) -> Belonging:
-    """Return what belongs to a commit of these files or folders. Changes nothing."""
+    """Read what belongs to a commit of these files or folders. Changes nothing."""
     paths = [one_path(path) for path in documents_in(tops)]
     stray = [path for path in paths if project.place(path) is None]
     if stray:
@@ -196,7 +196,9 @@ def read_project(tops: Sequence[str], project: Project, *, hardware: bool = True
 def _reached(
     paths: Iterable[str], locator: Locator, project: Project | None = None
 ) -> tuple[list[str], list[tuple[str, str]], list[tuple[str, str]], list[tuple[str, str]]]:
-    """Return the files and all that they link to, linked ones first; what is unreadable, outside, missing."""
+    """Return the files and all files to which they link, linked ones first; also the unreadable ones, and
+    links that lead outside or to nothing.
+    """
     order: list[str] = []
     unreadable: list[tuple[str, str]] = []
     outside: list[tuple[str, str]] = []
@@ -260,7 +262,7 @@ def _read(
 
 
 def _one_file_per_item(files: Sequence[ProjectFile]) -> tuple[list[ProjectFile], list[tuple[str, str]]]:
-    """Let an item have one file: a copy with other content is a document of its own, and is reported."""
+    """Let an item have one file: a copy with other content becomes a document of its own, and is reported."""
     owner: dict[str, ProjectFile] = {}
     for file in sorted(
         files,
@@ -284,7 +286,7 @@ def _one_file_per_item(files: Sequence[ProjectFile]) -> tuple[list[ProjectFile],
 
 
 def _moved(file: ProjectFile, gone: Mapping[str, ProjectEntry], files: Sequence[ProjectFile]) -> ProjectFile:
-    """Return the file with its place before: a remembered file is gone, and only this one can be it."""
+    """Give the file its previous place, if exactly one remembered file is gone and can only be this one."""
     if file.kept is not None and (file.kept.document == file.document or not file.document):
         return file
     rules: tuple[Callable[[ProjectEntry], bool], ...] = (
@@ -304,19 +306,19 @@ def _moved(file: ProjectFile, gone: Mapping[str, ProjectEntry], files: Sequence[
 def stand(
     tops: Sequence[str], project: Project, client: SiloClient | None, store: Store
 ) -> tuple[Belonging, list[FileStanding]]:
-    """Return what belongs to files or folders, and how each file stands. Changes nothing."""
+    """Find what belongs to files or folders, and how each file stands. Changes nothing."""
     belonging = name_documents(read_project(tops, project), client, new=False)
     return belonging, compare(belonging, client, store)
 
 
 def name_documents(belonging: Belonging, client: SiloClient | None, *, new: bool = True) -> Belonging:
-    """Give each file without an item its UUID, and write them down before the first request that has one.
+    """Give each file without an item a UUID, and write the UUIDs down before the first request that has one.
 
     new
-        False: only those that Silo has, and nothing is written.
+        False: name only files that Silo has, and write nothing.
 
-    A folder that remembers nothing (a copy of the files alone) learns from the files in Silo that link to a
-    file which document it is.
+    If the folder remembers nothing (a copy of the files alone), the links of files in Silo show which
+    document each file is.
     """
     numbers = _linked_documents(belonging, client) if client is not None else {}
     files = [
@@ -338,7 +340,7 @@ def name_documents(belonging: Belonging, client: SiloClient | None, *, new: bool
 
 
 def _linked_documents(belonging: Belonging, client: SiloClient) -> dict[str, str]:
-    """Return place → document, as the newest revisions of the registered files above record their links."""
+    """Return place → document, as the newest revisions of registered files record their links."""
     nameless = {file.place for file in belonging.files if not file.document}
     documents: dict[str, str] = {}
     users = [file for file in belonging.files if file.item] if nameless else []
@@ -358,7 +360,7 @@ def _linked_documents(belonging: Belonging, client: SiloClient) -> dict[str, str
 
 
 def compare(belonging: Belonging, client: SiloClient | None, store: Store) -> list[FileStanding]:
-    """Return how each file stands to the server, in the same order. One request if it knows documents.
+    """Compare each file with the server, in the same order. One request, if the server knows documents.
 
     client
         None: the server cannot be asked now, and what the project remembers counts.
@@ -384,7 +386,7 @@ def compare(belonging: Belonging, client: SiloClient | None, store: Store) -> li
 
 
 def _remembered(files: Iterable[ProjectFile]) -> dict[str, Revision]:
-    """Return the content that each file was made from, as if it were the newest."""
+    """Return the content from which each file was made, as if it were the newest."""
     return {
         file.document.lower(): Revision(revision_number=0, file_checksum=file.base)
         for file in files
@@ -393,10 +395,10 @@ def _remembered(files: Iterable[ProjectFile]) -> dict[str, Revision]:
 
 
 def newest_files(files: Iterable[ProjectFile], client: SiloClient) -> dict[str, Revision]:
-    """Return the newest revision of each file in Silo, by its UUID in lower case.
+    """Get the newest revision of each file in Silo, by its UUID in lower case.
 
-    A Silo without documents is asked for the main item of each file; of a file without any it knows nothing,
-    so what was sent from here counts.
+    For a Silo without documents, the main item of each file is asked for. It knows nothing of a file without
+    an item, so what was sent from here counts.
     """
     several = [file for file in files if file.document]
     try:
@@ -430,7 +432,7 @@ def _state(file: ProjectFile, newest: Revision | None, client: SiloClient | None
 
 
 def address_of(file: ProjectFile, client: SiloClient) -> str:
-    """Return what names the file's revisions on the server: a part number, or the document itself."""
+    """Return the address of the file's revisions on the server: a part number, or the document itself."""
     item = client.get_item_by_uuid(file.item) if file.item else None
     return item.part_number if item is not None else DocumentId(file.document)
 
@@ -444,10 +446,10 @@ def commits(
     over_newer: Container[str] = (),
     boms: bool = True,
 ) -> Iterator[tuple[ProjectFile, Commit]]:
-    """Make the commits of what belongs and is not in Silo: files that differ, and the BOMs of the assemblies.
+    """Make the commits of files that differ from Silo, and of the BOMs of the assemblies.
 
     over_newer
-        files that go although they are newer in Silo, which a person saw: on top of those.
+        files that are sent on top of newer revisions in Silo, which a person saw.
     boms
         also the BOMs of files that are in Silo already.
     """
@@ -498,7 +500,7 @@ def _users(belonging: Belonging) -> dict[str, str]:
 
 
 def keep(project: Project, store: Store, file: ProjectFile, commit: Commit, server: str) -> None:
-    """Put a commit into the queue, and remember its content as the one that later edits are made from."""
+    """Put a commit into the queue, and remember its content as the base of later edits."""
     store.add(commit, server)
     if commit.file is not None:
         remember(project, [file])
@@ -507,7 +509,8 @@ def keep(project: Project, store: Store, file: ProjectFile, commit: Commit, serv
 def send_along(
     path: str, client: SiloClient | None, store: Store, server: str, skip: Container[str] = (), **how: Any
 ) -> int:
-    """Put into the queue what a committed file links to and is not in Silo; how many files.
+    """Put into the queue the files to which a committed file links and that are not in Silo; returns how
+    many.
 
     skip
         files that a person has decided about.

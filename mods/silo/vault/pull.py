@@ -57,7 +57,7 @@ def top_of(extraction: Extraction) -> ComparedAssembly:
 
 
 def bom_in(content: Path | str, path: str) -> ComparedAssembly | None:
-    """Return the BOM of a file that belongs at ``path``; None for a part, or where it holds several
+    """Read the BOM of a file that belongs at ``path``; None for a part, and for a file with several
     assemblies.
     """
     contents = FileContents(instead={os.path.realpath(path): os.fspath(content)})
@@ -87,7 +87,7 @@ class RevisionBoms:
         self._stack.close()
 
     def bom(self, number: int) -> ComparedAssembly | None:
-        """Return the BOM of a revision; None for a part."""
+        """Download a revision and read its BOM; None for a part."""
         if number not in self._known:
             target = self._folder / f"{number}.FCStd"
             self.client.download_file(self.part_number, target, number, cancelled=self.cancelled)
@@ -96,13 +96,13 @@ class RevisionBoms:
         return self._known[number]
 
     def change(self, older: int | None, newer: int) -> tuple[LineChange, ...]:
-        """Return the lines that differ between two revisions; all of them where there is no older one."""
+        """Return the lines that differ between two revisions; all lines if there is no older one."""
         before, after = self.bom(older) if older is not None else None, self.bom(newer)
         changes = compare_assemblies([before] if before else [], [after] if after else [])
         return tuple(line for change in changes for line in change.lines)
 
     def three(self, stands: Standing, mine: ComparedAssembly | None) -> tuple[ThreeLines, ...]:
-        """Compare base → theirs → mine, if all of them are assemblies."""
+        """Compare base → theirs → mine, if all three are assemblies."""
         if mine is None or stands.newest is None:
             return ()
         theirs = self.bom(stands.newest.revision_number)
@@ -116,12 +116,12 @@ def file_revisions(revisions: Sequence[Revision]) -> list[Revision]:
 
 
 def words(lines: Sequence[LineChange], most: int = 6) -> str:
-    """Return a difference in one line, such as ``+ Bolt 4, - Plate 1, Nut 4 → 8``."""
+    """Write a difference in one line, such as ``+ Bolt 4, - Plate 1, Nut 4 → 8``."""
     return listed(line_texts(lines), most)
 
 
 def line_texts(lines: Iterable[LineChange]) -> list[str]:
-    """Return the lines of a difference in words."""
+    """Write each line of a difference in words."""
     texts = []
     for line in lines:
         name = display_name(line.entry) or line.entry.object_name
@@ -152,7 +152,7 @@ class Holder:
 
     @property
     def part_number(self) -> str:
-        """Return the item's; "" for a document without one."""
+        """Return the item's part number; "" for a document without one."""
         return "" if isinstance(self.of, DocumentId) else self.of
 
 
@@ -238,7 +238,9 @@ class _Fetch:
         return FileTree(tuple(self.files.values()), tuple(self.lost))
 
     def frozen(self, holder: Holder) -> Revision | None:
-        """Return the revision of a file in the release that is fetched; None if the file is not in it."""
+        """Return the revision of a file in the release that is being fetched; None if the file is not
+        in it.
+        """
         files = self.release.files if self.release is not None else ()
         numbers = {file.document: file.revision for file in files}
         revisions = self.revisions(holder) if holder.id in numbers else []
@@ -247,7 +249,7 @@ class _Fetch:
         )
 
     def unlinked(self) -> list[tuple[str, Holder, Revision]]:
-        """Return the next file of the release that no link led to: a person uploaded it."""
+        """Return the next file of the release to which no link led: a person uploaded it."""
         there = {file.item for file in self.files.values()} | self._sought
         for file in self.release.files if self.release is not None else ():
             if file.document not in there:
@@ -264,7 +266,7 @@ class _Fetch:
         return []
 
     def holder(self, item: Item) -> Holder:
-        """Return the item, or the file of several items that it lies in."""
+        """Return the item; or, if it has no revisions, the file of several items that holds it."""
         own = Holder(item.part_number, item.id)
         if self.revisions(own):
             return own
@@ -277,7 +279,7 @@ class _Fetch:
     def fetch(
         self, position: str, holder: Holder, revision: Revision
     ) -> Iterator[tuple[str, Holder, Revision]]:
-        """Fetch one file; gives what it links to and was not seen before."""
+        """Fetch one file, and yield the files to which it links and that were not seen before."""
         stop_if(self.cancelled)
         if (file := self.files.get(position)) is not None:
             if file.item != holder.id:
@@ -348,7 +350,7 @@ class _Fetch:
     def means(
         self, path: str, link: LinkedFile | None, items: Mapping[str, Item], others: _Children
     ) -> Holder | None:
-        """Return what a link leads to."""
+        """Find the item or document to which a link leads."""
         if link is not None and link.document:
             own = Holder(DocumentId(link.document), link.document)
             if self.revisions(own):
@@ -357,10 +359,10 @@ class _Fetch:
         return self.holder(child) if child is not None else None
 
     def choose(self, child: Holder, sha256: str, *, by_top: bool) -> Revision | None:
-        """Return the newest revision of a linked file; for a chosen revision of the top, that of its time.
+        """Choose the newest revision of a linked file; if a revision of the top was chosen, that of its time.
 
-        What the top itself links to was written down with it (``sha256``). A file further below
-        may have been committed again between the file that links to it and the top.
+        The top's own links were recorded with their hash (``sha256``). A file further below may have been
+        committed again after the file that links to it, but before the top.
         """
         if self.release is not None:
             return self.frozen(child)
@@ -410,12 +412,12 @@ class _Children:
 
 
 def _is_place(folder: str) -> bool:
-    """Return True for a folder inside a project, such as ``parts/bought``."""
+    """Return True if a folder is inside a project, such as ``parts/bought``."""
     return not any(":" in part or part in ("", ".", "..") or refusal(part) for part in folder.split("/"))
 
 
 def _refused(path: str) -> str:
-    """Return why a recorded path is not followed; "" if it is."""
+    """Say why a recorded path is not followed; "" if it is."""
     if _ABSOLUTE.match(path):
         return "it is an absolute path, which has no place in another folder"
     if (refused := refusal(path)) is not None:
@@ -442,13 +444,13 @@ def fetched(
     progress: Progress = lambda _name, _count: None,
     most: int = MOST_FILES,
 ) -> Iterator[FileTree]:
-    """Yield the tree of an item, in a scratch folder that goes with the block.
+    """Fetch the files of an item, and yield their tree in a scratch folder that ends with the block.
 
     revision
         the number of a file's revision: its linked files are then those of its time. The label of a released
         revision: all files as they were frozen. None: the newest of all.
 
-    Raises InputError where the item has no such file, and for more than ``most`` files.
+    Raises InputError if the item has no such file, and for more than ``most`` files.
     """
     item = client.get_item(part_number)
     number = revision if isinstance(revision, int) else None
@@ -490,7 +492,7 @@ class Pulled:
 
     @property
     def complete(self) -> bool:
-        """Return True if every file is there as wanted."""
+        """Return True if every file is there in the wanted revision."""
         return not self.lost and not any(
             file.state in (PullState.EDITED, PullState.OPEN) for file in self.files
         )
@@ -500,10 +502,11 @@ class Pulled:
 
 
 def lay_out(files: Iterable[tuple[str, str | None]]) -> list[str]:
-    """Return where each file goes below one folder: its position, with names for the folders above the top's.
+    """Find the place of each file below one folder: its position, with names for the folders above the top's.
 
     files
-        (position, ``file_path`` of the revision); the paths name folders that the positions only step out of.
+        (position, ``file_path`` of the revision); the paths have the names of folders for which the positions
+        only have ``..``.
     """
     split = [(*_ups(position), (spot or "").replace("\\", "/").split("/")) for position, spot in files]
     most = max((ups for ups, _, _ in split), default=0)
@@ -528,9 +531,7 @@ def _ups(position: str) -> tuple[int, list[str]]:
 
 
 def _anchor(tree: FileTree, places: Sequence[str], into: Path) -> Path:
-    """Return where the folder of the places begins: the item may have its file in the user's folder
-    already.
-    """
+    """Find the folder at which the places begin: the user's folder may have the item's file already."""
     top, name = tree.files[0], posixpath.basename(places[0])
     path = into.joinpath(*places[0].split("/"))
     if path.exists() or not into.is_dir():
@@ -569,9 +570,10 @@ class Rules:
 
 
 def place(tree: FileTree, into: Path | str, rules: Rules = Rules()) -> Pulled:
-    """Write the files of a tree below a folder. What has no place there is lost, the others come.
+    """Write the files of a tree below a folder. A file without a place there is lost; the others are written.
 
-    Raises DocumentError where the disk does not take one, or the top has no place; those before it are whole.
+    Raises DocumentError if a file cannot be written, or if the top has no place; the files before it are
+    complete.
     """
     base = Path(os.path.realpath(into))
     places = lay_out((file.position, file.revision.file_path) for file in tree.files)
@@ -611,7 +613,7 @@ def _uid_of(path: Path) -> str:
 
 
 def _in_the_way(target: Path, base: Path) -> str:
-    """Return why a file cannot go where it belongs, though the disk takes others; "" if it can."""
+    """Say why a file cannot be written to its place, although the disk accepts others; "" if it can."""
     if base not in Path(os.path.realpath(target)).parents:
         return f"its place leads out of {base}; nothing was written there"
     if target.is_dir():
@@ -650,7 +652,7 @@ def _place(one: Fetched, target: Path, rules: Rules) -> PulledFile:
 
 
 def pulled_json(pulled: Pulled, base: Path) -> dict[str, Any]:
-    """Return the data for machines; paths relative to ``base``."""
+    """Return the result as JSON values; paths are relative to ``base``."""
 
     def below(path: Path) -> str:
         return os.path.relpath(path, base).replace(os.sep, "/")

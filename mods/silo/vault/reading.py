@@ -63,7 +63,7 @@ class Question:
     name_only: bool = False
 
     def __post_init__(self) -> None:
-        # Another process, and another day, have other current folders.
+        # Another process, or another run, has another current folder.
         object.__setattr__(self, "path", os.path.abspath(self.path))
 
     @property
@@ -80,17 +80,17 @@ def _name(assembly: str | None, hardware: bool, below: bool, name_only: bool) ->
 
 
 def collect_seldom() -> None:
-    """Let Python search for rings of objects seldom.
+    """Make Python search for reference cycles less often.
 
-    A session takes its own rings apart. Each search goes through all that is remembered of a vault, so that
-    a document of a large vault would cost more than one of a small vault.
+    A session takes its own cycles apart. Each search goes through everything that is remembered of a vault,
+    so a document of a large vault would cost more than one of a small vault.
     """
     gc.set_threshold(100_000, *gc.get_threshold()[1:])
 
 
 @contextmanager
 def collecting_seldom() -> Iterator[None]:
-    """Do :func:`collect_seldom`, for a while."""
+    """Do :func:`collect_seldom` during the block."""
     before = gc.get_threshold()
     collect_seldom()
     try:
@@ -119,7 +119,7 @@ class First(NamedTuple):
 
     @property
     def files(self) -> list[str]:
-        """Return the file, and those that it links to."""
+        """Return the file, and the files to which it links."""
         return [self.path, *(location.real for location in self.linked.values())]
 
 
@@ -144,7 +144,7 @@ class WalkSession:
         self.locator = Locator(remembers_files=True)
 
     def ask(self, question: Question, facts: Callable[[str], str] = lambda _path: "") -> StoredAnswer:
-        """Return the answer with its trail."""
+        """Answer a question by reading files; the answer comes with its trail."""
         library = Library(contents=self.contents, locator=self.locator, facts=facts)
         try:
             return StoredAnswer.found_in(library, self._answer(library, question))
@@ -152,7 +152,7 @@ class WalkSession:
             library.dissolve()
 
     def read(self, question: Question) -> First:
-        """Return the file of a question, and the answer where no other file is needed for it."""
+        """Read the file of a question, and answer it if no other file is needed."""
         library = Library(contents=self.contents, locator=self.locator)
         try:
             return self._read(library, question)
@@ -203,10 +203,10 @@ _mine = threading.local()
 
 
 def work(questions: Sequence[Question], supplies: Supplies | None, run: str) -> Done:
-    """Read the files of questions, or with supplies answer them; this is what travels to workers.
+    """Read the files of questions, or with supplies answer them. Workers run this function.
 
     run
-        names the run: what a worker of a cluster keeps from another one may be old.
+        names the run, since what a worker of a cluster keeps from another run may be out of date.
     """
     if getattr(_mine, "run", None) != run:
         _mine.run, _mine.session = run, WalkSession()
@@ -214,7 +214,7 @@ def work(questions: Sequence[Question], supplies: Supplies | None, run: str) -> 
 
 
 def work_in(session: WalkSession, questions: Sequence[Question], supplies: Supplies | None) -> Done:
-    """Return :func:`work` in this process."""
+    """Do what :func:`work` does, in this process."""
     reads, begin = session.contents.reads, time.thread_time()
     if supplies is None:
         firsts = [session.read(question) for question in questions]
@@ -233,7 +233,7 @@ _WORTH_A_POOL = 128
 
 
 def _end_processes(executor: Executor) -> None:
-    # Python would wait for them at the end anyway, and at times trips over it then.
+    # Python would wait for them at its end anyway, and sometimes fails then.
     executor.shutdown(wait=True, cancel_futures=True)
 
 
@@ -267,13 +267,13 @@ class Pool:
         self._executor: Executor | None = None
 
     def submit(self, questions: Sequence[Question], supplies: Supplies | None) -> Future[Done]:
-        """Have questions worked on."""
+        """Give questions to a worker."""
         if self._executor is None:
             self._executor = self._make()
         return self._executor.submit(work, questions, supplies, self._run)
 
     def renew(self) -> None:
-        """Give up an executor that lost its workers, or that is no longer needed."""
+        """Shut down an executor that lost its workers, or that is no longer needed."""
         if self._executor is not None:
             self._end(self._executor)
             self._executor = None
@@ -281,11 +281,11 @@ class Pool:
 
 @contextmanager
 def pool_of(jobs: int, dask: str | None = None, *, worth: int = _WORTH_A_POOL) -> Iterator[Pool | None]:
-    """Yield processes of this machine, or a Dask cluster at an address; None for one job."""
+    """Yield a pool of processes on this machine, or of a Dask cluster at an address; None for one job."""
     if dask is not None:
         with _dask_client(dask) as client:
             workers = sum(client.nthreads().values())
-            # Dask cancels where nobody waits, also what was begun.
+            # Dask cancels tasks for which nobody waits, even those that have begun.
             yield Pool(
                 client.get_executor,
                 max(1, workers),
@@ -336,14 +336,14 @@ class WalkAnswer:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """Return what :mod:`silo.bom.report` writes of an extraction; or the one key of an error."""
+        """Return what :mod:`silo.bom.report` wrote of an extraction; or an error, as its only key."""
         if self._plain is None:
             self._plain = json.loads(self.known.answer)
         return self._plain
 
     @property
     def found(self) -> Extraction | SiloError:
-        """Return the BOM, or why there is none."""
+        """Return the BOM, or the error that explains why there is none."""
         if "document" in self.plain:
             return DocumentError(*self.plain["document"])
         if "several" in self.plain:
@@ -388,7 +388,7 @@ class VaultReader:
         return self._session.contents.reads + self._elsewhere
 
     def ask(self, question: Question) -> WalkAnswer:
-        """Ask one question."""
+        """Answer a question from the index, or by reading files."""
         answer = self.index.recall(question.path, question.name)
         if answer is None:
             self.asked += 1
@@ -441,7 +441,7 @@ class VaultReader:
     def _recalled(
         self, asked: Sequence[Question], numbers: Iterable[int]
     ) -> Iterator[tuple[int, StoredAnswer | None]]:
-        """Yield what the index has, question by question."""
+        """Yield what the index has for each question."""
         for group in grouped(numbers, _RECALLED):
             yield from zip(
                 group,
@@ -469,7 +469,7 @@ class VaultReader:
         self.index.remember(question.path, question.name, answer)
 
     def _worked_on(self, chunks: Iterable[_Chunk], pool: Pool | None) -> Iterator[First]:
-        """Yield what the chunks gave, in their order."""
+        """Yield the results of the chunks, in their order."""
         waiting: deque[_Chunk] = deque()
         for chunk in chunks:
             if pool is None:
@@ -483,7 +483,7 @@ class VaultReader:
             yield from self._collect(waiting, pool)
 
     def _collect(self, waiting: deque[_Chunk], pool: Pool) -> list[First]:
-        """Return what the first chunk that waits gave."""
+        """Wait for the first waiting chunk, and return its results."""
         chunk = waiting[0]
         while chunk.asked is not None:
             try:
@@ -502,7 +502,7 @@ class VaultReader:
         return done.found
 
     def _again(self, waiting: Iterable[_Chunk], pool: Pool) -> None:
-        """Ask again what a dead worker had not finished; a file that kills twice is asked alone."""
+        """Ask again what a dead worker had not finished; a file that kills two workers is asked alone."""
         lost = [chunk for chunk in waiting if chunk.asked is not None and not _succeeded(chunk.asked)]
         pool.renew()
         for chunk in lost:
@@ -510,7 +510,7 @@ class VaultReader:
             chunk.asked = pool.submit(chunk.questions, chunk.supplies) if chunk.tries < _TRIES else None
 
     def _alone(self, question: Question, supplies: Supplies | None, pool: Pool) -> First:
-        """Return one question in a process of its own."""
+        """Answer one question in a process of its own."""
         with pool.alone() as executor:
             try:
                 return self._counted(executor.submit(work, [question], supplies, str(uuid4())).result())[0]
@@ -526,18 +526,18 @@ def _succeeded(future: Future[Any]) -> bool:
 
 
 def grouped(several: Iterable[T], size: int) -> Iterator[list[T]]:
-    """Yield lists of ``size``; the last one may be shorter."""
-    left = iter(several)
-    while group := list(islice(left, size)):
+    """Yield lists of ``size`` items; the last one may be shorter."""
+    rest = iter(several)
+    while group := list(islice(rest, size)):
         yield group
 
 
 def tapered(several: Sequence[T], size: int, jobs: int) -> Iterator[Sequence[T]]:
-    """Yield lists of ``size``, and smaller ones towards the end, so that no worker is left with much
+    """Yield lists of ``size`` items, and smaller ones towards the end, so that no worker has much left
     to do.
     """
     at = 0
     while at < len(several):
-        some = min(size, max(_LEAST, (len(several) - at) // (3 * jobs)))
-        yield several[at : at + some]
-        at += some
+        count = min(size, max(_LEAST, (len(several) - at) // (3 * jobs)))
+        yield several[at : at + count]
+        at += count
