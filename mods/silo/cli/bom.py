@@ -69,7 +69,7 @@ def add_bom(parser: argparse.ArgumentParser) -> None:
 
 
 def run_bom(args: argparse.Namespace) -> int:
-    """Print the BOM; 1 where an error says that it is not the whole one."""
+    """Print the BOM; returns 1 if an error says that it is incomplete."""
     if args.verify:
         return _verify(args)
     if args.why:
@@ -141,14 +141,16 @@ def _why(args: argparse.Namespace) -> int:
 
 
 def _exit_of(extraction: Extraction, args: argparse.Namespace) -> int:
-    """Return 1 if an error says that the BOM is not whole, or if own parts of the file are no items yet."""
+    """Return exit code 1 if an error makes the BOM incomplete, or if own parts of the file are no items
+    yet.
+    """
     incomplete = extraction.blocked and not args.allow_missing
     return Exit.UNDONE if incomplete or extraction.assembly.own else Exit.DONE
 
 
 def _show_each(args: argparse.Namespace) -> int:
-    """Show each assembly of a file; of a folder with its own lines, children first. 1 where one is not
-    whole.
+    """Show each assembly of a file; in a folder, each with its own lines, children first. Returns 1 if one is
+    incomplete.
     """
     if args.flat or args.resolve or args.csv or args.xlsx:
         raise InputError("--flat, --resolve, --csv and --xlsx are for one assembly; name its file.")
@@ -180,7 +182,7 @@ def _show_each(args: argparse.Namespace) -> int:
 
 
 def _table(extraction: Extraction, *, flat: bool) -> list[list[str | int]]:
-    """Return the lines for a spreadsheet, with a heading; ``level`` 1 stands below the assembly itself."""
+    """Make the rows of a spreadsheet, with a heading; ``level`` is 1 for direct children of the assembly."""
     rows: list[dict[str, Any]] = []
 
     def grow(entries: list[dict[str, Any]]) -> None:
@@ -225,9 +227,9 @@ def _write_xlsx(path: str, rows: list[list[str | int]]) -> None:
 
 
 def _verify(args: argparse.Namespace) -> int:
-    """Return the geometry as witness: the BOM as live FreeCAD has it, against the solids shown.
+    """Compare the BOM, as live FreeCAD has it, with the solids that FreeCAD shows.
 
-    Asked is a FreeCAD that can open all files of the assembly, each with the version that saved it.
+    It asks a FreeCAD that can open all files of the assembly, by the versions that saved them.
     """
     from silo.bom.document import saved_by
     from silo.bom.links import extract
@@ -265,7 +267,7 @@ def _verify(args: argparse.Namespace) -> int:
 
 
 def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> BomEntry:
-    """Return the entry with all its children again, those without a part number too."""
+    """Give an entry all its children back, also those without a part number."""
     entries = (*entry.children, *(unresolved.get(child.key, child) for child in entry.unregistered))
     children = (
         replace(_whole(bom_entry, unresolved), quantity=child.quantity, level=child.level)
@@ -281,7 +283,7 @@ def add_where_used(parser: argparse.ArgumentParser) -> None:
 
 
 def run_where_used(args: argparse.Namespace) -> int:
-    """Print the files; those of an unchanged vault are known from the index."""
+    """Print the files; for an unchanged vault the index knows them."""
     from silo.vault.reading import Question
 
     if not os.path.isdir(args.root):
@@ -331,7 +333,7 @@ def run_where_used(args: argparse.Namespace) -> int:
 
 
 def _above(part: str, users: Mapping[str, set[str]]) -> set[str]:
-    """Return all files that use one, directly or not."""
+    """Find all files that use ``part``, directly or not."""
     result: set[str] = set()
     left = [part]
     while left:
@@ -356,7 +358,7 @@ def add_relink(parser: argparse.ArgumentParser) -> None:
 
 
 def run_relink(args: argparse.Namespace) -> int:
-    """Mend the links; 2 where no link records OLD, or NEW does not hold what they want."""
+    """Mend the links; returns 2 if no link records OLD, or if NEW does not hold what they want."""
     from silo.fcstd.linked import Relinked, relink
 
     folder = os.path.dirname(os.path.realpath(args.top))
@@ -411,7 +413,7 @@ def _closed(path: str) -> None:
 
 
 def _documents(top: str) -> list[str]:
-    """Return the files of the tree, as far as they can be read."""
+    """List the files of the tree that can be read."""
     try:
         extraction = common.read_assembly(top)
     except SiloError:  # such as no assembly in the file: its own links can be mended anyway
@@ -431,7 +433,9 @@ def add_diff(parser: argparse.ArgumentParser) -> None:
 
 
 def run_diff(args: argparse.Namespace) -> int:
-    """Print the comparison; with ``--check`` 1 on drift, on broken links and on unregistered components."""
+    """Print the comparison; with ``--check`` returns 1 for drift, broken links and unregistered
+    components.
+    """
     from silo.batch import suggest_by_identity
     from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
 
@@ -467,7 +471,7 @@ def run_diff(args: argparse.Namespace) -> int:
 
 
 def _folder_diff(args: argparse.Namespace) -> int:
-    """Show every assembly of a folder against the server; only those that differ."""
+    """Compare every assembly of a folder with the server, and show those that differ."""
     from silo.batch import RunSummary, SyncOptions, is_news
     from silo.bom_sync import blocking
     from silo.cli import show
@@ -572,7 +576,9 @@ def add_bom_diff(parser: argparse.ArgumentParser) -> None:
 
 
 def run_bom_diff(args: argparse.Namespace) -> int:
-    """Print the comparison. 1 where a BOM could not be read whole, and with ``--check`` where one changed."""
+    """Print the comparison. Returns 1 if a BOM could not be read completely, and with ``--check`` if one
+    changed.
+    """
     from silo.bom.compare import compare_assemblies
 
     check_writable(*args.report)
@@ -599,7 +605,7 @@ def run_bom_diff(args: argparse.Namespace) -> int:
 
 
 def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
-    """Return what is to be compared. Raises InputError."""
+    """Read the two states to compare. Raises InputError."""
     from silo.vault.plan import read_folder
 
     if args.git is None:
@@ -618,7 +624,7 @@ def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
     with scratch_folder("silo-bom-diff-") as scratch:
 
         def state(name: str, revision: str | None) -> tuple[Path, list[tuple[str, str]]]:
-            """Return the whole repository as it was: the folder may use what lies beside it."""
+            """Lay out the whole repository as it was, since the folder may use files beside it."""
             folder = Path(top) if revision is None else Path(scratch, name)
             return folder, [] if revision is None else lay_out(top, revision, folder, laid)
 
@@ -652,7 +658,7 @@ def _quantities(line: LineChange) -> str:
 
 
 def _where(line: LineChange, change: AssemblyChange) -> str:
-    """Return the file, and the object if the assembly has another one of it."""
+    """Return a line's file, with the object if the assembly has another object of that file."""
     heads = [
         bom_entry for state in (change.old, change.new) if state for bom_entry in (state.head, *state.lines)
     ]

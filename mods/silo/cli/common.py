@@ -145,7 +145,7 @@ def _report_in(forms: str) -> Callable[[str], str]:
 
 
 def add_shared(parser: argparse.ArgumentParser, command: str) -> None:
-    """Give a command the options that it shares with others."""
+    """Add to a command the options that it shares with others."""
     groups: dict[str, Any] = {"": parser}
     for option in shared_options():
         if command in option.commands.split():
@@ -165,7 +165,9 @@ def add_top(parser: argparse.ArgumentParser, *alone: str) -> None:
 
 
 def add_each(parser: argparse.ArgumentParser, name: str, *alone: str, **how: Any) -> None:
-    """Add what the command runs for, one after the other; ``alone``: options that need a single one."""
+    """Add the arguments that name what the command runs for, one after the other; ``alone``: options that
+    need a single one.
+    """
     parser.add_argument(name, nargs="+", **how)
     parser.set_defaults(each=name, alone=alone)
 
@@ -182,16 +184,16 @@ def options(parser: argparse._ActionsContainer, helps: Mapping[str, str]) -> Non
 
 
 def only_with(parser: argparse.ArgumentParser, needed: str, *options: str) -> None:
-    """Refuse ``options`` without the option ``needed``: a person who gave one believes that it did something.
+    """Refuse ``options`` without the option ``needed``, since a person expects that an option does something.
 
-    Several needed ones, as "--apply --plan": any of them.
+    ``needed`` may name several, such as "--apply --plan"; any of them is enough.
     """
     needs = parser.get_default("needs") or ()
     parser.set_defaults(needs=(*needs, *((option, needed) for option in options)))
 
 
 def not_with(parser: argparse.ArgumentParser, other: str, *options: str) -> None:
-    """Refuse ``options`` beside the option ``other``, with which they do nothing."""
+    """Refuse ``options`` together with the option ``other``, with which they do nothing."""
     excludes = parser.get_default("excludes") or ()
     parser.set_defaults(excludes=(*excludes, *((option, other) for option in options)))
 
@@ -215,19 +217,19 @@ def refuse_idle_options(parser: argparse.ArgumentParser, args: argparse.Namespac
 
 
 def a_path(text: str) -> Path:
-    """Return an argument that is a path; an empty one would be the current folder."""
+    """Read an argument that is a path. Refuses an empty one, which would be the current folder."""
     if not text:
         raise InputError("the name of a file or folder is empty ('')")
     return Path(text)
 
 
 def job_count(text: str) -> int:
-    """Return how many processes, as an argument."""
+    """Read a number of processes from an argument."""
     return above_zero(text, most=512)
 
 
 def above_zero(text: str, most: int = 1_000_000_000) -> int:
-    """Return a count as an argument: a whole number, not 0 and not less."""
+    """Read a count from an argument: a whole number above 0."""
     if not text.isascii() or not text.isdigit() or not 1 <= int(text[:20]) <= most:
         raise argparse.ArgumentTypeError(f"{text[:50]!r} is no number from 1 to {most}")
     return int(text)
@@ -235,7 +237,7 @@ def above_zero(text: str, most: int = 1_000_000_000) -> int:
 
 @contextmanager
 def reading_of(args: argparse.Namespace) -> Iterator[VaultReader]:
-    """Yield the reader of files, as the options say."""
+    """Yield a reader of files with the options of the command."""
     from silo.vault.index import Index, default_path
     from silo.vault.reading import VaultReader, pool_of
 
@@ -263,7 +265,7 @@ def client_of(
     """Yield a client for the server that the options, the environment or the configuration name.
 
     busy_tries, longest
-        for jobs that may wait: how often a server that puts us off is asked, and the longest pause (seconds).
+        for jobs that may wait: how often a busy server is asked, and the longest pause (seconds).
     stop
         once it is set, nobody waits for the server any more.
     """
@@ -291,9 +293,7 @@ def client_of(
 
 
 def read_assembly(top: str) -> Extraction:
-    """Return the BOM of a file, read without FreeCAD; missing files come with the ones that were probably
-    meant.
-    """
+    """Read the BOM of a file without FreeCAD, and suggest which files were meant by missing ones."""
     from silo.fcstd import Library
 
     with Library() as library:
@@ -312,9 +312,9 @@ def _with_suggestions(extraction: Extraction) -> Extraction:
 
 
 def read_tops(args: argparse.Namespace) -> list[Extraction]:
-    """Return the BOM of the file that the options name, from the index where it is known. Raises SiloError.
+    """Read the BOM of the file that the options name, or get it from the index. Raises SiloError.
 
-    Of each assembly of the file if all are asked for, else one.
+    Reads each assembly of the file if all are asked for, else one.
     """
     from silo.vault.reading import Question
 
@@ -384,25 +384,27 @@ def progress_of(command: str) -> Iterator[None]:
 
 
 def at(step: str) -> None:
-    """Set what the running command does now."""
+    """Set the text for what the running command does now."""
     for progress in _running[-1:]:
         progress.step = step
 
 
 def sending(entry: Entry, done: int, total: int) -> None:
-    """Set that a file of the queue is sent; both counts in bytes."""
+    """Set that a file of the queue is being sent; both counts in bytes."""
     at(f"sending {entry.label or entry.file_name}, {done * 100 // max(total, 1)} %")
 
 
 def count_steps(count: int) -> Callable[[str], None]:
-    """Return what sets the next of ``count`` steps, by its name."""
+    """Return a function that shows the next of ``count`` steps, by its name."""
     numbers = itertools.count(1)
     return lambda name: at(f"[{next(numbers)}/{count}] {name}")
 
 
 @contextmanager
 def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, VaultReader, str]]:
-    """Yield all assemblies of the folder that the options name, and the folder. InputError if it has none."""
+    """Yield the plan of all assemblies in the folder that the options name, its reader, and the folder.
+    InputError if there is none.
+    """
     from silo.files import documents_in
     from silo.vault.plan import make_plan
 
@@ -424,7 +426,7 @@ def refuse_assembly_of(tops: Sequence[str], assembly: str | None) -> None:
 
 
 def named_item(client: SiloClient, number: str) -> Item:
-    """Return the item that a person named. InputError if there is none: it is the name that is wrong."""
+    """Get the item that a person named. InputError if there is none, since then the name is wrong."""
     try:
         return client.get_item(number)
     except RouteMissingError:
@@ -434,7 +436,7 @@ def named_item(client: SiloClient, number: str) -> Item:
 
 
 def reach(client: SiloClient, extraction: Extraction | None = None) -> None:
-    """Report a wrong address or token also where no component has an identity to ask the server about."""
+    """Report a wrong address or token even if no component has an identity about which to ask the server."""
     entries = () if extraction is None else walk_entries((extraction.assembly, *extraction.entries))
     if any(entry.silo_uuid for entry in entries):
         return
@@ -443,12 +445,12 @@ def reach(client: SiloClient, extraction: Extraction | None = None) -> None:
 
 
 def print_json(data: Any) -> None:
-    """Print JSON on standard output; escaped where that is not UTF-8, or a file's name is not."""
+    """Print JSON on standard output; escaped if that is not UTF-8, or if a file's name is not."""
     print(json_text(data, indent=2))
 
 
 def json_text(data: Any, indent: int | None = None) -> str:
-    """Return JSON that standard output can take as it is."""
+    """Write JSON with characters that standard output can encode."""
     text = json.dumps(data, indent=indent, ensure_ascii=False)
     unicode = (getattr(sys.stdout, "encoding", None) or "utf-8").lower().replace("-", "") == "utf8"
     try:

@@ -104,7 +104,7 @@ def _demo(folder: Path, port: int) -> Iterator[Demo]:
 
 @contextmanager
 def _merge_events(client: SiloClient) -> Iterator[queue.Queue[MergeEvent]]:
-    """Yield the merges that the server announces, as they come."""
+    """Yield a queue that receives the merges that the server announces."""
     from silo.api.events import EventListener
 
     merges: queue.Queue[MergeEvent] = queue.Queue()
@@ -216,7 +216,7 @@ class Demo:
         self.out.print(f"The page where a person decides: {self.page}", markup=False)
 
     def stay(self) -> None:
-        """Leave the server running to look at."""
+        """Leave the server running, so that people can look at it."""
         if self.login_url:
             path = self.page.removeprefix(self.client.base_url)
             self.out.print(f"Look at it logged in: {self.login_url}?next={quote(path)}", markup=False)
@@ -232,7 +232,7 @@ class Demo:
 
 
 def remove_from_assembly(path: Path, label: str) -> None:
-    """Delete the link with this label from the file, as pressing Delete in the tree does."""
+    """Delete the link with this label from the file, as the Delete key in the tree does."""
 
     def edit(document: ElementTree.Element) -> None:
         name = _object_with_label(path, document, label)
@@ -250,7 +250,7 @@ def remove_from_assembly(path: Path, label: str) -> None:
 
 
 def set_element_count(path: Path, label: str, added: int) -> tuple[int, int]:
-    """Give a link array more elements; returns the count before and after."""
+    """Add elements to a link array; returns the count before and after."""
     counts: list[int] = []
 
     def edit(document: ElementTree.Element) -> None:

@@ -126,7 +126,7 @@ def need_inertia_extra() -> None:
 
 
 def bom_table(args: argparse.Namespace) -> BomTable | None:
-    """Return the BOM by the user's options."""
+    """Read the BOM that the user's options name; None if they name none."""
     from silo.inertia.bom.parser import BOMParser
 
     columns = _pairs(args.column, "--column", "ROLE=HEADER, for example mass=Gewicht")
@@ -148,7 +148,7 @@ def _pairs(texts: Sequence[str], option: str, wanted: str) -> dict[str, str]:
 
 
 def material_table(args: argparse.Namespace) -> MaterialTable:
-    """Return the table by the user's options."""
+    """Load the material table that the user's options name."""
     from silo.inertia.materials import load_materials
 
     return load_materials(args.materials, freecad=not args.no_freecad_materials)
@@ -170,9 +170,7 @@ def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
 
 
 def check_outputs(args: argparse.Namespace) -> None:
-    """Raise InputError for files that cannot be written, or that must not be: what is read, and one file
-    twice.
-    """
+    """Raise InputError for files that cannot be written, or must not be: an input file, or one file twice."""
     from silo.inertia.geometry.graph import is_model_name
 
     report: list[str] = getattr(args, "report", [])
@@ -195,7 +193,7 @@ def check_outputs(args: argparse.Namespace) -> None:
 
 
 def read_options(args: argparse.Namespace, **more: Any) -> ReadOptions:
-    """Return what the arguments say about reading geometry."""
+    """Make the options for reading geometry from the arguments."""
     from silo.inertia.geometry import ReadOptions
 
     return ReadOptions(
@@ -209,7 +207,7 @@ def read_options(args: argparse.Namespace, **more: Any) -> ReadOptions:
 
 
 def read(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
-    """Return the geometry, with progress on standard error; Ctrl-C stops it at once."""
+    """Read the geometry, and show the progress on standard error; Ctrl-C stops it at once."""
     from silo.inertia.calculator import read_geometry
 
     with _progress(Path(path).name) as progress:
@@ -247,7 +245,7 @@ def _progress(name: str) -> Iterator[Any]:
 
 
 def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly, *, quiet: bool = False) -> None:
-    """Write every file that was asked for, and print the report; only its warnings where ``quiet``."""
+    """Write every file that was asked for, and print the report; only its warnings if ``quiet``."""
     from silo.cli.show import console
 
     _write_files(args, report, assembly)
@@ -288,8 +286,8 @@ def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Asse
 
 
 def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
-    """Return the exit code: 1 where something could not be read, with --strict where a warning is not
-    allowed.
+    """Return exit code 1, and print why, if a warning without --allow says that something could not be read;
+    with --strict, if there is any warning without --allow.
     """
     from silo.inertia.model import GeometryCode
 
@@ -308,7 +306,7 @@ def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
 def push_report(
     args: argparse.Namespace, report: InertiaReport, part_numbers: Mapping[str, str] | None = None
 ) -> int:
-    """Write the masses to the server, or show the plan; 1 where an item is unknown there."""
+    """Write the masses to the server, or show the plan; returns 1 if an item is unknown there."""
     from silo.inertia.push import plan_push, push
 
     plan = plan_push(report, part_numbers, args.item)
@@ -416,7 +414,7 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
 
 
 def run_inertia(args: argparse.Namespace) -> int:
-    """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
+    """Calculate and show; returns 1 for warnings with --strict, or items that a push did not find."""
     need_inertia_extra()
     check_options(args, asks_server=args.push and not args.dry_run)
     if args.urdf_out and args.in_place:
@@ -520,7 +518,7 @@ def add_links(parser: argparse.ArgumentParser) -> None:
 
 
 def run_links(args: argparse.Namespace) -> int:
-    """Read, group, write."""
+    """Read the geometry, group it into links, and write the map."""
     need_inertia_extra()
     if args.clusters is not None and args.clusters < 1:
         raise InputError(f"--clusters: wanted a number of links above 0, got {args.clusters}")
@@ -586,7 +584,7 @@ def add_mass(parser: argparse.ArgumentParser) -> None:
 
 
 def run_mass(args: argparse.Namespace) -> int:
-    """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
+    """Calculate and show; returns 1 for warnings with --strict, or items that a push did not find."""
     need_inertia_extra()
     # The documents hold identities; their part numbers are the server's, for a preview as well.
     check_options(args, asks_server=args.push)
@@ -617,8 +615,8 @@ def run_mass(args: argparse.Namespace) -> int:
 
 
 def _push(args: argparse.Namespace, report: InertiaReport) -> int:
-    """Return the documents' identities give the part numbers; the top assembly's own, unless --item says
-    another.
+    """Push the masses to the items with the part numbers of the documents' identities; --item replaces that
+    of the top assembly.
     """
     from silo.bom.report import base_of
     from silo.bom_sync import resolve

@@ -243,7 +243,9 @@ class _Parser(argparse.ArgumentParser):
 
 
 def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
-    """Return the whole command line; of the commands only what ``words`` choose, if they are given."""
+    """Build the parser of the whole command line; if ``words`` are given, only with the command that they
+    choose.
+    """
     parser = _Parser(
         prog="silo-mod",
         usage="silo-mod [-h] [--version] COMMAND ...",
@@ -452,7 +454,7 @@ class _Output(io.TextIOBase):
         return otherwise
 
     def _forget(self) -> None:
-        """Drop what is left in a stream: at its end Python would write it and fail again."""
+        """Drop what is left in a stream, since Python would write it at the end and fail again."""
         with suppress(OSError, ValueError):
             null = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null, self._stream.fileno())
@@ -466,14 +468,11 @@ class _Output(io.TextIOBase):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """Return the encoding of the stream."""
         return getattr(self._stream, "encoding", None) or "utf-8"
 
 
 def _system_said_no(error: OSError) -> InputError:
-    """Return a file that we were asked to write, or the output itself: no such folder, no right, a full
-    disk.
-    """
+    """Describe why a file or the output cannot be written: no such folder, no right, a full disk."""
     what = error.filename or "the output cannot be written"
     return InputError(f"{what}: {error.strerror or error}")
 

@@ -44,7 +44,7 @@ def add_commit(parser: argparse.ArgumentParser) -> None:
 
 
 def run_status(args: argparse.Namespace) -> int:
-    """Print how each file stands. 1 where folder and server differ."""
+    """Print how each file stands. Returns 1 if folder and server differ."""
     from silo.outbox.store import Store
     from silo.vault.project import find_project, stand
 
@@ -62,8 +62,9 @@ def run_status(args: argparse.Namespace) -> int:
 
 
 def run_commit(args: argparse.Namespace) -> int:
-    """Send what differs, through the queue. 1 where anything is not in Silo afterwards; 3 where the server
-    does not answer: then all that the project does not remember as sent is kept in the queue."""
+    """Send what differs, through the queue. Returns 1 if anything is not in Silo afterwards; 3 if the server
+    does not answer: then the queue keeps everything that the project does not remember as sent.
+    """
     from silo.outbox.send import Report, send_all
     from silo.outbox.store import Store
     from silo.vault.project import (
@@ -123,7 +124,9 @@ def run_commit(args: argparse.Namespace) -> int:
 
 
 def _send_models(belonging: Belonging, client: SiloClient) -> tuple[int, list[str]]:
-    """Send what the server does not draw yet of these files; the commits stand, whatever becomes of it."""
+    """Send the models that the server lacks of these files. The commits remain done, whatever happens
+    here.
+    """
     try:
         from silo.drawing.models import send_models
     except ImportError:

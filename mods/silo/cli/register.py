@@ -76,8 +76,8 @@ Nothing is registered before the last question. Ctrl-C leaves everything as it w
 
 
 def read_line(prompt: str) -> str | None:
-    """Return what a person types; None at the end of the input. Standard output may be JSON, so they read
-    stderr.
+    """Ask a person for a line; None at the end of the input. Asks on stderr, since standard output may be
+    JSON.
     """
     common.at("")
     print(prompt, end="", file=sys.stderr, flush=True)
@@ -109,7 +109,7 @@ class Dialog:
         self._earlier = CandidateFiles()
 
     def ask(self) -> tuple[list[Order], list[Candidate]]:
-        """Return the orders, and the components that are left without a number."""
+        """Ask about each component. Returns the orders, and the components that stay without a number."""
         orders: list[Order] = []
         left: list[Candidate] = []
         for number, candidate in enumerate(self._candidates):
@@ -167,7 +167,9 @@ class Dialog:
         return f"{order.item_type} {order.name!r}, category {order.category} ({meaning})"
 
     def _changed(self, order: Order, what: str, text: str) -> Order:
-        """Return the order with the change; unchanged, with an explanation, if it is not possible."""
+        """Return the order with the change; if it is not possible, explain that and return the order
+        unchanged.
+        """
         if what == "name":
             if problem := wrong_name(text, order.candidate):
                 _say(f"  {problem}")
@@ -275,7 +277,7 @@ def add_register(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Register what is unregistered; 1 where something was skipped or failed."""
+    """Register what is unregistered; returns 1 if something was skipped or failed."""
     taken = args.undeclare or args.not_a_part
     if args.orphans:
         return _orphans(args)
@@ -314,9 +316,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
-    """Return the components, the files that no assembly uses, and whether there is a file that cannot be
-    read.
-    """
+    """Read the components, the files that no assembly uses, and if any file cannot be read."""
     if not os.path.isdir(args.top):
         extraction = common.read_tops(args)[0]
         return extraction, frozenset(), _tell_missing(extraction, base_of(extraction))
@@ -328,7 +328,7 @@ def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
 
 
 def _tell_missing(extraction: Extraction, base: str) -> bool:
-    """Report the files that nobody can register, for they are not there."""
+    """Report the missing files, which nobody can register."""
     from silo.cli.show import plain
 
     missing = {entry.doc_path for entry in walk_entries(extraction.entries) if entry.missing}
@@ -415,7 +415,7 @@ class _RegisterRun:
         return self.register(*Dialog(offered, self.found, self.client, self.base, is_own).ask())
 
     def write_plan(self, unused: frozenset[str]) -> int:
-        """Return the table; nothing is registered."""
+        """Write the table of all components, and register nothing."""
         from silo.platform import replacing
 
         earlier = CandidateFiles()
@@ -440,7 +440,9 @@ class _RegisterRun:
         return Exit.DONE
 
     def all_but_duplicates(self, unused: frozenset[str]) -> tuple[list[Order], list[Candidate]]:
-        """Return every proposal; what seems to be an item already is treated as ``--duplicates`` says."""
+        """Divide the components into orders and those to leave; ``--duplicates`` decides about components
+        that seem to be items already.
+        """
         orders, left = [], []
         earlier = CandidateFiles()
         for candidate in self.found.candidates:
@@ -464,7 +466,7 @@ class _RegisterRun:
         return orders, left
 
     def register(self, orders: Sequence[Order], left: Sequence[Candidate], *, already: int = 0) -> int:
-        """Carry out; what was done is reported also where Ctrl-C ends it."""
+        """Register the orders; the result is reported even if Ctrl-C ends it."""
         try:
             done = carry_out_on_disk(
                 orders,
@@ -503,7 +505,7 @@ class _RegisterRun:
 
 
 def _declare(args: argparse.Namespace) -> int:
-    """Give what is modelled in the file an identity; 1 where that failed."""
+    """Give an identity to what is modelled in the file; returns 1 if that failed."""
     articles = modelled(args.top, args.assembly)
     wanted = chosen(articles, args.declare, apart=args.apart)
     for part in wanted:
@@ -531,7 +533,7 @@ def _declare(args: argparse.Namespace) -> int:
 
 
 def _undeclare(args: argparse.Namespace) -> int:
-    """Take identities and marks out of the file; what is no part gets its mark."""
+    """Take identities and marks out of the file; an object that is no part gets its mark."""
     from silo.fcstd import unstamp
 
     no_part = bool(args.not_a_part)
@@ -555,7 +557,7 @@ def _undeclare(args: argparse.Namespace) -> int:
 
 
 def _orphans(args: argparse.Namespace) -> int:
-    """List the items that no file names, or archive them; 1 where some are left."""
+    """List the items that no file names, or archive them; returns 1 if any are left."""
     journal, rows, done = Journal(), [], args.orphans == "archive"
     base = os.path.join(os.path.realpath(args.top), "")
     with common.client_of(args) as client:
@@ -580,7 +582,9 @@ def _orphans(args: argparse.Namespace) -> int:
 
 
 def _asker(how: str) -> Ask:
-    """Return which of the items that fit is the component's: as ``--unclear`` says."""
+    """Make the function that decides, as ``--unclear`` says, which of several matching items a component
+    gets.
+    """
 
     def ask(proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
         if how == "new":

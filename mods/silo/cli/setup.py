@@ -67,7 +67,7 @@ def need_server_extra() -> None:
 
 
 def run_serve(args: argparse.Namespace) -> int:
-    """Serve until stopped, which is how a server ends: 0 also after Ctrl-C or a TERM signal."""
+    """Serve until stopped, which is how a server ends: returns 0 also after Ctrl-C or a TERM signal."""
     need_server_extra()
     from silo_server.run import Greeting, serve
 
@@ -109,7 +109,7 @@ def add_summaries(parser: argparse.ArgumentParser) -> None:
 
 
 def run_summaries(args: argparse.Namespace) -> int:
-    """Return 0 once all is summed up; the server keeps it from then on by itself."""
+    """Sum up all assemblies and return 0; from then on the server keeps the sums itself."""
     need_server_extra()
     from silo_server.db.engine import Database
     from silo_server.db.migrate import upgrade
@@ -140,7 +140,7 @@ def _add_place(parser: argparse.ArgumentParser) -> None:
 
 
 def run_backup(args: argparse.Namespace) -> int:
-    """Return 0; 1 where files are missing that the server itself has lost."""
+    """Make a backup; returns 1 if files are missing that the server itself has lost."""
     need_server_extra()
     from silo_server.backup import back_up
     from silo_server.settings import settings_from_environment
@@ -155,7 +155,7 @@ def run_backup(args: argparse.Namespace) -> int:
 
 
 def run_restore(args: argparse.Namespace) -> int:
-    """Return 0 if the backup was whole and is now the server's state."""
+    """Replace the server's state by a backup, or with ``--verify`` only check that the backup is whole."""
     need_server_extra()
     from silo_server.backup import restore, verify
     from silo_server.settings import settings_from_environment
@@ -270,7 +270,7 @@ def add_login(parser: argparse.ArgumentParser) -> None:
 
 
 def run_login(args: argparse.Namespace) -> int:
-    """Save what was seen to work; nothing is written where the server refuses."""
+    """Save the server and the token if they work; writes nothing if the server refuses them."""
     from silo.api.client import SiloClient
     from silo.api.config import config_path, resolve_server, save_config
     from silo.outbox.store import Store
@@ -298,7 +298,9 @@ def run_login(args: argparse.Namespace) -> int:
 
 
 def _token_by_browser(args: argparse.Namespace) -> str:
-    """Return the token that a person let in on the server's page; "" without a terminal or such a page."""
+    """Let a person allow a new token on the server's page, and return it; "" without a terminal or such a
+    page.
+    """
     if args.paste or not sys.stdin.isatty():
         return ""
     from silo.api.client import SiloClient
@@ -344,7 +346,7 @@ def add_doctor(parser: argparse.ArgumentParser) -> None:
 
 
 def run_doctor(args: argparse.Namespace) -> int:
-    """Print what was found; 2 or 3 where something that the commands need does not work."""
+    """Print what was found; returns 2 or 3 if something that the commands need does not work."""
     checks = {**_machine(), **_server(args)}
     failed = {name: value for name, value in checks.items() if isinstance(value, SiloError)}
     if args.json:
@@ -378,7 +380,9 @@ def _machine() -> Rows:
 
 
 def _program() -> str:
-    """Return the version; ConfigError if another distribution has files in the same package."""
+    """Return the versions of silo-mod and Python; ConfigError if another distribution has a package of the
+    same name.
+    """
     names = {name.replace("_", "-") for name in importlib.metadata.packages_distributions().get("silo", ())}
     if others := sorted(names - {"silo-mod"}):
         raise ConfigError(
@@ -397,7 +401,7 @@ def _configuration() -> str:
 
 
 def _folder(path: os.PathLike[str]) -> str | SiloError:
-    """Return the folder, which need not be there yet; an error where nothing can be written to it."""
+    """Return the folder, which need not exist yet; an error if nothing can be written to it."""
     there = os.fspath(path)
     while not os.path.lexists(there) and os.path.dirname(there) != there:
         there = os.path.dirname(there)
@@ -456,7 +460,7 @@ def _server(args: argparse.Namespace) -> Rows:
 
 
 def look(client: SiloClient, schema: str) -> dict[str, Any]:
-    """Ask for each thing; an error is an answer too."""
+    """Ask for each fact; an error is an answer too."""
     return {
         "mode": _tried(lambda: _mode(client)),
         "who": _tried(lambda: _who(client)),
@@ -519,7 +523,7 @@ def add_install_addon(parser: argparse.ArgumentParser) -> None:
 
 
 def run_install_addon(args: argparse.Namespace) -> int:
-    """Install, and say where."""
+    """Install the add-on, and print where it is."""
     from silo.freecads import ask_freecad, install_folder, install_packages
 
     place = ask_freecad(args.freecadcmd, Path(args.freecad_data) if args.freecad_data else None)

@@ -22,7 +22,7 @@ from silo.bom_sync import Status
 
 
 def schema_of(name: str) -> dict[str, Any]:
-    """Return the schema of a command's JSON. InputError names all that there are."""
+    """Return the schema of a command's JSON. InputError names all schemas."""
     if name not in NAMES:
         raise InputError(f"there is no schema {name!r}; there are: {', '.join(NAMES)}")
     if name in ("inertia", "mass"):
@@ -45,7 +45,7 @@ class _Open(BaseModel):
 
 
 def _shape(title: str, /, base: type[BaseModel] = JsonForm, doc: str = "", **keys: Any) -> Any:
-    """Return a shape; each key with its type, or with (type, default) where it may be left out."""
+    """Make a model; each key has its type, or (type, default) if it may be left out."""
     fields: dict[str, Any] = {}
     for key, given in keys.items():
         kind, *default = given if isinstance(given, tuple) else (given,)

@@ -61,26 +61,26 @@ class _Terminal(Console):
         raise BrokenPipeError
 
     def print(self, *shown: Any, **how: Any) -> None:
-        """Print; sentences in the language of the person."""
+        """Print; texts of ours in the person's language."""
         super().print(*(spoken(one) if isinstance(one, str) else one for one in shown), **how)
 
 
 def console(stream: TextIO | None = None) -> Console:
-    """Return the terminal. A file or a pipe has no width: each record is one line there, and whole."""
+    """Open the terminal. A file or a pipe has no width: each record is one whole line there."""
     stream = stream or sys.stdout
     return _Terminal(file=stream, highlight=False, width=None if stream.isatty() else _ENDLESS)
 
 
 def plain(text: str) -> str:
-    """Return text of a file or a server without control characters: it may not steer the terminal, nor fill
-    it.
+    """Replace control characters in text of a file or a server, and cut it: it may neither steer the terminal
+    nor fill it.
     """
     shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
     return "".join(c if c.isprintable() else "�" for c in shown)
 
 
 def entry_text(entry: BomEntry, base: str) -> Text:
-    """Return one line of the tree."""
+    """Write one line of the tree."""
     text = Text().append(f"{entry.quantity} × ", "bold")
     if entry.part_number:
         text.append(plain(entry.part_number), "cyan").append("  ").append(plain(entry.name or ""))
@@ -94,7 +94,7 @@ def entry_text(entry: BomEntry, base: str) -> Text:
 
 
 def bom_tree(extraction: Extraction, base: str = "") -> Tree:
-    """Return the multi-level BOM; quantities are per one parent, paths as in :func:`bom_json`."""
+    """Draw the multi-level BOM; quantities are per one parent, paths as in :func:`bom_json`."""
     base = base or base_of(extraction)
     head = extraction.assembly
     title = Text(plain(head.part_number or display_name(head)), "bold")
@@ -126,7 +126,7 @@ def bom_tree(extraction: Extraction, base: str = "") -> Tree:
 
 
 def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Return the flat BOM: a purchaser's table of totals."""
+    """Draw the flat BOM: a purchaser's table of totals."""
     table = Table(box=None, pad_edge=False)
     for title in ("Part number", "Name", "Quantity", "Unit", "Standard or file", ""):
         table.add_column(spoken(title), justify="right" if title == "Quantity" else "left", overflow="fold")
@@ -144,7 +144,7 @@ def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
-    """Return findings, the worst first."""
+    """Write the findings, the worst first."""
     order = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
     lines = []
     for finding in sorted(findings, key=lambda f: order[f.severity]):
@@ -156,7 +156,7 @@ def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
 
 
 def summary_text(summary: ProductSummary) -> Text:
-    """Return what the server says of a product over all levels: what is open, mass and cost."""
+    """Write what the server keeps of a product over all levels: what is open, mass and cost."""
     from silo.bom_sync import summary_texts
 
     texts, values = summary_texts(summary)
@@ -168,10 +168,10 @@ def summary_text(summary: ProductSummary) -> Text:
 
 
 def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -> RenderableType:
-    """Show CAD against server, one row per line that differs or is a person's own.
+    """Draw the difference of CAD and server: a row for each line that differs or that a person added.
 
     whole
-        False where components are missing or have no number: then nobody knows that nothing differs.
+        False if components are missing or have no number: then it is not known that nothing differs.
     """
     table = Table(box=None, pad_edge=False)
     for title, justify in (
@@ -210,7 +210,7 @@ _STATUS = {
 
 
 def outcome_text(outcome: Outcome, base: str) -> Text:
-    """Return one line: which assembly, what became of it, and its file relative to ``base``."""
+    """Write which assembly it was, what became of it, and its file relative to ``base``."""
     from silo.api.boms import unusual
     from silo.batch import STATUS_WORDS
     from silo.bom_sync import draft_text
@@ -231,7 +231,7 @@ def outcome_text(outcome: Outcome, base: str) -> Text:
 
 
 def activity_box(activity: ActivityText) -> Panel:
-    """Return the Activity pane's box (spec §6)."""
+    """Draw the Activity pane's box (spec §6)."""
     body = Text()
     body.append(f"📋 {plain(spoken(activity.headline))}\n", "bold")
     body.append(plain(spoken(activity.counts)))
@@ -247,7 +247,7 @@ def activity_box(activity: ActivityText) -> Panel:
 
 
 def article_json(article: Modelled, base: str) -> Mapping[str, Any]:
-    """Return what is modelled in the file and not counted."""
+    """Return an article that is modelled in the file, as JSON values."""
     return {
         "doc_path": relative(article.entry.doc_path, base),
         "objects": list(article.objects),
@@ -259,7 +259,7 @@ def article_json(article: Modelled, base: str) -> Mapping[str, Any]:
 
 
 def articles_text(articles: Sequence[Modelled], base: str) -> list[str]:
-    """Return the section of what is modelled in the file, line by line."""
+    """Write the section about what is modelled in the file, line by line."""
     lines = ["Modelled in this file, not counted:"]
     most = _MOST_MODELLED if sys.stdout.isatty() else len(articles)
     for article in articles[:most]:
@@ -300,7 +300,7 @@ def registrations(
     left: Sequence[tuple[Proposal, str]],
     articles: Sequence[Modelled],
 ) -> None:
-    """Show the outcome of each; ``left``: proposals that were not registered, and why."""
+    """Show each registration; ``left``: proposals that were not registered, and why."""
     if args.json:
         common.print_json(
             {

@@ -49,7 +49,7 @@ def add_sync(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Sync each file; one failure does not stop the rest. 1 or 3 where anything was left undone."""
+    """Sync each file; one failure does not stop the rest. Returns 1 or 3 if anything was left undone."""
     from silo.batch import ReportFile, RunSummary
     from silo.vault.plan import only_job
 
@@ -166,8 +166,8 @@ class _Shown:
 
 
 def _show(result: TopResult, *, whole: bool) -> None:
-    """Show results. ``whole``: everything about the one file; of many only what changed, for the summary says
-    the rest.
+    """Show a result. ``whole``: everything about the one file; otherwise only what changed, since the summary
+    has the rest.
     """
     from silo.batch import is_news
     from silo.bom_sync import Status
@@ -207,8 +207,8 @@ _STYLES = {"New since the last run": "bold", "Moved": "cyan", "Warnings": "yello
 
 
 def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> list[tuple[str, str, str]]:
-    """Return files that carry on the identity of one that is gone or another item's by now: (name, before,
-    now).
+    """Find the files that took over the identity of a file that is gone, or that has another item now: (name,
+    before, now).
     """
     from silo.bom.document import relative
 
@@ -288,7 +288,9 @@ def add_queue(parser: argparse.ArgumentParser) -> None:
 
 
 def run_queue(args: argparse.Namespace) -> int:
-    """Return 1 where something waits or is held after all; 2 or 3 where the server stops a retry."""
+    """Show the queue, after doing what ``args.do`` says. Returns 1 if something waits or is held; 2 or 3 if
+    the server stops a retry.
+    """
     from silo.api.config import canonical, resolve_server
     from silo.outbox.store import Store
 
@@ -323,7 +325,7 @@ def run_queue(args: argparse.Namespace) -> int:
 
 
 def _retry(args: argparse.Namespace, store: Store, here: str) -> SiloError | None:
-    """Send what waits; return what the server refused to all of it."""
+    """Send what waits; returns the error that stopped it, or None."""
     from silo.outbox.send import send_all
 
     for number in args.numbers:
@@ -382,7 +384,7 @@ def _show_queue(
 
 
 def run_pull(args: argparse.Namespace) -> int:
-    """Return 1 where a file was left alone, or is not in Silo."""
+    """Fetch an item's files into a folder. Returns 1 if a file was left alone, or is not in Silo."""
     from silo.freecads import open_in_any
     from silo.outbox.store import Store
     from silo.vault.pull import Rules, fetched, place, pulled_json
@@ -538,7 +540,7 @@ def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
 def _revision_on_disk(
     store: Store, sha256: str, identity: str, server: str, revisions: list[Revision]
 ) -> tuple[int | None, bool]:
-    """Return the revision that the file is, or was made from, and whether it has edits since."""
+    """Return the revision that the file is or was made from, and if it has edits since."""
     from silo.api.files import standing
 
     for content, edited in ((sha256, False), (store.origin_of(sha256), True)):

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from silo.workbench.session.session import Newer, PaneState, Session
 
 
-# FreeCAD's window comes first; a server is not talked to before it stands.
+# FreeCAD's window comes first; no server is asked before it is open.
 BEGIN_AFTER_MS = 1500
 # What waits is looked at this often; each thing has its own, growing pause besides.
 TICK_MS = 20_000
@@ -70,7 +70,7 @@ class AddOn:
     # -- the session ------------------------------------------------------------------------------------
 
     def begin(self) -> None:
-        """Continue when the window stands."""
+        """Continue the start after the window has opened."""
         from silo.workbench.freecad import saving
 
         saving.watch_edits()
@@ -79,7 +79,7 @@ class AddOn:
     def _begin(self) -> None:
         self.session.begin(live=self.preferences.flag("LiveActivity"))
         self.opened.begin(self.session.look)
-        # The first commit is to be as quick as the others: what it needs is imported while nobody waits. Only
+        # The first commit should be as quick as the others: its modules are imported while nobody waits. Only
         # what has no widgets comes from the worker, for the classes of those are made in the GUI thread.
         self.session.aside(
             "Getting ready",
@@ -104,7 +104,7 @@ class AddOn:
         self._guard_newer_files()
 
     def _ask_team(self) -> None:
-        """Say so if the team works with another FreeCAD."""
+        """Ask the server with which FreeCAD the team works, and say so if it is another one."""
         from silo.workbench.pane.entries import of_team
 
         def told(wanted: str) -> None:
@@ -115,7 +115,7 @@ class AddOn:
             translate("Silo", "Looking at the server"),
             lambda client, _control: client.ready().freecad,
             done=told,
-            failed=lambda _error: None,  # whatever else is asked says it
+            failed=lambda _error: None,  # any other request reports it
         )
 
     def _guard_newer_files(self) -> None:
@@ -129,7 +129,7 @@ class AddOn:
         host.add_document_observer(LossGuard(lambda: self.session.outbox, self.session.add, ask))
 
     def _closing(self) -> None:
-        """Save and hold what was committed before FreeCAD's window closes its documents."""
+        """Save and hold what was committed, before FreeCAD's window closes its documents."""
         if "commits" in vars(self):
             self.commits.finish()
 
@@ -142,7 +142,7 @@ class AddOn:
 
     @cached_property
     def session(self) -> Session:
-        """Return what works beside the GUI thread."""
+        """Make the session, which does the work beside the GUI thread."""
         from silo.workbench.session.session import Listener, Session
         from silo.workbench.settings.server import Keyring, read_known
 
@@ -157,19 +157,19 @@ class AddOn:
 
     @cached_property
     def buttons(self) -> Buttons:
-        """Return what the buttons of the pane do."""
+        """Make the object that does what the buttons of the pane say."""
         return Buttons(self)
 
     @cached_property
     def desk(self) -> LiveDesk:
-        """Return FreeCAD as the flows see it."""
+        """Make the desk: FreeCAD as the flows see it."""
         from silo.workbench.freecad.live_desk import LiveDesk
 
         return LiveDesk(self.opened, lambda: self.preferences.flag("CountHardware"))
 
     @cached_property
     def commits(self) -> CommitFlow:
-        """Return the commit flow."""
+        """Make the commit flow."""
         from silo.workbench.commit.flow import CommitFlow
 
         return CommitFlow(
@@ -182,21 +182,21 @@ class AddOn:
 
     @cached_property
     def revisions(self) -> RevisionFlow:
-        """Return the flow that gets files from Silo."""
+        """Make the flow that gets files from Silo."""
         from silo.workbench.revisions.flow import RevisionFlow
 
         return RevisionFlow(self.session, self.desk)
 
     @cached_property
     def projects(self) -> ProjectFlow:
-        """Return the project folder."""
+        """Make the flow of the project view."""
         from silo.workbench.revisions.flow import ProjectFlow
 
         return ProjectFlow(self.session, self.preferences, self.commits, self.desk, self.revisions)
 
     @cached_property
     def previews(self) -> PreviewFlow:
-        """Return the previews."""
+        """Make the flow of the previews."""
         from silo.workbench.preview.flow import PreviewFlow
 
         return PreviewFlow(
@@ -211,14 +211,14 @@ class AddOn:
 
     @cached_property
     def group(self) -> SiloGroup:
-        """Return what the property editor shows of components."""
+        """Make the observer that shows Silo's facts about components in the property editor."""
         from silo.workbench.freecad.live_desk import SiloGroup
 
         return SiloGroup()
 
     @cached_property
     def registrations(self) -> RegisterFlow:
-        """Return the registering dialogs."""
+        """Make the flow of the Register Parts dialogs."""
         from silo.workbench.register.flow import RegisterFlow
 
         return RegisterFlow(self.session, self.preferences, self.commits, self.desk)
@@ -246,9 +246,9 @@ class AddOn:
             self.dock.update_shown(replace(shown, presence=presence))
 
     def _presence(self, colleagues: Mapping[str, Newer]) -> tuple[str, ...]:
-        """Return what colleagues committed of the documents that are open, since they were opened."""
+        """Say which open documents colleagues have committed since they were opened."""
         docs = [(doc, self.opened.of(doc).since) for doc in host.documents() if doc.FileName]
-        # To find the item of each document takes a while where there are hundreds.
+        # Finding the item of each document takes a while if there are hundreds.
         asked = (colleagues, [(doc.Name, since) for doc, since in docs])
         if asked != self._present[0]:
             from silo.workbench.pane.activity import presence_text
@@ -262,19 +262,21 @@ class AddOn:
         return self._present[1]
 
     def _sent(self, sent: Sent) -> None:
-        """Note that a commit of this FreeCAD arrived."""
+        """React to a commit of this FreeCAD that arrived: refresh what shows it, and offer to register
+        parts.
+        """
         path = sent.entry.path
         if sent.resolved is not None:
             self.group.know(path, sent.resolved.entries)
         if "previews" in vars(self):
             self.previews.again(path)
         self._refresh_project()
-        left = len(sent.resolved.unresolved) if sent.resolved is not None else 0
-        if left and self.preferences.flag("AskRegister") and self.commits.was_asked_for(sent.entry.key):
+        lacking = len(sent.resolved.unresolved) if sent.resolved is not None else 0
+        if lacking and self.preferences.flag("AskRegister") and self.commits.was_asked_for(sent.entry.key):
             self.buttons.register(path)
 
     def _refresh_project(self) -> None:
-        """Refresh the project once for all that arrives together."""
+        """Refresh the project view once for all commits that arrive together."""
         if not self._refreshing:
             self._refreshing = True
             qt.later(REFRESH_MS, self._refresh_now)
@@ -292,7 +294,7 @@ class AddOn:
     # -- commands ---------------------------------------------------------------------------------------
 
     def has_document(self) -> bool:
-        """Return True if there is something to commit."""
+        """Return True if a document is active, so that there is something to commit."""
         return host.active_document() is not None
 
     def shown_everywhere(self) -> bool:
@@ -300,7 +302,7 @@ class AddOn:
         return self.preferences.flag("ShowEverywhere")
 
     def preference_page(self) -> Any:
-        """Return the preference page of our own settings."""
+        """Make the preference page of our own settings."""
         from silo.workbench.settings.page import PreferencePage
 
         return PreferencePage(self.preferences, self.session, self.settings_changed)
@@ -347,7 +349,7 @@ class AddOn:
             self.previews.start(doc)
 
     def register(self) -> None:
-        """Give part numbers to components."""
+        """Show the components of the active document that have no part number."""
         doc = host.active_document()
         if doc is not None:
             self.registrations.start(doc)
@@ -369,7 +371,7 @@ class AddOn:
         self._window.show()
 
     def show_project(self) -> None:
-        """Show the project view, with what is so now."""
+        """Show the project view, up to date."""
         self.project.show_and_raise()
         self.project.refresh()
 
@@ -470,7 +472,7 @@ class Buttons:
             )
 
     def _compare(self, action: Action) -> None:
-        """Show the colleague's revision as a ghost beside the document that a held commit is of."""
+        """Show the colleague's revision as a ghost beside the document whose commit is held."""
         from silo.workbench.commit.flow import of_held
 
         held = next(
@@ -503,13 +505,13 @@ class Buttons:
             commits.sync_only(doc)
 
     def _save_copy(self, action: Action) -> None:
-        """Ask where to, and write the file of something that waits."""
+        """Ask for a place, and write the file of an entry that waits there."""
         target = qt.ask_where_to_save(host.main_window(), translate("Silo", "Save a copy"), action.document)
         if target:
             self._addon.session.save_copy(int(action.target), Path(target))
 
     def register(self, path: str) -> None:
-        """Give part numbers to the components of this document, where it is open."""
+        """Show the components of this document that have no part number, if it is open."""
         self._with_document(path, self._addon.registrations.start)
 
     def _with_document(self, path: str, call: Callable[[object], object]) -> None:
@@ -522,7 +524,7 @@ class Buttons:
             call(doc)
 
     def open_page(self, url: str) -> None:
-        """Open a page of the server in use; where no browser opens, the address is on the clipboard."""
+        """Open a page of the server in use; if no browser opens, put the address on the clipboard."""
         from silo.api.config import ServerAddress
         from silo.bom.errors import SiloError
 

@@ -29,7 +29,7 @@ if sys.version_info < (3, 11):  # noqa: UP036  (FreeCAD brings its own Python, w
     sys.exit(f"Silo needs Python 3.11 or newer; this FreeCAD has {sys.version.split()[0]}")
 
 if __name__ == "__main__":
-    # Run by path: this very copy of the package is meant, also where an installed add-on was loaded at start.
+    # Run by path: use this copy of the package, even if an installed add-on was loaded at start.
     for _name in [name for name in sys.modules if name == "silo" or name.startswith("silo.")]:
         del sys.modules[_name]
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -61,7 +61,7 @@ class HeadlessJob:
 
     @classmethod
     def from_text(cls, text: str | None) -> HeadlessJob:
-        """Read a job; raise InputError that names what is wrong."""
+        """Read a job; InputError names what is wrong."""
         try:
             data = json.loads(text or "")
         except ValueError as error:
@@ -85,7 +85,7 @@ _EXAMPLE = '{"tops": ["TopAssembly.FCStd"]}'
 
 
 def main(env: Mapping[str, str] = os.environ) -> int:
-    """Do the job that the environment describes; the exit code."""
+    """Do the job that the environment describes, and return the exit code."""
     try:
         job = HeadlessJob.from_text(job_text(env))
         check_writable(job.json, job.report)
@@ -133,7 +133,7 @@ def _extractions(
 
 
 def _write_lines(job: HeadlessJob, out: TextIO) -> int:
-    """Write one line when a file is begun and one when it is done, to show where FreeCAD died."""
+    """Write one line when a file is begun and one when it is done, which shows where FreeCAD crashed."""
     from silo.bom.report import to_plain
 
     fine = True
@@ -164,7 +164,7 @@ def _line(out: TextIO, data: Mapping[str, Any]) -> None:
 
 
 def error_json(error: SiloError) -> dict[str, str]:
-    """Return an error for the other side; a document's error keeps path and reason apart."""
+    """Return an error as JSON values for the other process; a document's error has path and reason apart."""
     path, reason = getattr(error, "path", None), getattr(error, "reason", None)
     data = {"code": error.code, "message": str(error)}
     return {**data, "path": path, "reason": reason} if isinstance(path, str) and reason else data
@@ -209,8 +209,8 @@ def _sync(job: HeadlessJob) -> int:
             take(result)
             host.message(f"Silo: [{number}/{len(tops)}] {_in_words(result)}")
             if (stopped := stopped_by(result, client)) is not None:
-                for left in tops[number:]:
-                    take(TopResult(left, error=stopped))
+                for untried in tops[number:]:
+                    take(TopResult(untried, error=stopped))
                 if tops[number:]:
                     host.message(f"Silo: {len(tops) - number} more not tried: {stopped}")
                 break
@@ -222,10 +222,10 @@ def _sync(job: HeadlessJob) -> int:
 
 
 def _each(tops: list[str], job: HeadlessJob) -> Iterator[tuple[str, Extraction | SiloError]]:
-    """Yield the BOM of each file, read by a FreeCAD of its own: where that dies of a file, another reads the
-    rest.
+    """Yield the BOM of each file, read by another FreeCAD. If a file makes that one crash, a new one reads
+    the rest.
 
-    Where this program cannot start itself again, the files are read in here.
+    If this program cannot start itself again, it reads the files itself.
     """
     from silo.freecads import run_freecad
     from silo.workbench.freecad import host
@@ -270,7 +270,7 @@ def _without_server(job: HeadlessJob, error: ImportError) -> int:
 
 
 def _write(path: str, text: str) -> None:
-    """Write the whole report or nothing: a run that dies leaves the previous report."""
+    """Write the whole report or nothing, so that a run that crashes leaves the previous report."""
     from silo.platform import replacing
 
     target = Path(path)

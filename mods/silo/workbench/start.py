@@ -37,10 +37,10 @@ if TYPE_CHECKING:
     from silo.workbench.addon import AddOn
 
 COMMIT = "Origin_Commit"
-# Where FreeCAD, or a fork of it, has an Origin_Commit of its own, it is left alone and hooked; ours for
+# If FreeCAD, or a fork of it, has its own Origin_Commit, it is left alone and hooked; ours for
 # committing by hand then has this name.
 OWN_COMMIT = "Silo_Commit"
-# The real Silo's workbench has a Silo_BOM and a Silo_Settings too. Where a name is taken, ours is this.
+# The real Silo's workbench has a Silo_BOM and a Silo_Settings too. If a name is taken, ours is this.
 FALLBACK = "SiloMod_{}"
 BOM = "Silo_BOM"
 REGISTER = "Silo_RegisterParts"
@@ -72,7 +72,7 @@ class Command:
         self.keys, self.help, self.active = keys, help, active
 
     def GetResources(self) -> dict[str, str]:
-        """Return what FreeCAD shows."""
+        """Return the texts, the icon and the keys of the command."""
         texts = {
             "MenuText": self.text,
             "ToolTip": self.tip,
@@ -88,12 +88,12 @@ class Command:
         self.run()
 
     def IsActive(self) -> bool:
-        """Return whether FreeCAD offers the command now."""
+        """Return True if FreeCAD offers the command now."""
         return self.active()
 
 
 def commands(addon: Any) -> dict[str, Command]:
-    """Return all commands. ``addon`` does the work (:class:`silo.workbench.addon.AddOn`)."""
+    """Make all commands. ``addon`` does the work (:class:`silo.workbench.addon.AddOn`)."""
     return {
         COMMIT: Command(
             text=QT_TRANSLATE_NOOP("Origin_Commit", "Commit to Silo"),
@@ -222,7 +222,7 @@ class ByHand:
         self._actions: dict[str, Any] = {}
 
     def put(self, _workbench: str = "") -> None:
-        """Put the entries in place where they are not."""
+        """Put the entries into their places, if they are not there."""
         if not self._wanted():
             return
         window = host.main_window()
@@ -264,7 +264,7 @@ _kept: list[Any] = []
 
 
 def start() -> None:
-    """Make the add-on known to FreeCAD, once. A problem here costs the add-on, never FreeCAD's start."""
+    """Make the add-on known to FreeCAD, once. A problem here stops the add-on, but never FreeCAD."""
     if _kept:
         _report_copies()
         return
@@ -301,7 +301,7 @@ class Late:
 
     @property
     def addon(self) -> AddOn:
-        """Return the add-on."""
+        """Return the add-on; it is made at the first use."""
         if self._addon is None:
             from silo.workbench.addon import AddOn
 
@@ -312,9 +312,7 @@ class Late:
         return lambda: getattr(self.addon, name)()
 
     def preference_page(self) -> type:
-        """Return what FreeCAD makes the preference page with; it wants a class, and calls it when the page
-        opens.
-        """
+        """Make the class that FreeCAD calls for the preference page when the page opens."""
         late = self
 
         class Page:
@@ -350,7 +348,7 @@ class Names:
         self.foreign: list[str] = []
 
     def of(self, wanted: Sequence[str]) -> list[str]:
-        """Return the names of these commands; adds them all, the first time."""
+        """Return FreeCAD's names of these commands; adds all commands to FreeCAD the first time."""
         if not self._got:
             self._got = {name: self._add(name, command) for name, command in self._known.items()}
         return [self._got[name] for name in wanted]
@@ -370,7 +368,7 @@ class Names:
 
 
 def when_loaded(call: Callable[[], None]) -> None:
-    """Call once all add-ons are loaded. A timer alone is not enough: the splash screen lets timers pass."""
+    """Call after all add-ons are loaded. A timer alone is not enough: the splash screen lets timers run."""
     if host.has_active_workbench():
         call()
     else:
@@ -398,9 +396,9 @@ def finish(addon: AddOn, names: Names, *, by_hand: bool) -> None:
 
 
 def silo_workbench(names: Names, toolbar: Sequence[str], menu: Sequence[str]) -> Any:
-    """Return the Silo workbench: a toolbar and a menu with all commands.
+    """Make the Silo workbench: a toolbar and a menu with all commands.
 
-    FreeCAD knows it by the name of its class, and the real Silo's is called SiloWorkbench.
+    FreeCAD knows a workbench by the name of its class; the real Silo's is called SiloWorkbench.
     """
 
     class SiloModWorkbench(host.gui().Workbench):  # type: ignore[misc]  # FreeCAD has no types
@@ -423,15 +421,15 @@ def _is_installed(name: str) -> bool:
 
 
 def missing_packages(is_there: Callable[[str], bool] = _is_installed) -> tuple[str, ...]:
-    """Return the packages that are not there; their names on PyPI are those by which they are imported."""
+    """Return the packages that are not installed; they are imported by their names on PyPI."""
     return tuple(name for name in FREECAD_PACKAGES if not is_there(name))
 
 
 def packages_hint(packages: Sequence[str], folder: str, python: tuple[int, int]) -> str:
-    """Return the hint for the user, in one line: a command that can be copied, for this very FreeCAD.
+    """Write the hint for the user in one line, with a command to copy for this very FreeCAD.
 
     folder
-        where this FreeCAD looks for additional packages; python: its version of Python.
+        where this FreeCAD looks for additional packages; ``python``: its version of Python.
     """
     # FreeCAD's own Python has no pip in some systems; any other of the same version serves.
     command = 'python{}.{} -m pip install --target "{}" {}'.format(*python, folder, " ".join(packages))

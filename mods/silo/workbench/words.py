@@ -33,7 +33,7 @@ def use(function: Translate) -> None:
 
 
 def translate(context: str, text: str, **values: object) -> str:
-    """Return the text in the user's language, with values (:func:`filled`).
+    """Translate the text into the user's language, and fill in the values (:func:`filled`).
 
     Write context and text as literals, or Qt's tools do not see them.
     """
@@ -41,7 +41,7 @@ def translate(context: str, text: str, **values: object) -> str:
 
 
 def filled(text: str, **values: object) -> str:
-    """Put each value in place of its ``{name}``; a name without a value stays, also in a value."""
+    """Put each value in the place of its ``{name}``. A name without a value stays, also inside a value."""
     return re.sub(r"\{(\w+)\}", lambda name: str(values.get(name[1], name[0])), text)
 
 
@@ -52,17 +52,17 @@ def spoken(sentence: object) -> str:
 
 
 def QT_TRANSLATE_NOOP(_context: str, text: str) -> str:  # the name that Qt's tools look for
-    """Return the text; FreeCAD translates it when it shows it."""
+    """Return the text unchanged; FreeCAD translates it when it shows it."""
     return text
 
 
 def of_command(name: str, text: str) -> str:
-    """Return a command's text in the user's language."""
+    """Translate a command's text into the user's language."""
     return _translate(name, text)
 
 
 def plain(text: str, most: int = 200) -> str:
-    """Return text of others as one line of visible characters, cut where it is too long to help anybody."""
+    """Return foreign text as one line of visible characters, cut if it is very long."""
     # Only a little more than can be shown is looked at: a label may be megabytes long.
     head = text[: most * 4]
     shown = " ".join("".join(" " if unicodedata.category(c) in _HIDDEN else c for c in head).split())
@@ -70,7 +70,7 @@ def plain(text: str, most: int = 200) -> str:
 
 
 def told_apart(paths: Iterable[str]) -> dict[str, str]:
-    """Return path → the file's name; with as many of its folders as it takes where several have that name."""
+    """Return path → the file's name, with as many folders as are needed if several files have that name."""
     left = {path: path.replace("\\", "/").split("/") for path in paths}
     shown: dict[str, str] = {}
     depth = 0
@@ -90,10 +90,9 @@ _ZERO_WIDTH = "\u200b"
 
 
 def breakable(text: str) -> str:
-    """Return a text whose long words (paths, names without a blank) can be broken: after a sign or a small
-    letter.
+    """Add places where long words (paths, names without a blank) can break: after a sign or a small letter.
 
-    A place where a line may end is a character without width; texts without long words stay as they are.
+    Such a place is a character without width; texts without long words stay unchanged.
     """
     return " ".join(word if len(word) <= _LONG_WORD else _broken(word) for word in text.split(" "))
 
@@ -112,7 +111,7 @@ def _broken(word: str) -> str:
 
 
 def visible(text: str, most: int = 20_000) -> str:
-    """Return text for the report view and message boxes as :func:`plain` does, but keep lines and blanks."""
+    """Do what :func:`plain` does for the report view and message boxes, but keep lines and blanks."""
     shown = (c if c == "\n" or unicodedata.category(c) not in _HIDDEN else " " for c in text[:most])
     return "".join(shown) + ("…" if len(text) > most else "")
 
@@ -122,10 +121,10 @@ MOST_TIP = 3000
 
 
 def tip(text: str) -> str:
-    """Return a tool tip. Qt takes text that looks like markup for markup, so ours is some, with nothing in
-    it.
+    """Write a tool tip as markup. Qt takes a text that looks like markup for markup, so all texts are
+    escaped.
 
-    That also breaks long lines, which a plain tool tip does not.
+    Markup also breaks long lines, which a plain tool tip does not.
     """
     # FreeCAD's start must not pay for its table of names.
     import html
@@ -134,10 +133,10 @@ def tip(text: str) -> str:
 
 
 def counted(count: int, singular: str, many: str) -> str:
-    """Return ``one`` or ``many``, with ``{n}`` replaced by the count."""
+    """Return ``singular`` or ``many``, with ``{n}`` replaced by the count."""
     return filled(singular if count == 1 else many, n=count)
 
 
 def quantity(value: float | None) -> str:
-    """Return a quantity for people."""
+    """Write a quantity, for people."""
     return "?" if value is None else f"{value:g}"

@@ -106,7 +106,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         return tree
 
     def _make_selecting(self) -> Any:
-        """Return which files go along, all at once."""
+        """Make the row of buttons that choose several files at once."""
         parts = [widgets.label(translate("Silo", "Select:"), wrap=False)]
         for name, text, wanted in (
             ("edited", translate("Silo", "edited"), lambda row: row.wanted),
@@ -154,7 +154,9 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         return str(self.comment.toPlainText()).strip()
 
     def _fit(self, tree: Any, column: int) -> None:
-        """Make it as wide as its texts, but not more than some thirty letters; tool tips have the rest."""
+        """Make a column as wide as its texts, but not wider than about thirty letters; tool tips have the
+        rest.
+        """
         tree.resizeColumnToContents(column)
         most = 32 * tree.fontMetrics().averageCharWidth()
         tree.setColumnWidth(column, min(tree.columnWidth(column) + 8, most))
@@ -162,7 +164,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
     # -- what colleagues did ----------------------------------------------------------------------------
 
     def show_theirs(self, theirs_by_identity: Mapping[str, Theirs]) -> None:
-        """Show what colleagues committed since; called when the look at Silo is done, perhaps never."""
+        """Show what colleagues committed since. Called when Silo was looked at, perhaps never."""
         self._looking.hide()
         for number, row in enumerate(self._plan.rows):
             theirs = theirs_by_identity.get(row.path)
@@ -213,12 +215,12 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         widgets.read(self, theirs.headline, line_texts(theirs))
 
     def _details(self, theirs: Theirs) -> list[tuple[str, str]]:
-        """Return the lines below a file, each with its tool tip."""
+        """Write the lines below a file, each with its tool tip."""
         lines = []
         if theirs.revision:
             when = time.strftime("%Y-%m-%d %H:%M", time.localtime(theirs.when)) if theirs.when else ""
-            said = plain(theirs.comment, 160) or translate("Silo", "(no comment)")
-            lines.append((" · ".join(filter(None, (when, said))), theirs.comment))
+            comment = plain(theirs.comment, 160) or translate("Silo", "(no comment)")
+            lines.append((" · ".join(filter(None, (when, comment))), theirs.comment))
         return lines + [(text, text) for text in line_texts(theirs, _MOST_LINES)]
 
     def _chose(self, number: int, box: Any) -> None:
@@ -242,13 +244,13 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self.commit.setText(only)
 
     def answer(self) -> CommitAnswer:
-        """Return what the person wants."""
+        """Return what the person has chosen in the dialog."""
         chosen = self.chosen()
         registering = self.register.isChecked() and any(row.is_top for row in chosen)
         return CommitAnswer(chosen, self.text(), registering, self.choices())
 
     def choices(self) -> tuple[tuple[DocumentRow, Theirs, Choice], ...]:
-        """Return what to do about colleagues' files, beside committing."""
+        """Return what to do with colleagues' files besides committing."""
         return tuple(
             (self._plan.rows[number], self._theirs[number], choice)
             for number, box in self._choices.items()

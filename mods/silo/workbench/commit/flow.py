@@ -90,7 +90,7 @@ class Decisions:
         write_memory(self._path, accepted)
 
     def without_accepted(self, extraction: Extraction) -> Extraction:
-        """Return the extraction without the copied-identity findings that a person has accepted."""
+        """Remove the copied-identity findings that a person has accepted."""
         if not any(f.code is FindingCode.COPIED_IDENTITY for f in extraction.findings):
             return extraction
         accepted_now = self._read()
@@ -126,7 +126,7 @@ class Choice(StrEnum):
 
 
 def choice_texts() -> dict[Choice, str]:
-    """Return the choices in words, the harmless one first."""
+    """Return the choices in words; the harmless one comes first."""
     return {
         Choice.LEAVE: translate("Silo", "leave out"),
         Choice.OPEN: translate("Silo", "open theirs beside mine"),
@@ -159,7 +159,7 @@ class Theirs:
 
     @property
     def headline(self) -> str:
-        """Return who committed which revision, and what mine was made from."""
+        """Say who committed which revision, and from what mine was made."""
         if not self.revision:
             return translate("Silo", "the file on disk was changed since you opened it")
         if self.base is None:
@@ -184,7 +184,7 @@ def of_held(entry: QueueEntry) -> Theirs:
 
 
 def theirs_of(path: str, part_number: str, newer: Mapping[str, Any]) -> Theirs:
-    """Return a revision that is newer than a file was made from, as plain values."""
+    """Describe a revision that is newer than the one from which a file was made, in plain values."""
     return Theirs(
         path,
         part_number,
@@ -196,7 +196,7 @@ def theirs_of(path: str, part_number: str, newer: Mapping[str, Any]) -> Theirs:
 
 
 def line_words(line: ThreeLines, *, known: bool = True) -> str:
-    """Return ``Bolt: 6 → 4 by them, 8 by you``; ``known``: the base is."""
+    """Write ``Bolt: 6 → 4 by them, 8 by you``; ``known``: True if the base is known."""
     base, theirs, mine = (quantity(value) for value in line.quantities)
     name = plain(display_name(line.entry) or line.entry.object_name, 60)
     if not known:
@@ -213,7 +213,7 @@ def line_words(line: ThreeLines, *, known: bool = True) -> str:
 
 
 def line_texts(theirs: Theirs, most: int | None = None) -> list[str]:
-    """Return the lines of a change in words; at most ``most`` of them."""
+    """Write the lines of a change, at most ``most`` of them."""
     return [line_words(line, known=theirs.base is not None) for line in theirs.lines[:most]]
 
 
@@ -238,10 +238,10 @@ def look(
     mine: Callable[[str], ComparedAssembly | None],
     cancelled: Cancel | None = None,
 ) -> dict[str, Theirs]:
-    """Return path → what a colleague committed since, for the files where that is so. For a worker.
+    """Find the files that a colleague has committed since: path → what they committed. For a worker.
 
     mine
-        the BOM of the document of a path as it is now.
+        returns the present BOM of the document of a path.
     """
     files = [check for check in asked if check.identity]
     items = client.get_items_by_uuid([check.identity for check in files], cancelled=cancelled)
@@ -259,13 +259,13 @@ def look(
 
 
 def gone(client: SiloClient, announced: Mapping[str, Newer], cancelled: Cancel | None = None) -> list[str]:
-    """Return the items of which the server no longer has the announced commit. For a worker: a request for
+    """Find the items of which the server no longer has the announced commit. For a worker: one request for
     each.
     """
     from silo.api.files import newest_number
     from silo.api.transport import stop_if
 
-    result = []
+    identities = []
     for identity, newer in announced.items():
         stop_if(cancelled)
         try:
@@ -275,17 +275,17 @@ def gone(client: SiloClient, announced: Mapping[str, Newer], cancelled: Cancel |
         except NotFoundError:
             revisions = []
         if newest_number(revisions) < newer.revision:
-            result.append(identity)
-    return result
+            identities.append(identity)
+    return identities
 
 
 def look_held(
     client: SiloClient, outbox: Store, entry: QueueEntry, cancelled: Cancel | None = None
 ) -> Theirs | None:
-    """Return the newest revision that a held commit would undo, with the BOM base → theirs → mine; None for a
-    part, for another server's, and where nothing would be undone any more. For a worker.
+    """Find the newest revision that a held commit would undo, with the BOM base → theirs → mine. None for a
+    part, for a commit to another server, and if nothing would be undone any more. For a worker.
 
-    Raises SiloError where the server or a file does not answer.
+    Raises SiloError if the server does not answer, or a file cannot be read.
     """
     from silo.api.config import canonical
     from silo.bom.report import from_plain
@@ -311,7 +311,7 @@ class _CommitFile:
     origin: str
 
     def standing(self, client: SiloClient, outbox: Store) -> Standing | None:
-        """Return how the file stands; None if it would undo nothing."""
+        """Compare the file with the item's revisions; None if committing it would undo nothing."""
         from silo.api.files import is_newest, standing
 
         # The newest one decides it nearly always; an item may have hundreds.
@@ -388,7 +388,7 @@ class Desk(Protocol):
     def documents(self) -> Documents: ...
 
     def snapshot(self, doc: Any, /) -> Snapshot:
-        """Return snapshot of a live document."""
+        """Take a snapshot of a live document."""
 
     def find(self, path: str, /) -> Any | None:
         """Return the open document of a file; None if it is not open."""
@@ -397,19 +397,19 @@ class Desk(Protocol):
         """Let a person give a document its first name."""
 
     def identity(self, doc: Any, /) -> str | None:
-        """Return the item that a document belongs to, without looking at its components."""
+        """Return the item to which a document belongs, without looking at its components."""
 
     def ask(self, planned: CommitPlan, note: str, comment: str, look: Look, /) -> CommitAnswer | None:
-        """Return which documents to commit, with which comment; None if the person does not want to.
+        """Ask which documents to commit, and with which comment; None if the person cancels.
 
         comment
-            what the person wrote before and is not in Silo yet.
+            what the person wrote before, if it is not in Silo yet.
         look
-            begins to look at Silo, and calls back with what colleagues did meanwhile.
+            asks Silo, and calls back with what colleagues did meanwhile.
         """
 
     def warn(self, title: str, text: str, /) -> None:
-        """Show a message that a person must have seen."""
+        """Show a message that a person must see."""
 
     def later(self, call: Callable[[], None], /) -> None:
         """Run something in a turn of its own, once the present event is done."""
@@ -417,10 +417,10 @@ class Desk(Protocol):
     # -- files ------------------------------------------------------------------------------------------
 
     def open(self, path: str, /) -> Any:
-        """Return the document of a file, opened whole."""
+        """Open the document of a file completely."""
 
     def close(self, doc: Any, /) -> None:
-        """Close a document without saving."""
+        """Close a document without saving it."""
 
     def save_copy(self, doc: Any, path: Path, /) -> None:
         """Write a document, with its unsaved edits, to another file."""
@@ -437,21 +437,23 @@ class Desk(Protocol):
         """Open the preview of a document."""
 
     def accounts(self, extraction: Extraction, /) -> Sequence[CountedSolids]:
-        """Return the solids that FreeCAD shows, for the assembly and each sub-assembly."""
+        """Count the solids that FreeCAD shows, for the assembly and each sub-assembly."""
 
     def why(self, doc: Any, assembly: str, parts: Collection[Key], /) -> list[str]:
-        """Return why an assembly of a document has so many of a part: the number, then each chain to it."""
+        """Say why an assembly of a document has this quantity of a part: the number, then each chain to
+        it.
+        """
 
     def relink(self, finding: Finding, /) -> list[str]:
-        """Set the live links of a finding to the file that was meant; their labels."""
+        """Set the live links of a finding to the file that was meant; returns their labels."""
 
     def light(self, doc: Any, names: Sequence[str], /) -> int:
-        """Select objects and draw them through what covers them; how many there are."""
+        """Select objects and draw them in front of what covers them; returns how many there are."""
 
     def compare(self, path: str, revision: int, theirs: Sequence[Ghost], /) -> Differences | None:
-        """Draw another revision as a ghost beside a document; None: it was there, and is removed.
+        """Draw another revision as a ghost beside a document; None if it was drawn already, and is removed.
 
-        Raises DocumentError where the document is not open.
+        Raises DocumentError if the document is not open.
         """
 
     # -- registering ------------------------------------------------------------------------------------
@@ -460,23 +462,24 @@ class Desk(Protocol):
         """Open the Register Parts dialog of a document."""
 
     def look_at(self, paths: Iterable[str], /) -> dict[str, OpenedFile]:
-        """Return how the files of components stand."""
+        """Find out how the files of components stand."""
 
     def write_identity(self, candidate: Candidate, identity: str, /) -> None:
         """Write an identity into a component's document and save it."""
 
     def remove_identity(self, candidate: Candidate, /, *, no_part: bool) -> None:
-        """Take the identity from what is modelled in an assembly's own file, and save it; with or without the
-        mark that it is no part."""
+        """Take the identity from an object modelled in an assembly's own file, and save it; with or without
+        the mark that it is no part.
+        """
 
     def restore_identity(self, candidate: Candidate, /) -> None:
         """Give a component's file the identity that it had before it was registered, or none, and save it."""
 
     def unedited(self) -> list[Any]:
-        """Return the documents without unsaved edits, each after those that it links to."""
+        """Return the documents without unsaved edits, each after those to which it links."""
 
     def save_marked(self, doc: Any, /) -> None:
-        """Save a document that was unedited, where FreeCAD has marked it for something below it."""
+        """Save a document that was unedited, if FreeCAD has marked it because of a file below it."""
 
 
 class CommitFlow:
@@ -511,11 +514,13 @@ class CommitFlow:
         return bool(self._turns)
 
     def was_asked_for(self, key: str) -> bool:
-        """Return True for the commit of a document that a person committed, not one below it."""
+        """Return True if a person committed this very document, not one above it."""
         return key in self._asked_for
 
     def snapshot(self, doc: Any) -> Snapshot:
-        """Return a document as it is, without what a person has decided already (files that are one part)."""
+        """Take a snapshot of a document, without findings that a person has decided already (files that are
+        one part).
+        """
         taken = self._desk.snapshot(doc)
         if taken.extraction is None:
             return taken
@@ -530,17 +535,17 @@ class CommitFlow:
         )
 
     def has_identity(self, doc: Any) -> bool:
-        """Return True for a document that belongs to Silo."""
+        """Return True if the document belongs to an item in Silo."""
         try:
             return bool(self._desk.snapshot(doc).identity)
         except SiloError:
             return False
 
     def start(self, doc: Any) -> None:
-        """Commit a document: ask where there is something to ask, then return without waiting."""
+        """Commit a document: ask if there is something to ask, then return without waiting."""
         if not doc.FileName:
             self._desk.save_as(doc)
-        # A file of several registered parts is no item, and needs none: it goes as a document.
+        # A file of several registered parts is no item, and needs none: it is sent as a document.
         unregistered = bool(
             doc.FileName and not self._desk.identity(doc) and not self._desk.snapshot(doc).several
         )
@@ -570,7 +575,7 @@ class CommitFlow:
             self._turns.append((self._registering(planned.top.path), ""))
 
     def commit_folder(self, root: str, paths: Iterable[str], comment: str) -> None:
-        """Save what is edited of these open files of a project, then send what Silo does not have of it."""
+        """Save the edited ones of these open files of a project, then send what Silo does not have of it."""
         rows: dict[str, DocumentRow] = {}
         wanted = set(paths)
         for doc in filter(None, map(self._desk.find, wanted)):
@@ -585,10 +590,11 @@ class CommitFlow:
         self.send_linked(root, {*sent, *(row.path for row in left)}, comment)
 
     def send_linked(self, path: str, skip: set[str], comment: str, over: Collection[str] = ()) -> None:
-        """Send what a file links to, or a folder holds, and Silo does not have, once the documents are saved.
+        """Send the linked files of a file, or the files of a folder, that Silo does not have, after the
+        documents are saved.
 
         over
-            files that go on top of a colleague's newer revision.
+            files that are sent on top of a colleague's newer revision.
         """
         self._turns.append((self._along(path, skip, comment, over), ""))
         if len(self._turns) == 1:
@@ -597,7 +603,7 @@ class CommitFlow:
     def _along(
         self, path: str, skip: set[str], comment: str, over: Collection[str] = ()
     ) -> Iterator[CommittedDocument]:
-        """Commit, a turn after the documents are saved, what they link to and Silo does not have."""
+        """Commit, a turn after the documents are saved, the linked files that Silo does not have."""
         how: dict[str, Any] = {"comment": comment, "over_newer": over}
         how["allow_missing"] = self._preferences.text("MissingLinks") == ALLOW
         title = translate("Silo", "Looking at the linked files")
@@ -631,11 +637,11 @@ class CommitFlow:
         yield from ()
 
     def comment_of(self, path: str) -> str:
-        """Return what a person wrote about a file when it had no item yet; told once."""
+        """Return what a person wrote about a file when it had no item yet, and forget it."""
         return self._comments.pop(path, "")
 
     def _heard(self, planned: CommitPlan) -> bool:
-        """Return True if the server has announced a colleague's commit of one of these documents."""
+        """Return True if the server announced a colleague's commit of one of these documents."""
         return bool(self._session.shown.newer) and any(
             self._session.newer_than(check.identity, check.base.since)
             for check in self._files_to_check(planned)
@@ -651,8 +657,9 @@ class CommitFlow:
         ]
 
     def _look(self, planned: CommitPlan, back: Callable[[Mapping[str, Theirs]], None]) -> None:
-        """Ask Silo, in a worker, what colleagues committed since. What it cannot be asked now is caught when
-        the commit is sent."""
+        """Ask Silo, in a worker, what colleagues committed since. If it cannot answer now, the commit finds
+        it out when it is sent.
+        """
         local = {row.path: Theirs(row.path) for row in planned.rows if row.replaced}
         if local:
             back(local)
@@ -688,7 +695,7 @@ class CommitFlow:
             self._desk.later(self._turn)
 
     def finish(self) -> None:
-        """Do at once what is left to do: FreeCAD is about to close the documents."""
+        """Do everything that is left at once, since FreeCAD is about to close the documents."""
         self._register = lambda _path: None
         while self._turns:
             self._step()
@@ -696,7 +703,8 @@ class CommitFlow:
     def sync_only(self, doc: Any, *, by_fork: bool = False, allow_missing: bool = False) -> None:
         """Sync the BOM of a document whose file is committed already: its parts were registered, or a
         question about them was answered. ``by_fork``: a fork's ``Origin_Commit`` did it, in its own way.
-        ``allow_missing``: a person wants it without the components that are missing."""
+        ``allow_missing``: a person wants it without the missing components.
+        """
         try:
             taken = self.snapshot(doc)
             commit = self._commit_of(taken, new_key()) if taken.identity and taken.is_assembly else None
@@ -718,8 +726,8 @@ class CommitFlow:
             self._session.keep(commit, failed=lambda error: self._tell_error(taken.label, str(error)))
 
     def made_from(self, commit: Commit, doc: Any) -> Commit:
-        """Return the commit of a BOM alone, with what its document was made from: it must not undo the BOM of
-        a colleague's newer file. ``doc``: None if the file is not open.
+        """Add to the commit of a BOM alone what its document was made from, so that it does not undo the BOM
+        of a colleague's newer file. ``doc``: None if the file is not open.
         """
         from silo.files import sha256_of  # late: FreeCAD's start waits for this module
 
@@ -741,7 +749,7 @@ class CommitFlow:
             if self._turns:
                 self._step()
         finally:
-            # Whatever went wrong with one document, the others have their turn.
+            # If one document fails, the others still have their turn.
             if self._turns:
                 self._desk.later(self._turn)
 
@@ -822,7 +830,7 @@ def commit_of(
     sync_bom: bool = True,
     allow_missing: bool = False,
 ) -> Commit | None:
-    """Return a snapshot as the outbox wants it; None if neither a file nor a BOM is to be sent."""
+    """Make a commit for the outbox from a snapshot; None if there is neither a file nor a BOM to send."""
     if file is None and (taken.extraction is None or not sync_bom):
         return None
     return Commit(
@@ -840,7 +848,7 @@ def commit_of(
 
 
 def not_in_silo(taken: Snapshot) -> PaneEntry:
-    """Return the box for a document that has no item yet."""
+    """Make the box for a document that has no item yet."""
     name = taken.label or os.path.basename(taken.path)
     text = taken.problem or translate("Silo", "It has no Silo part number yet, so it was not sent.")
     tone = Tone.PLAIN if taken.problem else Tone.WARNING

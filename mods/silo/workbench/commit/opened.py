@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def _stamp(path: str) -> Stamp | None:
-    """Return what changes when a file is written; None if there is none. FreeCAD's start does not import
-    it.
+    """Return a stamp that changes when the file is written; None if there is no file. Imports late, for
+    FreeCAD's start.
     """
     from silo.platform import stamp_of
 
@@ -53,7 +53,9 @@ class Base:
         self._lock = threading.Lock()
 
     def settle(self, origins: Origins) -> str:
-        """Return the origin, determined if that is still to do. Any thread; reads the file once."""
+        """Return the origin, and determine it first if that was not done yet. From any thread; reads the file
+        once.
+        """
         with self._lock:
             if not self.origin:
                 from silo.outbox.entry import UNKNOWN
@@ -65,7 +67,8 @@ class Base:
     def committed(self, sha256: str) -> None:
         """Note that a commit of the document has this content; later states are made from it.
 
-        "" where another program has copied and sent it: then it is the file's, unless that was written since.
+        ``sha256`` is "" if another program has copied and sent it: then the file's hash counts, unless it was
+        written since.
         """
         if sha256 := sha256 or _unchanged_hash(self.path, self.stamp):
             with self._lock:
@@ -73,7 +76,7 @@ class Base:
 
     @property
     def replaced(self) -> bool:
-        """Return True if somebody else has written the file since."""
+        """Return True if another program has written the file since."""
         now = _stamp(self.path)
         return self.stamp is not None and now is not None and now != self.stamp
 
@@ -102,14 +105,14 @@ class Opened:
         self._left: list[Callable[[], object]] = []
 
     def begin(self, work: Callable[[Callable[[], object]], object]) -> None:
-        """Hand work to a worker from now on; before FreeCAD's window stands none is started."""
+        """Hand work to a worker from now on; none is started before FreeCAD's window is open."""
         self._work = work
         for call in self._left:
             work(call)
         self._left.clear()
 
     def of(self, doc: Any) -> Base:
-        """Return the base of a document, also of one that was opened before we looked."""
+        """Return the base of a document, even of one that was opened before we watched."""
         base = self._bases.get(doc.Name)
         if base is None:
             base = self._bases[doc.Name] = Base(doc.FileName, _stamp(doc.FileName))
@@ -131,7 +134,7 @@ class Opened:
     # FreeCAD calls these; an exception in them would only be printed.
 
     def slotChangedDocument(self, doc: Any, prop: str) -> None:
-        """Look at the file: FreeCAD names it before it reads it."""
+        """Look at the file; FreeCAD sets its name before it reads it."""
         if prop != "FileName" or not doc.FileName:
             return
         base_now = self._bases.get(doc.Name)
@@ -152,13 +155,15 @@ class Opened:
         self.forget(doc)
 
     def slotStartSaveDocument(self, doc: Any, filename: str) -> None:
-        """Look at the file that it was made from, if nobody has: it is about to be replaced."""
+        """Look at the file that is about to be replaced, from which the document was made, if that was not
+        done yet.
+        """
         base = self._bases.get(doc.Name)
         if base is not None and base.path == filename and not base.origin:
             self._settle(base)
 
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
-        """Note that the file is ours now."""
+        """Note that this FreeCAD wrote the file."""
         base = self._bases.get(doc.Name)
         if base is None or os.path.realpath(filename) != os.path.realpath(doc.FileName or ""):
             return

@@ -59,7 +59,9 @@ class Snapshot:
         return self.extraction is not None
 
     def is_as(self, other: Snapshot) -> bool:
-        """Return True if both are of one state: the same item, and the same BOM with all below it."""
+        """Return True if both are the same state: the same item, and the same BOM with everything below
+        it.
+        """
         mine, its = (snapshot.extraction and to_plain(snapshot.extraction) for snapshot in (self, other))
         return (self.path, self.identity, mine) == (other.path, other.identity, its)
 
@@ -71,9 +73,9 @@ def take(doc: Any, *, assembly: Any = None, walk: Walk = extract) -> Snapshot:
     """Take a snapshot of an open document.
 
     assembly
-        the container that a person works in, where that is known; used where the document holds several.
+        the container in which a person works, if it is known; it decides if the document holds several.
     walk
-        gives the BOM of a container (:func:`silo.workbench.freecad.live.extract_object`).
+        returns the BOM of a container (:func:`silo.workbench.freecad.live.extract_object`).
     """
     path = one_path(doc.FileName) if doc.FileName else ""
     label = str(getattr(doc, "Label", "") or os.path.basename(path))
@@ -113,7 +115,7 @@ class Documents(Protocol):
 
 
 def is_edited(documents: Documents, doc: Any) -> bool:
-    """Return True if a document differs from its file; one that FreeCAD only marked does not."""
+    """Return True if a document differs from its file; False if FreeCAD only marked it."""
     return documents.is_modified(doc) and documents.is_edited(doc, time.thread_time() + MOST_S)
 
 
@@ -156,18 +158,20 @@ class DocumentRow:
 
     @property
     def can_commit(self) -> bool:
-        """Return True if the file can be brought up to date and sent."""
+        """Return True if the file can be saved, if necessary, and sent."""
         return self.state in (DocumentState.CHANGED, DocumentState.RECOMPUTED, DocumentState.SAVED)
 
     @property
     def wanted(self) -> bool:
-        """Return True if it is checked to begin with; a document that was only recomputed is as in Silo."""
+        """Return True if the row is checked at the beginning; a document that was only recomputed is as in
+        Silo.
+        """
         asked = self.is_top or self.state is not DocumentState.RECOMPUTED
         return self.can_commit and asked and not self.replaced
 
     @property
     def note(self) -> str:
-        """Return the state in words."""
+        """Describe the state in words."""
         lost = plain(", ".join(self.lost), 300)
         return _words()[self.state].replace("{lost}", lost)
 
@@ -210,7 +214,7 @@ class CommitPlan:
 
     @property
     def wanted(self) -> tuple[DocumentRow, ...]:
-        """Return what is committed unless a person says otherwise."""
+        """Return the rows that are committed unless a person decides otherwise."""
         return tuple(row for row in self.rows if row.wanted)
 
     @property
@@ -220,8 +224,8 @@ class CommitPlan:
 
     @property
     def is_simple(self) -> bool:
-        """Return True if there is nothing to ask: one document that can be committed, the others
-        unchanged.
+        """Return True if there is nothing to ask: one document that can be committed, and no changes in the
+        others.
         """
         others = all(row.state is DocumentState.RECOMPUTED for row in self.rows[:-1])
         replaced = any(row.replaced for row in self.rows)
@@ -233,13 +237,13 @@ def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> Commi
     until = time.thread_time() + MOST_S
     changed = {doc.Name for doc in documents.linked(top) if documents.is_modified(doc)} - {top.Name}
     rows = []
-    # The order is asked for only where there is one to find.
+    # The order is only needed if there are several documents.
     for doc in leaves_first(top) if changed else (top,):
         is_top = doc is top or doc == top
         if is_top or doc.Name in changed:
             path = one_path(doc.FileName) if doc.FileName else ""
             state = _state(doc, documents, until)
-            # What was only recomputed, and cannot be saved anyway, is nobody's concern.
+            # Do not show documents that were only recomputed and cannot be saved anyway.
             if is_top or state is not DocumentState.SAVED:
                 replaced = bool(path) and documents.base(doc).replaced
                 lost = tuple(documents.lost_objects(doc)) if state is DocumentState.LOST else ()
@@ -248,7 +252,7 @@ def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> Commi
 
 
 def refusal(plan: CommitPlan) -> str:
-    """Return why the document itself cannot be committed; "" if it can."""
+    """Say why the document itself cannot be committed; "" if it can."""
     top = plan.top
     if top.can_commit:
         return ""
@@ -259,9 +263,9 @@ def refusal(plan: CommitPlan) -> str:
 
 
 def leaves_first(top: Any) -> Iterable[Any]:
-    """Return a document and all that it links to, each once, linked ones before those that link to them.
+    """Return a document and all documents to which it links, each once, after those to which it links itself.
 
-    Documents that link to each other in a ring come in the order in which they are found.
+    Documents that link to each other in a ring are in the order in which they are found.
     """
     sort = getattr(top, "getDependentDocuments", None)
     if sort is None:
@@ -307,7 +311,7 @@ def _state(doc: Any, documents: Documents, until: float) -> DocumentState:
 
 
 def _held(doc: Any, documents: Documents) -> DocumentState | None:
-    """Return why a document cannot be saved; None if it can."""
+    """Return the state that keeps a document from being saved; None if it can be saved."""
     if documents.is_partial(doc):
         return DocumentState.PARTIAL
     if documents.lost_objects(doc):
@@ -349,7 +353,9 @@ class Keeping(Protocol):
 def take_each(
     rows: Iterable[DocumentRow], documents: Documents, take: Callable[[Any], Snapshot], outbox: Keeping
 ) -> Iterator[CommittedDocument]:
-    """Save one document after another and take snapshots; a failure does not stop the others. GUI thread."""
+    """Save one document after another and take snapshots; one failure does not stop the others. GUI
+    thread.
+    """
     for row in rows:
         try:
             taken = _take(row, documents, take, outbox)

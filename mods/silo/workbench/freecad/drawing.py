@@ -45,7 +45,9 @@ SAME_PLACE = 1e-3
 
 
 def command() -> list[str]:
-    """Return what starts the child. Raises ConfigError if this FreeCAD does not say which program it is."""
+    """Return the command that starts the child. Raises ConfigError if this FreeCAD's program cannot be
+    found.
+    """
     # FreeCAD 1.1 takes a long text for the name of a file, and ends; so the paths come by the environment.
     code = (
         "import os, sys; sys.path[:0] = os.environ['PYTHONPATH'].split(os.pathsep); "
@@ -65,7 +67,7 @@ class FreeCadDrawer:
     """Draws stored shapes with FreeCAD's kernel."""
 
     def faces(self, path: Path, named: str, place: Floats) -> Sequence[Mesh | None]:
-        """Return the triangles of each face."""
+        """Make the triangles of each face."""
         import MeshPart
         import numpy as np
 
@@ -95,7 +97,7 @@ class FreeCadDrawer:
         return meshes
 
     def simplified(self, mesh: Mesh, error: float, keep_border: bool) -> Mesh:
-        """Return fewer triangles, if box and volume stay; a border always does."""
+        """Make a mesh with fewer triangles, if box and volume stay; a border always stays."""
         import Mesh as FreeCadMesh
         import numpy as np
 
@@ -116,7 +118,7 @@ class FreeCadDrawer:
         return mesh
 
     def measured(self, shapes: Sequence[Stored], weigh: bool) -> tuple[Box, Measured | None]:
-        """Return the box as the surfaces have it, and the solids as a mass has them."""
+        """Return the box around the surfaces, and the solids as they are measured for a mass."""
         from silo.drawing.models import EPS
         from silo.inertia.geometry.freecad import Leaf, ShapeRef
         from silo.inertia.geometry.together import exact_box
@@ -135,7 +137,7 @@ def _corners(box: Any) -> tuple[list[float], list[float]]:
 
 
 def _stored(path: Path, named: str, place: Floats) -> Any:
-    """Read a shape with its place in its product. Raises DocumentError."""
+    """Read a shape, with its placement in its product. Raises DocumentError."""
     import Part
 
     from silo.inertia.geometry.graph import is_binary_brep
@@ -174,24 +176,25 @@ class Overlay:
     setSelection = removeSelection = clearSelection = addSelection
 
     def light(self, doc: Any, names: Sequence[str]) -> int:
-        """Select objects and draw them through what covers them; return how many there are."""
+        """Select objects and draw them in front of what covers them; returns how many there are."""
         _remove(self._lit)
         self._is_ours = True
         try:
-            result = host.select(doc, names)
+            count = host.select(doc, names)
         finally:
             self._is_ours = False
         self._lit = _add(doc, ((mesh, LIT, 0.4, True) for mesh in _meshes(doc, names)))
-        return result
+        return count
 
     def clear(self) -> None:
-        """Remove the ghost and what is lit."""
+        """Remove the ghost and the lit objects."""
         _remove(self._lit)
         _remove(self._ghost)
         self.ghost_of = None
 
     def compare(self, doc: Any, top: str, mine: Iterable[str], theirs: Sequence[Ghost]) -> Differences:
-        """Draw what stands elsewhere in another revision, or only there, as a ghost; light what is only here.
+        """Draw as a ghost what another revision has at another place, or has alone; light what only this one
+        has.
 
         top, mine
             the assembly in the document, and the objects that it shows.
@@ -225,7 +228,7 @@ def _matrix(placement: Any) -> Any:
 
 
 def _place(whole: Any, path: Sequence[str]) -> Any | None:
-    """Return (4, 4) [mm] of what stands at a path below an assembly; None if there is nothing."""
+    """Return the placement (4, 4) [mm] at a path below an assembly; None if nothing is there."""
     import Part
 
     try:
@@ -236,7 +239,9 @@ def _place(whole: Any, path: Sequence[str]) -> Any | None:
 
 
 def _same(place: Any, matrix: Floats) -> bool:
-    """Report whether two places are one; ``matrix`` in m. A scale is no difference: FreeCAD's has none."""
+    """Return True if two placements are equal; ``matrix`` in m. Ignores scales, which FreeCAD's placements
+    lack.
+    """
     import numpy as np
 
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
@@ -249,7 +254,7 @@ _Drawn = tuple[_Triangles, str, float, bool]
 
 
 def _meshes(doc: Any, names: Iterable[str]) -> Iterable[_Triangles]:
-    """Yield the triangles of objects where the document shows them [mm]."""
+    """Yield the triangles [mm] of objects at the places where the document shows them."""
     import Part
 
     for name in list(names)[: host.MOST_SELECTED]:
@@ -263,7 +268,9 @@ def _meshes(doc: Any, names: Iterable[str]) -> Iterable[_Triangles]:
 
 
 def _node(mesh: _Triangles, colour: str, clear: float, through: bool) -> Any:
-    """Return a node that shows triangles [mm], ``through`` whatever covers them; nobody can pick it."""
+    """Make a node that shows triangles [mm]; with ``through``, also behind other objects. Nobody can
+    pick it.
+    """
     from pivy import coin
 
     node, points, faces = coin.SoSeparator(), coin.SoCoordinate3(), coin.SoIndexedFaceSet()
@@ -286,7 +293,7 @@ def _node(mesh: _Triangles, colour: str, clear: float, through: bool) -> Any:
 
 
 def _add(doc: Any, drawn: Iterable[_Drawn]) -> list[tuple[Any, Any]]:
-    """Put nodes into the view of a document; return each with its parent. Nothing without pivy."""
+    """Put nodes into the view of a document; returns each with its parent. Returns nothing without pivy."""
     view: Any = getattr(host.view_of(doc), "ActiveView", None)
     if not hasattr(view, "getSceneGraph"):
         return []

@@ -29,7 +29,7 @@ from typing import Any, Protocol
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
 
-# Two points are the same where they are as close as FreeCAD's own tolerance has it, relative to the shape.
+# Two points are the same if they are within FreeCAD's own tolerance, relative to the shape.
 SAME = 1e-7
 
 _ABSENT = object()
@@ -58,7 +58,7 @@ class EditWatch:
         self._docs: dict[str, _Edits] = {}
 
     def begin(self, unmodified: list[Any]) -> None:
-        """Begin with the open documents; earlier edits stay unknown."""
+        """Begin with the open documents; their earlier edits stay unknown."""
         for doc in unmodified:
             self._docs.setdefault(doc.Name, _Edits())
 
@@ -73,23 +73,23 @@ class EditWatch:
         self._docs.pop(doc.Name, None)
 
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
-        """Note that the file has all edits now; "Save a copy" writes another file."""
+        """Note that the file now has all edits; "Save a copy" writes another file."""
         if doc.Name in self._docs and os.path.realpath(filename) == os.path.realpath(doc.FileName):
             self._docs[doc.Name] = _Edits()
 
     def slotBeforeChangeObject(self, obj: Any, name: str) -> None:
-        """Note a property that gets a value; this is its old value."""
+        """Note the present value of a property that is about to change."""
         # An object that is being deleted has no name any more.
         if name not in _OWN and obj.Name:
             self._remember(obj.Document, obj.Name, name, obj)
 
     def slotBeforeChangeDocument(self, doc: Any, name: str) -> None:
-        """Note a changed property of the document itself."""
+        """Note the present value of a property of the document itself."""
         if name not in _OWN:
             self._remember(doc, "", name, doc)
 
     def slotAppendDynamicProperty(self, owner: Any, name: str) -> None:
-        """Note a property that the file lacks; an object's, or the document's. A view's document has no
+        """Note that an object or the document has a property that the file lacks. A view's document has no
         name.
         """
         doc = getattr(owner, "Document", owner)
@@ -139,12 +139,12 @@ class EditWatch:
         """Return True if the document differs from its file.
 
         until
-            the time (``time.thread_time``) from which on nothing more is compared.
+            the time (``time.thread_time``) after which nothing more is compared.
         """
         return next(self.differences(doc, until), None) is not None
 
     def differences(self, doc: Any, until: float | None = None) -> Iterator[str]:
-        """Yield what differs, as far as it was looked for: "Pad.Length"."""
+        """Yield the differences that were found, such as "Pad.Length"."""
         edits = self._docs.get(doc.Name)
         if edits is None:
             yield "it had edits before anybody looked"
@@ -181,7 +181,7 @@ def _value(owner: Any, name: str) -> Any:
 
 
 def same(old: Any, new: Any) -> bool:
-    """Return True if two values of a property would be the same in a file."""
+    """Return True if two values of a property are the same in a file."""
     if old is new:
         return old is not _ABSENT
     if type(old) is not type(new):
@@ -205,7 +205,7 @@ def same(old: Any, new: Any) -> bool:
 
 
 def _same_shape(old: Any, new: Any) -> bool:
-    """Return True if two shapes lie in the same place and have the same corners; a recompute makes each
+    """Return True if two shapes are at the same place and have the same corners; a recompute makes all shapes
     again.
     """
     if old.isNull() or new.isNull():
@@ -269,12 +269,12 @@ class CommitHook:
         self._host, self._ended, self._has_identity, self._later = host, ended, has_identity, later
         self._names: list[str] = []
         self._connected: list[Any] = []
-        # Name of the document → True where its commit was seen, False where only that it was saved.
+        # Name of the document → True if its commit was seen, False if only its saving was seen.
         self._noted: dict[str, bool] = {}
         self._waiting = False
 
     def watch(self, name: str) -> None:
-        """Take notice of this command's end from now on."""
+        """Notice from now on when this command ends."""
         if not self._names:
             self._host.add_document_observer(_Observer(self._saved, self._activated))
         if name not in self._names:
@@ -327,7 +327,7 @@ class CommitHook:
             return
 
     def note(self, doc: Any, *, committed: bool = True) -> None:
-        """Note that a commit of this document ends, or that it was only saved."""
+        """Note that a commit of this document has ended, or that it was only saved."""
         self._noted[doc.Name] = committed or self._noted.get(doc.Name, False)
         if not self._waiting:
             self._waiting = True
@@ -348,11 +348,11 @@ class _Observer:
         self._saved, self._activated = saved, activated
 
     def slotActivateDocument(self, _doc: Any) -> None:
-        """Look again when a person works in another document."""
+        """Look again when a person changes to another document."""
         self._activated()
 
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
-        """Note that a document is whole on disk."""
+        """Note that a document is completely on the disk."""
         self._saved(doc, filename)
 
 
@@ -397,9 +397,7 @@ class FactCache:
         return cached_document
 
     def value(self, value: Any) -> Any:
-        """Return a value with views in the place of objects, also in lists and in pairs of object and
-        sub-name.
-        """
+        """Replace objects in a value by their views, also in lists and in pairs of object and sub-name."""
         if self._is_object(value):
             return self.object(value)
         if isinstance(value, list):
@@ -434,12 +432,12 @@ class CachedObject:
         return value
 
     def isDerivedFrom(self, type_name: str, /) -> bool:
-        """Return FreeCAD's answer, remembered by type."""
+        """Return FreeCAD's answer, which is remembered for each type."""
         key = (self.TypeId, type_name)
-        result: bool | None = self._cache.derived.get(key)
-        if result is None:
-            result = self._cache.derived[key] = bool(self.real.isDerivedFrom(type_name))
-        return result
+        answer: bool | None = self._cache.derived.get(key)
+        if answer is None:
+            answer = self._cache.derived[key] = bool(self.real.isDerivedFrom(type_name))
+        return answer
 
     def __repr__(self) -> str:
         return f"<{self.TypeId} {self.Name}>"
@@ -459,7 +457,7 @@ class CachedDocument:
 
     @property
     def ProgramVersion(self) -> str:
-        """Return the FreeCAD that saved the document, "" while it is unsaved."""
+        """Return the FreeCAD that saved the document; "" while it is unsaved."""
         return self.real.getProgramVersion() or ""
 
     @property
@@ -482,7 +480,9 @@ class CachedDocument:
         return self._cache.object(obj) if obj is not None else None
 
     def imported(self, file: str) -> Any:
-        """Return the part that A2plus imported from a file, read from there: FreeCAD does not open it."""
+        """Return the part that A2plus imported from a file; it is read from that file, since FreeCAD does not
+        open it.
+        """
         return self._cache.imported(self.FileName, file)
 
     def getPropertyByName(self, name: str) -> Any:

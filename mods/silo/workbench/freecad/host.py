@@ -23,7 +23,7 @@ from silo.workbench.words import visible
 
 
 def gui() -> Any:
-    """Return the GUI module. The import succeeds headless as well, so ask :func:`has_gui` first."""
+    """Return the GUI module. It can be imported without a GUI too, so ask :func:`has_gui` first."""
     import FreeCADGui
 
     return FreeCADGui
@@ -35,13 +35,13 @@ def has_gui() -> bool:
 
 
 def version() -> tuple[int, int]:
-    """Return (major, minor), such as (1, 0)."""
+    """Return the version of FreeCAD as (major, minor), such as (1, 0)."""
     freecad_version = FreeCAD.Version()
     return int(freecad_version[0]), int(freecad_version[1])
 
 
 def program() -> str:
-    """Return the command line program of this FreeCAD. Raises ConfigError if nobody can say which."""
+    """Find the command line program of this FreeCAD. Raises ConfigError if it is not found."""
     from silo.bom.errors import ConfigError
 
     folders = (os.path.dirname(sys.executable or ""), os.path.join(FreeCAD.getHomePath(), "bin"))
@@ -58,7 +58,7 @@ def user_data_folder() -> str:
 
 
 def packages_folder() -> str:
-    """Return where this FreeCAD looks for additional Python packages (facts §7.3)."""
+    """Return the folder in which this FreeCAD looks for additional Python packages (facts §7.3)."""
     base = os.path.join(user_data_folder(), "AdditionalPythonPackages")
     return base if version() < (1, 0) else os.path.join(base, "py{}{}".format(*sys.version_info))
 
@@ -69,8 +69,8 @@ def translate(context: str, text: str) -> str:
 
 
 def message(text: str) -> None:
-    """Print a line in the report view. Like all of these, harmless to a terminal, no matter who wrote the
-    text.
+    """Print a line in the report view. Like all of these functions, it is safe for a terminal, no matter who
+    wrote the text.
     """
     FreeCAD.Console.PrintMessage(visible(text) + "\n")
 
@@ -98,7 +98,7 @@ def parameters(group: str) -> Any:
 
 
 def save_parameters() -> None:
-    """Write the parameters to disk now; by itself FreeCAD does it only on a normal exit."""
+    """Write the parameters to disk now; FreeCAD itself does that only on a normal exit."""
     FreeCAD.saveParameter()
 
 
@@ -122,7 +122,9 @@ class Pieces:
         self._known = {} if top is None else {(top.Document.Name, top.Name): (0, 0, 0)}
 
     def of(self, obj: Any, is_visible: bool = True) -> tuple[int, int, int]:
-        """Return the solids of an object. ``is_visible``: where it lies."""
+        """Count the solids of an object: visible, hidden, left out. ``is_visible``: False if a container
+        hides it.
+        """
         obj = real(obj)
         target = obj.LinkedObject if obj.isDerivedFrom("App::Link") else None
         if isinstance(target, tuple) and not target[1].endswith("."):  # a face or an edge
@@ -153,12 +155,14 @@ class Pieces:
 
 
 def real(obj: Any) -> Any:
-    """Return FreeCAD's own object for a copy that is read once (:mod:`silo.workbench.freecad.facts`)."""
+    """Return FreeCAD's own object, also for a view of it (:mod:`silo.workbench.freecad.facts`)."""
     return getattr(obj, "real", obj)
 
 
 def sub_objects(obj: Any) -> list[tuple[Any, bool]] | None:
-    """Return what an object shows within itself, and if it is visible there; None for a shape of its own."""
+    """Return the objects inside an object, each with its visibility there; None if it has a shape of
+    its own.
+    """
     if {"BuildShape", "Freeze", "Group"}.issubset(obj.PropertiesList):
         return [member for group in obj.Group for member in _in_group(group)]
     names = obj.getSubObjects()
@@ -176,9 +180,9 @@ def sub_objects(obj: Any) -> list[tuple[Any, bool]] | None:
 
 
 def _in_group(group: Any) -> list[tuple[Any, bool]]:
-    """Return what a group of Assembly3 holds, with or without the add-on, and if it is visible.
+    """Return the members of a group of Assembly3, each with its visibility, with or without the add-on.
 
-    The add-on switches each of its groups off; what is shown stands in the group's own list.
+    The add-on hides each of its groups; the group's own list says which members are shown.
     """
     listed = list(getattr(group, "VisibilityList", ()))
     members = list(group.Group)
@@ -190,8 +194,8 @@ def _in_group(group: Any) -> list[tuple[Any, bool]]:
 
 
 def root_objects(document: Any) -> list[tuple[Any, bool]]:
-    """Return what FreeCAD shows at the root of a document: all that no part, link group, array or body
-    holds.
+    """Return what FreeCAD shows at the root of a document: the objects in no part, link group, array or
+    body.
     """
     holders = [member for member in document.Objects if not member.isDerivedFrom("App::DocumentObjectGroup")]
     held = {
@@ -208,7 +212,7 @@ def _solids(obj: Any) -> int:
     import Part
 
     def count(shape: Any) -> int:
-        # shape.Solids has those only once that lie in one place.
+        # shape.Solids lists equal solids at one place only once.
         if shape.isNull():
             return 0
         return 1 if shape.ShapeType == "Solid" else sum(map(count, shape.SubShapes))
@@ -220,7 +224,7 @@ def _solids(obj: Any) -> int:
 
 
 def documents() -> list[Any]:
-    """Return all open documents, also those that a link has loaded."""
+    """Return all open documents, including those that a link has loaded."""
     return list(FreeCAD.listDocuments().values())
 
 
@@ -230,14 +234,12 @@ def is_object(value: Any) -> bool:
 
 
 def active_document() -> Any:
-    """Return the document that a person works in, or None."""
+    """Return the document in which a person works; None if there is none."""
     return FreeCAD.ActiveDocument
 
 
 def documents_by_path() -> dict[str, Any]:
-    """Return the open documents by the paths of their files, each in the one spelling that its folder
-    lists.
-    """
+    """Return the open documents by the paths of their files, each in the spelling that its folder lists."""
     from silo.platform import Spelling  # late: FreeCAD's start waits for this module
 
     real = Spelling().real
@@ -245,24 +247,24 @@ def documents_by_path() -> dict[str, Any]:
 
 
 def find_document(path: str) -> Any:
-    """Return the open document of a file, or None."""
+    """Return the open document of a file; None if it is not open."""
     from silo.platform import one_path
 
     return documents_by_path().get(one_path(path))
 
 
 def linked_documents(doc: Any) -> list[Any]:
-    """Return a document and all that it links to, directly or not, in no order."""
+    """Return a document and all documents to which it links, directly or not, in no order."""
     return list(doc.getDependentDocuments(False))
 
 
 def is_partial(doc: Any) -> bool:
-    """Return True if only the objects that links need are loaded: saving such a document writes nothing."""
+    """Return True if only the objects that links need are loaded; saving such a document writes nothing."""
     return bool(getattr(doc, "Partial", False))
 
 
 def open_document(path: str) -> Any:
-    """Have FreeCAD open a file; the document becomes the active one. For people's files: :mod:`saving`."""
+    """Open a file in FreeCAD; the document becomes the active one. For people's files use :mod:`saving`."""
     return FreeCAD.openDocument(path)
 
 
@@ -289,7 +291,7 @@ def close_document(doc: Any) -> None:
 
 
 def close_all() -> None:
-    """Close every document without saving; for batches, never with a person at work."""
+    """Close every document without saving; for batches, never while a person works."""
     for name in list(FreeCAD.listDocuments()):
         # Closing one document may close others that only it had loaded.
         if name in FreeCAD.listDocuments():
@@ -297,7 +299,7 @@ def close_all() -> None:
 
 
 def add_document_observer(observer: Any) -> None:
-    """Have an object notified of what happens to documents (``slotFinishSaveDocument`` and its like)."""
+    """Let an object be notified of what happens to documents (``slotFinishSaveDocument`` and the like)."""
     FreeCAD.addDocumentObserver(observer)
 
 
@@ -310,7 +312,7 @@ def main_window() -> Any:
 
 
 def view_of(doc: Any) -> Any:
-    """Return the GUI's half of a document (``Modified``, ``ActiveView``), or None."""
+    """Return the GUI's half of a document (``Modified``, ``ActiveView``); None if it has none."""
     try:
         return gui().getDocument(doc.Name)
     except NameError:  # FreeCAD's own choice of exception for "no such document"
@@ -323,7 +325,9 @@ def has_command(name: str) -> bool:
 
 
 def add_command(name: str, command: Any) -> bool:
-    """Register a command. One that exists is never replaced (0.20 would do it silently); False then."""
+    """Register a command; False if one of this name exists, which is never replaced (0.20 would do that
+    silently).
+    """
     if has_command(name):
         return False
     gui().addCommand(name, command)
@@ -336,7 +340,7 @@ def run_command(name: str) -> None:
 
 
 def command_actions(name: str) -> list[Any]:
-    """Return the QActions of a command; none until it stands in a menu or toolbar."""
+    """Return the QActions of a command; [] until it is in a menu or a toolbar."""
     command = gui().Command.get(name)
     return list(command.getAction()) if command is not None else []
 
@@ -361,7 +365,7 @@ def has_active_workbench() -> bool:
 
 
 def add_workbench_manipulator(manipulator: Any) -> bool:
-    """Have an object put commands into every workbench's menus; False where FreeCAD (0.20) cannot."""
+    """Let an object put commands into every workbench's menus; False if FreeCAD (0.20) cannot do that."""
     add = getattr(gui(), "addWorkbenchManipulator", None)
     if add is None:
         return False
@@ -370,9 +374,9 @@ def add_workbench_manipulator(manipulator: Any) -> bool:
 
 
 def add_resources(folder: Path) -> None:
-    """Make the icons and the translations known; the folder of the second may be missing."""
+    """Make the icons and the translations known. The folder of the translations may be missing."""
     gui().addIconPath(str(folder / "icons"))
-    # Loading the translations again takes FreeCAD 10 ms, so it is done where there are any.
+    # Loading the translations again takes FreeCAD 10 ms, so it is only done if there are any.
     if any(folder.glob("translations/*.qm")):
         gui().addLanguagePath(str(folder / "translations"))
         gui().updateLocale()
@@ -383,9 +387,9 @@ MOST_SELECTED = 2000
 
 
 def select(doc: Any, names: Iterable[str]) -> int:
-    """Select objects of a document in the 3D view and the tree; how many there are.
+    """Select objects of a document in the 3D view and the tree; returns how many there are.
 
-    Of very many, only the first :data:`MOST_SELECTED` are selected.
+    If there are very many, only the first :data:`MOST_SELECTED` are selected.
     """
     gui().Selection.clearSelection()
     names_there = [name for name in names if doc.getObject(name) is not None]
@@ -395,7 +399,7 @@ def select(doc: Any, names: Iterable[str]) -> int:
 
 
 def add_selection_observer(observer: Any) -> None:
-    """Have an object notified of what is selected (``addSelection`` and its like)."""
+    """Let an object be notified of what is selected (``addSelection`` and the like)."""
     gui().Selection.addObserver(observer, 0)
 
 
@@ -412,14 +416,14 @@ def selected() -> list[tuple[Any, str]]:
 
 
 def active_assembly() -> Any:
-    """Return the container that is active in the 3D view (the one new parts go into), or None."""
+    """Return the container that is active in the 3D view and gets new parts; None if there is none."""
     view = getattr(gui().ActiveDocument, "ActiveView", None)
     ask = getattr(view, "getActiveObject", None)
     return ask("part") if callable(ask) else None
 
 
 def origin_of(doc: Any) -> Any:
-    """Return the origin (Kindred Create) that a document belongs to, where FreeCAD has origins; else None."""
+    """Return the origin (Kindred Create) of a document; None if it has none, or if FreeCAD has no origins."""
     ask: Callable[[Any], Any] | None = getattr(gui(), "getOrigin", None)
     if ask is None:
         return None

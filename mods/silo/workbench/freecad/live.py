@@ -51,14 +51,14 @@ ASSEMBLY_SINCE = (0, 22)
 
 
 def read(path: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
-    """Return the BOM of a file, opened in this FreeCAD (or found open). Raises DocumentError, InputError."""
+    """Open a file in this FreeCAD, unless it is open, and read its BOM. Raises DocumentError, InputError."""
     return extract_live(saving.open_fully(path), assembly, hardware=hardware)
 
 
 def read_checked(path: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
-    """Read as :func:`read`, but do not open what could harm FreeCAD.
+    """Do what :func:`read` does, but do not open a file that could harm FreeCAD.
 
-    Where FreeCAD only says that it cannot open a file, the error has the reason that our reader finds.
+    If FreeCAD only says that it cannot open a file, the error has the reason that our reader finds.
     """
     from silo.fcstd import Library
 
@@ -86,12 +86,12 @@ def _refuse_entities(path: str) -> None:
 
 
 def extract_live(document: Any, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
-    """Return the BOM of an open document, as it stands in this session, saved or not.
+    """Read the BOM of an open document as it is in this session, saved or not.
 
-    What this FreeCAD could load only without some of its objects is read from its file.
+    If this FreeCAD could load a document only without some of its objects, its file is read instead.
 
     assembly
-        ``Name`` or ``Label`` of the assembly, where the document holds several.
+        ``Name`` or ``Label`` of the assembly, if the document holds several.
     hardware
         False leaves standard parts out.
     """
@@ -104,7 +104,9 @@ def extract_live(document: Any, assembly: str | None = None, *, hardware: bool =
 
 
 def cached_document(document: Any) -> CachedDocument:
-    """Return a live document for one walk: quick to ask, and never out of date for it is not kept."""
+    """Return a view of a live document for one walk. It answers quickly, and is not kept, so that it is never
+    out of date.
+    """
     library: Any = None
 
     def imported(owner: str, file: str) -> Any:
@@ -118,12 +120,12 @@ def cached_document(document: Any) -> CachedDocument:
 
 
 def extract_object(assembly_obj: Any, *, hardware: bool = True) -> Extraction:
-    """Return the BOM of one assembly object, live or :func:`cached_document`."""
+    """Read the BOM of one assembly object, live or of a :func:`cached_document`."""
     return extract(assembly_obj, **_walking(), hardware=hardware)
 
 
 def why_object(document: Any, assembly: str, parts: Collection[Key], *, hardware: bool = True) -> list[str]:
-    """Say why an assembly of an open document has so many of a part; see :func:`silo.bom.links.why`."""
+    """Say why an assembly of an open document has this quantity of a part; see :func:`silo.bom.links.why`."""
     cached = cached_document(document)
     top = cached.getObject(assembly) if assembly else choose_assembly(cached)
     if top is None:
@@ -136,8 +138,9 @@ def _walking() -> dict[str, Any]:
 
 
 def in_file(document: Any) -> Any:
-    """Return the document as its file has it, where this FreeCAD did not know the types of some objects; None
-    where FreeCAD has them all."""
+    """Read the document from its file, if this FreeCAD did not know the types of some objects; None if it
+    knew them all.
+    """
     if not saving.lost_objects(document):
         return None
     from silo.fcstd import Library
@@ -171,20 +174,22 @@ class WholeDocuments:
 
 
 def canonical_paths() -> Callable[[str], str]:
-    """Return the one path of a file, remembered for one walk: a file opened by two paths is one file."""
+    """Return a function that finds the one path of a file, and remembers it for one walk: a file opened by
+    two paths is one file.
+    """
     return Spelling().real
 
 
 def stored_target(link: Any, name: str = "LinkedObject") -> tuple[str, str] | None:
-    """Return file and object ``Name`` that a link has stored; ("", "") where it was never set, None if
-    untold.
+    """Return the file and the object ``Name`` that a link has stored; ("", "") if it was never set, None if
+    unknown.
     """
     stored = _stored(link, name)
     return None if stored is None else (stored.get("file", ""), stored.get("name", ""))
 
 
 def stored_sub_name(link: Any) -> str:
-    """Return the sub-name that a link has stored beside its target."""
+    """Return the sub-name that a link has stored with its target."""
     return (_stored(link, "LinkedObject") or {}).get("sub", "")
 
 
@@ -213,7 +218,7 @@ class LinkInspector:
         self._damage: dict[tuple[str, str], LinkProblem | None] = {}
 
     def __call__(self, obj: Any) -> LinkProblem | None:
-        """Return the problem; None if it is not known, or nothing is missing."""
+        """Return the problem of a link or a target; None if it is not known, or if nothing is missing."""
         return self._of_link(obj) if is_link(obj) or is_assembly_link(obj) else self._of_target(obj)
 
     def _of_target(self, obj: Any) -> LinkProblem | None:
@@ -245,7 +250,7 @@ class LinkInspector:
         return self._look(owner, file, name) if owner else LinkProblem(FindingCode.BROKEN_LINK, file, name)
 
     def _look(self, owner: str, file: str, name: str) -> LinkProblem:
-        """Return what the reader of files says of the target, for it knows more than FreeCAD does."""
+        """Let the reader of files find the problem of a target, since it knows more than FreeCAD does."""
         from silo.fcstd import Library
         from silo.fcstd.properties import Ref
 
@@ -270,7 +275,7 @@ class _Owner:
 
 
 def lost_assemblies(document: Any) -> list[str]:
-    """Return the assemblies that the file holds and this FreeCAD (before 1.0) could not load."""
+    """Return the assemblies of the file that this FreeCAD (before 1.0) could not load."""
     if host.version() >= ASSEMBLY_SINCE or (whole := in_file(document)) is None:
         return []
     return [
@@ -354,7 +359,7 @@ class SolidCount:
         self.differences.append(SolidDifference(obj.Name, obj.Label, shown, explained, why))
 
     def sentence(self) -> str:
-        """Return the sentence for people."""
+        """Describe the comparison in a sentence, for people."""
         solids = "1 solid" if self.shown == 1 else f"{self.shown} solids"
         text = f"{self.label}: the view has {solids}, the BOM explains {self.explained}"
         further = (
@@ -373,16 +378,16 @@ class SolidCount:
         return f"{text}. They differ; look at: {', '.join(texts)}."
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the data for JSON."""
+        """Return the comparison as JSON values."""
         more = {"unexplained": list(self.unexplained), "agrees": self.agrees, "sentence": self.sentence()}
         return {**asdict(self), **more}
 
 
 def accounts(extraction: Extraction, *, hardware: bool = True) -> list[SolidCount]:
-    """Return the assembly and every sub-assembly, each once; their documents are open.
+    """Compare the solids of the assembly and of every sub-assembly, each once; their documents are open.
 
     hardware
-        False where the extraction leaves standard parts out.
+        False if the extraction leaves standard parts out.
     """
     return _Witness(hardware).accounts(extraction)
 
@@ -453,12 +458,14 @@ class _Witness:
             account.beside += seen.shown if name in beside else 0
             account.explained += predicted[name]
             _judge(account, seen, roles, predicted[name], may_hide=name not in beside)
-        if own or not contents.own:  # a part is no assembly of what it is made of
+        if own or not contents.own:  # a part is not an assembly of its bodies
             self._compare_lines(account, lines, pieces)
         return account
 
     def _drawn(self, count: Count, tree: Tree | None) -> Any:
-        """Return the component; for one that is not open in FreeCAD, what stands for it in the assembly."""
+        """Return the component; if it is not open in FreeCAD, the object that stands for it in the
+        assembly.
+        """
         if host.is_object(host.real(count.target)):
             return count.target
         return next(chains(count, tree))[-1][0]
@@ -468,7 +475,7 @@ class _Witness:
         return (path if path == STANDARD_PARTS else self._canonical(path), name)
 
     def _compare_lines(self, account: SolidCount, lines: Sequence[BomEntry], pieces: Counter[Key]) -> None:
-        """Report lines with another quantity than the roles have, and what has no line."""
+        """Report lines whose quantity differs from the number of pieces, and pieces without a line."""
         left = Counter(pieces)
         for line in lines:
             registered = (line.doc_path, line.object_name)
@@ -485,7 +492,7 @@ class _Witness:
 def _members(
     listed: Sequence[tuple[Any, bool]], roles: Mapping[str, ObjectRole | None], visible: bool = True
 ) -> Iterator[tuple[Any, bool]]:
-    """Yield each object that is no mere holder, once for each path, and if it is visible there."""
+    """Yield each object that is not only a holder, once for each path, with its visibility there."""
     for member, is_visible in listed:
         if roles.get(member.Name) is ObjectRole.HOLDER:
             yield from _members(host.sub_objects(member) or [], roles, visible and is_visible)

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from silo.workbench.revisions.flow import Differences, Ghost
 
 
-# Of more objects the property editor shows only what they have in common.
+# For more objects, the property editor shows only what they have in common.
 MOST = 20
 # FreeCAD's numbers for "asks for no recompute" and "not written into the file" (App::PropertyType).
 _OUTPUT, _NO_PERSIST = 8, 32
@@ -70,7 +70,7 @@ class SiloGroup:
         host.add_selection_observer(self)
 
     def know(self, path: str, entries: Iterable[BomEntry]) -> None:
-        """Take over what Silo knows of the components of a document, where it is open."""
+        """Take over what Silo knows of the components of a document, if it is open."""
         doc = host.find_document(path)
         if doc is None:
             return
@@ -86,10 +86,10 @@ class SiloGroup:
         self._known[doc.Name] = str(doc.FileName), components
         self._soon()
 
-    # FreeCAD calls these, once for each object; what is selected then is looked at once.
+    # FreeCAD calls these once for each object; the selection is then looked at once.
 
     def addSelection(self, *_what: Any) -> None:
-        """Note one more selected object."""
+        """Note that one more object is selected."""
         self._soon()
 
     def setSelection(self, *_what: Any) -> None:
@@ -108,12 +108,12 @@ class SiloGroup:
             file, components = self._known.get(doc.Name, ("", {}))
             if name in components and doc.FileName == file:  # another document may have its name by now
                 wanted.append((doc.getObject(name), components[name]))
-        left = [
+        outdated = [
             (obj, texts) for obj, texts in wanted[:MOST] if obj is not None and not _is_shown(obj, *texts)
         ]
-        if left:
+        if outdated:
             with saving.others_unmarked():
-                for obj, (number, state) in left:
+                for obj, (number, state) in outdated:
                     _put(obj, SHOWN_NUMBER, number, translate("Silo", "Part number in Silo"))
                     _put(obj, SHOWN_STATE, state, translate("Silo", "Silo's data of this component"))
 
@@ -135,9 +135,7 @@ def _put(obj: Any, name: str, value: str, tip: str) -> None:
 
 
 def look_at(paths: Iterable[str]) -> dict[str, OpenedFile]:
-    """Return how the files of components stand. GUI thread; what needs the disk's content is left to the
-    worker.
-    """
+    """Find out how the files of components stand. GUI thread; the worker reads the contents from the disk."""
     documents = host.documents_by_path()
     own = next((str(doc.TransientDir) for doc in documents.values()), "")
     elsewhere = open_in_others(own)
@@ -182,7 +180,7 @@ def remove_identity(candidate: Candidate, *, no_part: bool = False) -> None:
     """Take the identity from a component's file, and save it. GUI thread.
 
     no_part
-        mark it as no part as well; otherwise such a mark goes too.
+        also mark it as no part; otherwise such a mark is removed too.
     """
     doc = saving.open_fully(candidate.entry.doc_path)
     saving.refuse_loss(doc)
@@ -205,7 +203,7 @@ def _objects(candidate: Candidate) -> tuple[str, ...]:
 
 
 def unedited() -> list[Any]:
-    """Return the documents without unsaved edits, each after those that it links to."""
+    """Return the documents without unsaved edits, each after those to which it links."""
     clean = {doc.Name: doc for doc in host.documents() if doc.FileName and not saving.is_modified(doc)}
     ordered: dict[str, Any] = {}
     for doc in clean.values():
@@ -221,8 +219,8 @@ def save_marked(doc: Any) -> None:
 def relink(finding: Finding) -> list[str]:
     """Set the links that a finding names to the file that it says was meant; labels of what was mended.
 
-    One step of undo per document. Raises DocumentError where the file lacks what a link wants; nothing is
-    changed then.
+    Makes one undo step per document. Raises DocumentError if the file lacks an object that a link wants; then
+    nothing is changed.
     """
     meant = saving.open_fully(finding.did_you_mean)
     inspect = live.LinkInspector()
@@ -245,10 +243,10 @@ def relink(finding: Finding) -> list[str]:
 
 
 def _target(meant: Any, problem: LinkProblem) -> Any:
-    result = meant.getObject(problem.obj)
-    if result is None:
+    target = meant.getObject(problem.obj)
+    if target is None:
         raise DocumentError(meant.FileName, f"it holds no object named {problem.obj!r}; nothing was changed")
-    return result
+    return target
 
 
 class LossGuard:
@@ -276,7 +274,9 @@ class LossGuard:
     # FreeCAD calls these; an exception in them would only be printed.
 
     def slotChangedDocument(self, doc: Any, prop: str) -> None:
-        """Look at the file: FreeCAD names it before it reads it, and knows later what it could not load."""
+        """Look at the file: FreeCAD sets its name before it reads it, and later knows what it could not
+        load.
+        """
         if prop == "FileName" and doc.FileName:
             name = doc.Name
             qt.later(0, lambda: self._opened(name))
@@ -414,12 +414,12 @@ class LiveDesk:
     save_marked = staticmethod(save_marked)
 
     def accounts(self, extraction: Extraction) -> list[SolidCount]:
-        """Return the solids that FreeCAD shows, against those that the BOM explains."""
+        """Compare the solids that FreeCAD shows with those that the BOM explains."""
         with qt.wait_cursor():
             return live.accounts(extraction, hardware=self._count_hardware())
 
     def why(self, doc: Any, assembly: str, parts: Collection[Key]) -> list[str]:
-        """Return each chain from an assembly to a part of it."""
+        """Say why an assembly has this quantity of a part: the number, then each chain to it."""
         return live.why_object(doc, assembly, parts, hardware=self._count_hardware())
 
     def relink(self, finding: Finding) -> list[str]:
@@ -428,18 +428,18 @@ class LiveDesk:
         return relink(finding)
 
     def save_as(self, _doc: Any) -> None:
-        """Show FreeCAD's own dialog for the active document."""
+        """Show FreeCAD's own dialog to save the active document."""
         host.run_command("Std_Save")
 
     def identity(self, doc: Any) -> str | None:
-        """Return the identity of the active assembly, if the document holds several. Each commit begins with
-        this.
+        """Return the item of a document; if it holds several assemblies, that of the active one. Each commit
+        begins with this.
         """
         cached = live.cached_document(doc)
         return file_item(cached, self._hint(doc, cached))
 
     def ask(self, planned: CommitPlan, note: str, comment: str, look: Look) -> CommitAnswer | None:
-        """Return the commit dialog."""
+        """Show the commit dialog, and return the answer; None if the person cancels."""
         from silo.workbench.commit.dialog import CommitDialog
 
         dialog = CommitDialog(planned, host.main_window(), note=note, comment=comment)
@@ -457,7 +457,7 @@ class LiveDesk:
             dialog.deleteLater()
 
     def preview_window(self, title: str, path: str, flow: PreviewFlow) -> Any:
-        """Return the preview window."""
+        """Open the preview window."""
         from silo.workbench.preview.dialog import PreviewDialog
 
         window = PreviewDialog(title, path, flow, host.main_window())
@@ -465,7 +465,7 @@ class LiveDesk:
         return window
 
     def light(self, doc: Any, names: Sequence[str]) -> int:
-        """Select objects and draw them through what covers them."""
+        """Select objects and draw them in front of what covers them."""
         return self._overlay.light(doc, names)
 
     def compare(self, path: str, revision: int, theirs: Sequence[Ghost]) -> Differences | None:
@@ -491,7 +491,7 @@ class LiveDesk:
         return Overlay()
 
     def register_window(self, title: str, path: str, flow: RegisterFlow, *, asks: bool) -> Any:
-        """Return the Register Parts dialog."""
+        """Open the Register Parts dialog."""
         from silo.workbench.register.dialog import RegisterDialog
 
         window = RegisterDialog(title, path, flow, host.main_window(), asks=asks)

@@ -42,7 +42,7 @@ def is_modified(doc: Any) -> bool:
 
 @cache
 def watch_edits() -> EditWatch:
-    """Watch edits from now on; :func:`is_edited` knows them."""
+    """Watch edits from now on, for :func:`is_edited`."""
     watch = EditWatch()
     watch.begin([doc for doc in host.documents() if not is_modified(doc)])
     host.add_document_observer(watch)
@@ -53,16 +53,16 @@ def is_edited(doc: Any, until: float) -> bool:
     """Return True if a modified document differs from its file; False if it was only recomputed.
 
     until
-        (``time.thread_time``) what is not compared by then counts as edited.
+        the time (``time.thread_time``) after which nothing more is compared; the rest counts as edited.
     """
     return watch_edits().is_edited(doc, until)
 
 
 def open_fully(path: str) -> Any:
-    """Return the document of a file with all its objects, opened or completed where needed.
+    """Open the document of a file with all its objects, or complete it if it is open in part.
 
     FreeCAD completes a partly loaded document by closing and reading it again, so unsaved edits in it would
-    be lost: then, and where the file cannot be read, :class:`DocumentError`.
+    be lost. In this case, and if the file cannot be read, it raises :class:`DocumentError`.
     """
     from silo.bom.errors import DocumentError
 
@@ -81,11 +81,11 @@ def open_fully(path: str) -> Any:
 
 
 def damage(path: str, name: str = "") -> FcstdError | None:
-    """Return why a file cannot be read as far as an object in it needs ("": to its end); None if it can.
+    """Find why a file cannot be read as far as an object in it needs ("": to its end); None if it can.
 
-    FreeCAD reads a file from its beginning and opens what it finds: objects without shapes where the file is
-    cut short, some of the objects where its Document.xml is damaged. It says so in the report view at most.
-    A file that is not there, or may not be read, is no damage: the session has what it had.
+    FreeCAD reads a file from its beginning and opens what it finds: objects without shapes if the file is cut
+    short, some of the objects if its Document.xml is damaged. At most it says so in the report view. A file
+    that is missing or may not be read is no damage: the session keeps what it has.
     """
     from silo.bom.findings import FindingCode
     from silo.fcstd import Library
@@ -102,8 +102,8 @@ def damage(path: str, name: str = "") -> FcstdError | None:
             document = library.glance(path)
             if not name:
                 document.complete()
-            elif (fcstd_object := document.getObject(name)) is not None:
-                document.check(fcstd_object)
+            elif (obj := document.getObject(name)) is not None:
+                document.check(obj)
     except FcstdError as error:
         sound = error.finding is FindingCode.MISSING_FILE or isinstance(error.__cause__, Refused)
         return None if sound else error
@@ -120,11 +120,11 @@ _UNKNOWN: dict[str, tuple[object, dict[str, tuple[str, str]]]] = {}
 
 
 def lost_objects(doc: Any) -> list[str]:
-    """Return the objects of a document's file that this FreeCAD could not load: "LCS (App::Point)".
+    """List the objects of a document's file that this FreeCAD could not load: "LCS (App::Point)".
 
-    FreeCAD drops objects of types that it does not know, says so in the report view only, and saving the
-    document then destroys them in the file. The file's own version says whether that can be: to read each
-    file takes too long.
+    FreeCAD drops objects of types that it does not know, and says so only in the report view; saving the
+    document then destroys them in the file. Only the version that saved the file is checked first, since
+    reading each file takes too long.
     """
     if not doc.FileName or _is_ours(doc.getProgramVersion()):
         return []
@@ -165,31 +165,31 @@ def _of_unknown_types(doc: Any) -> dict[str, tuple[str, str]]:
             document = library.open(path)
             types = frozenset(() if _is_ours(document.ProgramVersion) else doc.supportedTypes())
             objects = [obj for obj in document.Objects if types and obj.TypeId not in types]
-            result = {
+            unknown = {
                 obj.Name: (obj.Label, obj.TypeId) for obj in objects if not _is_made_again(obj, objects)
             }
     except (OSError, DocumentError):
         return {}
-    _UNKNOWN[path] = state, result
-    return result
+    _UNKNOWN[path] = state, unknown
+    return unknown
 
 
 def _is_made_again(obj: Any, unknown: list[Any]) -> bool:
-    """Return True for the point of an origin that nothing else refers to: FreeCAD 1.1 makes it when it is
-    missing.
+    """Return True for the point of an origin to which nothing else refers: FreeCAD 1.1 makes it again if it
+    is missing.
 
     Each origin of 1.1 has such a point, and so each file with a body.
     """
     if obj.TypeId != "App::Point":
         return False
     # A coordinate system that is lost as well is named itself.
-    lost = {label.Name for label in unknown}
+    lost = {other.Name for other in unknown}
     others = [obj.Document.getObject(name) for name in obj.Document.mentioning(obj.Name) if name not in lost]
     return all(other.TypeId == "App::Origin" for other in others)
 
 
 def save(doc: Any, *, mark_parents: bool = False) -> None:
-    """Save a document to its file; :class:`DocumentError` unless the file really was written.
+    """Save a document to its file; :class:`DocumentError` unless the file was really written.
 
     mark_parents
         let FreeCAD mark the documents that link to this one; the caller saves them as well.
@@ -244,10 +244,11 @@ def mark_modified(name: str) -> None:
 
 @contextmanager
 def others_unmarked(doc: Any = None) -> Iterator[None]:
-    """Keep other documents unmarked while this one is changed and saved; None for all of them.
+    """Keep other documents unmarked while this one is changed and saved; None: all of them.
 
-    FreeCAD marks each document that links to a saved one, for the time of saving that it keeps of it (0.20
-    does so whatever we do), and each that shows an axis cross, for the size of that. Nobody edited them.
+    FreeCAD marks each document that links to a saved one, because it keeps the time of saving of that (0.20
+    does so whatever we do), and each document that shows an axis cross, because the size of the cross
+    changes. Nobody edited them.
     """
     clean = [other for other in host.documents() if other != doc and not is_modified(other)]
     if not host.has_gui():
@@ -282,7 +283,7 @@ def _unmarking(owner: Any, name: str) -> Iterator[None]:
 def save_copy(doc: Any, path: Path) -> None:
     """Write a document, with its unsaved edits, to another file. DocumentError unless that was written.
 
-    A document that FreeCAD has loaded only in part cannot be written; what is in its file is copied.
+    A document that FreeCAD has loaded only in part cannot be written; its file is copied.
     """
     from silo.bom.errors import DocumentError
 
@@ -299,11 +300,11 @@ def save_copy(doc: Any, path: Path) -> None:
 
 
 def save_marked(doc: Any) -> None:
-    """Save a document that FreeCAD marked because something below it was saved, where that can be done."""
+    """Save a document that FreeCAD marked because something below it was saved, if that is possible."""
     from silo.bom.errors import DocumentError
 
     if is_modified(doc) and not host.is_partial(doc):
-        # Where it cannot be saved, FreeCAD's mark says what is so.
+        # If it cannot be saved, FreeCAD's mark is right.
         with suppress(DocumentError):
             save(doc, mark_parents=True)
 
@@ -323,8 +324,8 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
     name
         ``Name`` of the component's object; "" for the document itself.
     whole_document
-        the document is this one component, so it carries the identity as well. Otherwise the identity is the
-        object's only (:mod:`silo.bom.model` says where it is looked for).
+        the document is this one component, so it carries the identity as well. Otherwise only the object has
+        the identity (:mod:`silo.bom.model` says where it is looked for).
     """
     from silo.bom.errors import DocumentError
     from silo.bom.model import meta_key
@@ -344,12 +345,13 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
 
 
 def remove_identity(doc: Any, name: str, *, no_part: bool = False, whole_document: bool = False) -> None:
-    """Take the identity of one object out of every place. The caller saves.
+    """Remove the identity of one object from every place. The caller saves.
 
     no_part
-        the object gets ``SiloBomExclude``: a person says that it is no part. Otherwise it has none then.
+        the object gets ``SiloBomExclude``, since a person decided that it is no part. Otherwise the property
+        is removed.
     whole_document
-        the document's own goes too; otherwise it stays.
+        the document's own identity is removed too; otherwise it stays.
     """
     from silo.bom.model import meta_key
 

@@ -50,7 +50,7 @@ class Relay(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
         self._posted.connect(self._run, QtCore.Qt.ConnectionType.QueuedConnection)
 
     def post(self, call: Callable[[], None]) -> None:
-        """Run ``call`` in the GUI thread, soon; returns at once."""
+        """Let the GUI thread run ``call`` soon; returns at once."""
         try:
             self._posted.emit(call)
         except RuntimeError:
@@ -75,28 +75,28 @@ def in_gui_thread() -> bool:
 
 
 def later(milliseconds: int, call: Callable[[], None]) -> None:
-    """Run ``call`` in the GUI thread after a while; 0 means once the present event is done."""
+    """Run ``call`` in the GUI thread after a while; 0 means after the present event."""
     QtCore.QTimer.singleShot(milliseconds, call)
 
 
 def run_dialog(dialog: Any) -> bool:
-    """Show a dialog and wait for its end; True where it was accepted."""
+    """Show a dialog and wait until it is closed; True if it was accepted."""
     execute = getattr(dialog, "exec", None) or dialog.exec_
     return bool(execute())
 
 
 def open_url(url: str) -> bool:
-    """Open a page in the browser; False where there is none."""
+    """Open a page in the browser; returns False if there is none."""
     return bool(QtGui.QDesktopServices.openUrl(QtCore.QUrl(url)))
 
 
 def tell_at_pointer(text: str) -> None:
-    """Show a text where the person has just clicked; it goes away by itself."""
+    """Show a text where the person has just clicked; it disappears by itself."""
     QtWidgets.QToolTip.showText(QtGui.QCursor.pos(), text)
 
 
 def ask_where_to_save(parent: Any, title: str, name: str) -> str:
-    """Return the path that a person chose for a new file; "" if none was chosen."""
+    """Let a person choose a path for a new file; "" if they choose none."""
     return str(QtWidgets.QFileDialog.getSaveFileName(parent, title, name)[0])
 
 
@@ -107,7 +107,7 @@ def copy(text: str) -> None:
 
 @contextmanager
 def wait_cursor() -> Iterator[None]:
-    """Show the cursor of a busy window."""
+    """Show the cursor of a busy window during the block."""
     QtWidgets.QApplication.setOverrideCursor(QtCore.Qt.CursorShape.WaitCursor)
     try:
         yield

@@ -38,14 +38,15 @@ _COLOURS = {
 def is_dark(widget: Any) -> bool:
     """Return True if the widget's ground is dark (FreeCAD's dark themes).
 
-    Told by the colour of its text: a theme that is a style sheet leaves the palette's ground as it was.
+    It looks at the colour of the text, since a theme that is a style sheet does not change the palette's
+    ground.
     """
     widget.ensurePolished()
     return bool(widget.palette().color(QtGui.QPalette.ColorRole.WindowText).lightness() > 128)
 
 
 def colour(tone: Tone, widget: Any) -> str:
-    """Return the colour of a tone, readable on the widget's ground; "" for the theme's own."""
+    """Return the colour of a tone that is readable on the widget's ground; "" for the theme's own."""
     if tone is Tone.QUIET:
         widget.ensurePolished()
         text = widget.palette().color(QtGui.QPalette.ColorRole.WindowText)
@@ -59,7 +60,7 @@ def colour(tone: Tone, widget: Any) -> str:
 
 
 def label(text: str, tone: Tone = Tone.PLAIN, *, bold: bool = False, wrap: bool = True) -> Any:
-    """Return plain text that wraps, and that can be selected and copied."""
+    """Make a label of plain text, which wraps, and can be selected and copied."""
     made = QtWidgets.QLabel()
     made.setTextFormat(QtCore.Qt.TextFormat.PlainText)
     made.setText(words.breakable(text) if wrap else text)
@@ -76,7 +77,7 @@ def label(text: str, tone: Tone = Tone.PLAIN, *, bold: bool = False, wrap: bool 
 
 
 def paint(made: Any, tone: Tone, *, bold: bool = False) -> None:
-    """Give a label the colour of a tone, also one that has the colour of another."""
+    """Give a label the colour of a tone, even if it has that of another tone."""
     # Its own colour is in its palette, and would be taken for that of the theme.
     made.setStyleSheet("")
     rules = []
@@ -88,7 +89,7 @@ def paint(made: Any, tone: Tone, *, bold: bool = False) -> None:
 
 
 def link_button(text: str, call: Callable[[], None], tip: str = "") -> Any:
-    """Return a button that looks like a link: it does not shout, and the keyboard reaches it."""
+    """Make a button that looks like a link: it is not loud, and the keyboard reaches it."""
     made = QtWidgets.QPushButton(text)
     made.setFlat(True)
     made.setCursor(QtCore.Qt.CursorShape.PointingHandCursor)
@@ -101,7 +102,7 @@ def link_button(text: str, call: Callable[[], None], tip: str = "") -> Any:
 
 
 def link_style(shade: str, more: str = "") -> str:
-    """Return the style sheet of a link; it has to undo what FreeCAD's themes do to buttons."""
+    """Write the style sheet of a link, which must undo what FreeCAD's themes do to buttons."""
     return (
         f"QPushButton {{ color: {shade}; background: transparent; border: none; min-width: 0; min-height: 0;"
         f" margin: 0; padding: 1px 2px; text-align: left; {more} }}"
@@ -110,13 +111,13 @@ def link_style(shade: str, more: str = "") -> str:
 
 
 def brush(tone: Tone, widget: Any) -> Any:
-    """Return the colour of a tone for a cell; the theme's own where it has none."""
+    """Make a brush in the colour of a tone for a cell; in the theme's own colour if the tone has none."""
     shade = colour(tone, widget)
     return QtGui.QBrush(QtGui.QColor(shade)) if shade else QtGui.QBrush()
 
 
 def button(text: str, name: str, call: Callable[[], object], tip: str = "", *, default: bool = False) -> Any:
-    """Return a push button; Return presses the default one of a window only."""
+    """Make a push button; the Return key presses only the default button of a window."""
     made = QtWidgets.QPushButton(text)
     made.setObjectName(name)
     made.setAutoDefault(default)
@@ -127,7 +128,7 @@ def button(text: str, name: str, call: Callable[[], object], tip: str = "", *, d
 
 
 def line(*parts: Any) -> Any:
-    """Return a layout of widgets in one line; what stands after None is at the right."""
+    """Make a layout of widgets in one line; those after None are at the right."""
     layout = QtWidgets.QHBoxLayout()
     for part in parts:
         layout.addStretch(1) if part is None else layout.addWidget(part)
@@ -135,10 +136,11 @@ def line(*parts: Any) -> Any:
 
 
 def lay_out(window: Any, name: str, title: str, width: int, height: int, *, modal: bool = False) -> Any:
-    """Name and size of a window; the layout of its content.
+    """Give a window its name and size; returns the layout of its content.
 
     modal
-        the caller that waits for the window deletes it afterwards; others are gone once they are closed.
+        the caller waits for the window, and deletes it afterwards; other windows are deleted when they are
+        closed.
     """
     window.setObjectName(name)
     window.setWindowTitle(title)
@@ -151,7 +153,7 @@ def lay_out(window: Any, name: str, title: str, width: int, height: int, *, moda
 
 
 def tree(name: str, headings: Sequence[str], numbers: Sequence[int] = (), *, flat: bool = True) -> Any:
-    """Return a table of lines, or of lines below lines; the columns ``numbers`` are flush right."""
+    """Make a table of lines, or of lines below lines; the columns ``numbers`` are flush right."""
     made = QtWidgets.QTreeWidget()
     made.setObjectName(name)
     made.setRootIsDecorated(not flat)
@@ -162,7 +164,7 @@ def tree(name: str, headings: Sequence[str], numbers: Sequence[int] = (), *, fla
 
 
 def embolden(item: Any) -> None:
-    """Set the first cell of a line in bold letters."""
+    """Write the first cell of a line in bold letters."""
     # A line of a tree has a font for each column, a cell of a table its own.
     where = (0,) if isinstance(item, QtWidgets.QTreeWidgetItem) else ()
     font = item.font(*where)
@@ -171,7 +173,7 @@ def embolden(item: Any) -> None:
 
 
 def row(*widgets: Any, gap: int = 10) -> Any:
-    """Return a layout of widgets side by side, in several lines where the width ends."""
+    """Make a layout of widgets side by side, in several lines if they need more width."""
     layout = FlowLayout(gap)
     for widget in widgets:
         layout.addWidget(widget)
@@ -179,7 +181,7 @@ def row(*widgets: Any, gap: int = 10) -> Any:
 
 
 def picture(name: str, size: int = 16) -> Any:
-    """Return one of the add-on's own icons as a label."""
+    """Make a label with one of the add-on's own icons."""
     made = QtWidgets.QLabel()
     icon = host.icon(name)
     if icon is not None:
@@ -189,7 +191,7 @@ def picture(name: str, size: int = 16) -> Any:
 
 
 def broken(text: str, metrics: Any, width: int) -> str:
-    """Return a text with line ends where ``width`` pixels are full; a word that is wider stands alone."""
+    """Break a text into lines of at most ``width`` pixels; a wider word has a line of its own."""
     lines = [""]
     for word in text.split():
         longer = f"{lines[-1]} {word}".strip()
@@ -212,7 +214,7 @@ def clear(layout: Any) -> None:
 
 
 def read(parent: Any, title: str, lines: Iterable[str]) -> None:
-    """Show all lines of something long in a window that scrolls, and wait until it is closed."""
+    """Show all lines of a long text in a window that scrolls, and wait until it is closed."""
     window = QtWidgets.QDialog(parent)
     layout = lay_out(window, "SiloRead", title, 620, 420, modal=True)
     text = QtWidgets.QPlainTextEdit("\n".join(words.plain(line, 1000) for line in lines))
@@ -235,7 +237,7 @@ def _message(parent: Any, title: str, text: str) -> Any:
 
 
 def warn(parent: Any, title: str, text: str) -> None:
-    """Show a problem and wait until it is read."""
+    """Show a problem, and wait until the person closes it."""
     run_dialog(_message(parent, title, text))
 
 
@@ -261,27 +263,27 @@ class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no type
         self.setContentsMargins(0, 0, 0, 0)
 
     def addItem(self, item: Any) -> None:
-        """Take what Qt hands over from :meth:`addWidget`."""
+        """Take the item that Qt passes on from :meth:`addWidget`."""
         self._items.append(item)
 
     def count(self) -> int:
-        """Return how many widgets there are."""
+        """Return the number of widgets."""
         return len(self._items)
 
     def itemAt(self, number: int) -> Any:
-        """Return one of them, None beyond the last."""
+        """Return the widget's item with this number; None beyond the last."""
         return self._items[number] if 0 <= number < len(self._items) else None
 
     def takeAt(self, number: int) -> Any:
-        """Remove one and give it."""
+        """Remove an item and return it."""
         return self._items.pop(number) if 0 <= number < len(self._items) else None
 
     def hasHeightForWidth(self) -> bool:
-        """Return the narrower, the higher."""
+        """Return True: a narrower layout is higher."""
         return True
 
     def heightForWidth(self, width: int) -> int:
-        """Return height that a width needs."""
+        """Return the height that a width needs."""
         return self._place(QtCore.QRect(0, 0, width, 0), move=False)
 
     def setGeometry(self, area: Any) -> None:
@@ -290,11 +292,11 @@ class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no type
         self._place(area, move=True)
 
     def sizeHint(self) -> Any:
-        """Return the smallest size: the width comes from outside."""
+        """Return the smallest size, since the width comes from outside."""
         return self.minimumSize()
 
     def minimumSize(self) -> Any:
-        """Return room for the largest widget."""
+        """Return the size of the largest widget."""
         size = QtCore.QSize()
         for item in self._items:
             size = size.expandedTo(item.minimumSize())
@@ -314,7 +316,7 @@ class FlowLayout(QtWidgets.QLayout):  # type: ignore[misc]  # PySide has no type
 
 
 def choice_box(parent: Any, choices: Mapping[str, str], *, search: bool = False, name: str = "") -> Any:
-    """Return a list to choose from, no longer than the screen; ``search``: typed letters filter it."""
+    """Make a list of choices, no longer than the screen; with ``search``, typed letters filter it."""
     box = QtWidgets.QComboBox(parent)
     box.setObjectName(name)
     box.setMaxVisibleItems(14)
@@ -329,14 +331,14 @@ def choice_box(parent: Any, choices: Mapping[str, str], *, search: bool = False,
 
 
 def fill_choices(box: Any, choices: Mapping[str, str]) -> None:
-    """Let a list have these choices."""
+    """Fill a list with these choices."""
     box.clear()
     for key, text in choices.items():
         box.addItem(text, key)
 
 
 def chosen_key(box: Any) -> Any:
-    """Return the key of what is chosen or typed; None where the letters fit several, or none."""
+    """Return the key of the chosen or typed text; None if the letters fit several choices, or none."""
     typed = box.currentText()
     if not box.isEditable() or typed == box.itemText(box.currentIndex()):
         return box.currentData()
@@ -367,7 +369,7 @@ class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # Py
         self._choices, self._search = choices, search
 
     def createEditor(self, parent: Any, _option: Any, index: Any) -> Any:
-        """Return a list of the choices, opened at once."""
+        """Make a list of the choices, and open it at once."""
         box = choice_box(parent, self._choices(index.row()), search=self._search)
         box.activated.connect(lambda _number: self._chosen(box))
 
@@ -383,7 +385,7 @@ class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # Py
         return box
 
     def setEditorData(self, editor: Any, index: Any) -> None:
-        """Begin with what is chosen now."""
+        """Begin with the present choice."""
         editor.setCurrentIndex(editor.findData(index.data(KEY)))
 
     def setModelData(self, editor: Any, model: Any, index: Any) -> None:
@@ -419,7 +421,7 @@ class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # Py
         self.closeEditor.emit(box)
 
 
-# A bar that is there for a moment only is a flicker.
+# A bar that is visible only for a moment would flicker.
 PATIENCE_S = 0.3
 STEP_S = 0.05
 
@@ -440,10 +442,10 @@ class CloseWatch(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
 
 
 def wait_for_disk(left: Callable[[float], int]) -> None:
-    """Wait until nothing is left, with a bar after a moment and a button to close anyway.
+    """Wait until nothing remains; after a moment with a bar, and a button to close anyway.
 
     left
-        waits for at most so many seconds, and returns how many things the disk still has to do.
+        waits at most so many seconds, and returns how many files are still to be written.
     """
     most = left(PATIENCE_S)
     if not most:
@@ -487,7 +489,7 @@ def save_in_view(doc: Any) -> None:
 
 @contextmanager
 def _passing_view(doc: Any) -> Iterator[None]:
-    """Yield a 3D view that nobody gets to see."""
+    """Keep a 3D view open during the block, without showing it."""
     window = host.main_window()
     area = window.findChild(QtWidgets.QMdiArea)
     window.setUpdatesEnabled(False)
@@ -509,7 +511,7 @@ def _passing_view(doc: Any) -> Iterator[None]:
 
 @contextmanager
 def _answering_no() -> Iterator[None]:
-    """Answer No to FreeCAD's question about the files below, should it come."""
+    """Answer No if FreeCAD asks about the files below."""
 
     def answer() -> None:
         box = QtWidgets.QApplication.activeModalWidget()

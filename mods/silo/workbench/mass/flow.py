@@ -22,7 +22,7 @@ from silo.workbench.words import plain, tip, translate
 if TYPE_CHECKING:
     from silo.workbench.mass.rows import MassRow, MassView
 
-# The window lives this often while shapes are measured.
+# The window is drawn this often while shapes are measured.
 BREATH_S = 0.05
 # Small assemblies are measured before anybody could read a progress window.
 PATIENCE_MS = 500
@@ -39,7 +39,9 @@ class MassFlow:
         self._hardware = hardware
 
     def start(self, doc: Any) -> Any:
-        """Measure a document's assembly and show its masses; the window, None where there is nothing."""
+        """Measure a document's assembly and show its masses; returns the window, None if there is nothing to
+        show.
+        """
         title = translate("Silo", "Mass of the assembly")
         try:
             import numpy  # noqa: F401
@@ -100,7 +102,7 @@ class WaitingWindow:
         self._window.deleteLater()
 
     def report(self, stage: str, done: int, total: int) -> None:
-        """Report each part and each face; let the window draw now and then."""
+        """Report each part and each face, and let the window draw now and then."""
         if stage == "measuring":
             self._part = translate("Silo", "Part {n} of {total}", n=done, total=total)
             self._window.setRange(0, total)

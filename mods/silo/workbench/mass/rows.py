@@ -23,7 +23,7 @@ class MassRow:
     doubtful: bool
 
     def cells(self) -> tuple[str, ...]:
-        """Return the cells as text, in the order of the columns."""
+        """Write the cells, in the order of the columns."""
         return (
             self.name,
             str(self.quantity),
@@ -46,7 +46,7 @@ class MassView:
     notes: tuple[str, ...]
 
     def table(self, headings: tuple[str, ...]) -> str:
-        """Return the table for the clipboard: tab-separated, numbers in kg and cm³ that a spreadsheet
+        """Write the table for the clipboard: tab-separated, with numbers in kg and cm³ that a spreadsheet
         reads.
         """
         lines = ["\t".join(headings)]
@@ -57,7 +57,7 @@ class MassView:
 
 
 def shown(report: InertiaReport) -> MassView:
-    """Return the window's content; the heaviest part first, those without a mass last."""
+    """Make the window's content; the heaviest part comes first, parts without a mass come last."""
     parts = [part for link in report.links.values() for part in link.parts]
     rows = sorted((_row(part) for part in parts), key=lambda row: (-row.total, row.name))
     unknown = [row for row in rows if row.each == 0]
@@ -108,7 +108,7 @@ def _row(part: PartResult) -> MassRow:
 
 
 def mass_text(mass: float) -> str:
-    """Return a mass [kg] with a unit that suits it: ``12.3 g``, ``1.2346 kg``; a dash for none."""
+    """Write a mass [kg] in a suitable unit: ``12.3 g``, ``1.2346 kg``; a dash for none."""
     if mass == 0:
         return "–"
     return f"{mass * 1e3:.5g} g" if abs(mass) < 1 else f"{mass:.5g} kg"

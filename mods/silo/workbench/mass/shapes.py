@@ -82,9 +82,7 @@ _BOUNDARY = ("Forward", "Reversed")
 
 
 def faces_of(shape: Any) -> Iterator[Any]:
-    """Yield the faces, each as the solid has it (``Faces`` would list a face that is used twice only
-    once).
-    """
+    """Yield the faces as the solid has them (``Faces`` lists a face that is used twice only once)."""
     if shape.ShapeType == "Face":
         if shape.Orientation in _BOUNDARY:
             yield shape
@@ -95,15 +93,13 @@ def faces_of(shape: Any) -> Iterator[Any]:
 
 
 def face_of(face: Any) -> Face:
-    """Return a FreeCAD face as the integration takes it. ValueError where FreeCAD does not give enough of
-    it.
-    """
+    """Convert a FreeCAD face for the integration. ValueError if FreeCAD does not give enough of it."""
     wires = [wire for wire in face.childShapes() if wire.ShapeType == "Wire"]
     return Face(_surface(face), [_curve(face, edge) for wire in wires for edge in _edges(face, wire)])
 
 
 def _edges(face: Any, wire: Any) -> Iterator[Any]:
-    """Yield the edges, with the face's own orientation in them, which distinguishes the two curves of a
+    """Yield the edges with the face's own orientation in them, which distinguishes the two curves of a
     seam.
     """
     listed = [edge for edge in wire.childShapes() if edge.Orientation in _BOUNDARY]
@@ -127,7 +123,7 @@ def _curve(face: Any, edge: Any) -> Curve:
 
 
 def _fitted(curve: Any, basis: Basis) -> Callable[[Floats], Floats]:
-    """Return a line, circle or ellipse, from a few of its points."""
+    """Find the line, circle or ellipse through a few of its points."""
     points = _sampled(curve)(basis.samples)
     coefficients = np.linalg.solve(basis.at(basis.samples), points)
     return lambda t: basis.at(t) @ coefficients
@@ -154,7 +150,7 @@ def _breaks(curve: Any, kind: str, first: float, last: float) -> Floats:
 
 
 def _surface(face: Any) -> Surface:
-    """Return the quickest form of the face's surface that is the same surface."""
+    """Find the form of the face's surface that is the same surface and quickest to evaluate."""
     surface = face.Surface
     kind = type(surface).__name__
     value = _values(face)
@@ -215,7 +211,7 @@ def _asker(face: Any) -> Callable[[float, float], Any]:
 
 
 def _extruded(curve: Any, face: Any, value: Value) -> Nurbs:
-    """Return a spline drawn along a straight line: a spline surface of degree 1 in that direction."""
+    """Make the surface of a spline that is drawn along a straight line: of degree 1 in that direction."""
     if type(curve).__name__ == "BezierCurve":
         curve = curve.toBSpline()
     curve, periodic = curve.copy(), curve.isPeriodic()
@@ -258,7 +254,7 @@ AGREE = 0.02
 
 
 def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
-    """Return the geometry of an open document as it stands in this session, saved or not.
+    """Read the geometry of an open document as it is in this session, saved or not.
 
     ``report`` is called for every product and every face; what it raises (CancelledError) ends the reading.
     Raises DocumentError, as the reader of files does, and InputError for too many or too deeply nested parts.
@@ -278,7 +274,7 @@ def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
 
 
 def measure(leaf: Leaf, eps: float, report: Report) -> Measured:
-    """Return all solids of a leaf whose handles are FreeCAD's shapes, in its axes."""
+    """Measure all solids of a leaf whose handles are FreeCAD's shapes, in its axes."""
     return _Product(eps, report).measured(leaf)
 
 
@@ -289,12 +285,12 @@ class LiveFacts:
         self._inspect = live.LinkInspector()
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
-        """Return (4, 4) [mm] of an object's own placement; the identity where it has none."""
+        """Return (4, 4) [mm] of an object's own placement; the identity if it has none."""
         value = own(obj, name)
         return np.eye(4) if value is None else matrix_of(value)
 
     def places(self, obj: Any) -> list[Floats]:
-        """Return (4, 4) [mm] each, the object's own ``PlacementList``."""
+        """Return (4, 4) [mm] for each placement in the object's own ``PlacementList``."""
         return [matrix_of(place) for place in own(obj, "PlacementList") or ()]
 
     def shape(self, obj: Any) -> Any:
@@ -302,7 +298,7 @@ class LiveFacts:
         return obj.Shape if "Shape" in obj.PropertiesList and not obj.Shape.isNull() else None
 
     def material(self, obj: Any) -> StatedMaterial:
-        """Return the material object linked to it, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
+        """Return the material object to which it links, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
         linked = linked_material(obj)
         if linked is not None:
             return linked
@@ -317,11 +313,11 @@ class LiveFacts:
 
 
 def _stored(obj: Any, name: str) -> Any:
-    """Return the value of a property, cut off from its object; None if the object has no such property.
+    """Return a property's value that has no tie to its object; None if the object has no such property.
 
     ``obj.ShapeMaterial.getPhysicalValue(…)`` marks the document as edited and touches all links to the object
-    (measured in FreeCAD 1.0 and 1.1): FreeCAD takes every call of a value that it handed out as an attribute
-    for a change of it. A value got by name is nobody's.
+    (measured in FreeCAD 1.0 and 1.1): FreeCAD takes every call of a value that was read as an attribute for a
+    change of it. A value that was read by name has no owner.
     """
     # A document without an assembly stands for itself, and has none of these.
     if name not in getattr(obj, "PropertiesList", ()):
@@ -330,7 +326,7 @@ def _stored(obj: Any, name: str) -> Any:
 
 
 def matrix_of(placement: Any) -> Floats:
-    """Return (4, 4) of a FreeCAD placement."""
+    """Return a FreeCAD placement as (4, 4)."""
     return np.array(placement.toMatrix().A, dtype=np.float64).reshape(4, 4)
 
 
@@ -359,36 +355,38 @@ class _Product:
     problems: list[Note] = field(default_factory=list)
 
     def measured(self, leaf: Leaf) -> Measured:
-        """Return all solids of a leaf, in its axes."""
+        """Measure all solids of a leaf, in its axes."""
         shapes = [(ref.handle, ref.transform) for ref in leaf.shapes]
         # FreeCAD keeps an object's placement as the location of its shape; the walk's own takes its place.
         placed = [(shape, t @ np.linalg.inv(matrix_of(shape.Placement))) for shape, t in shapes]
         solids = [(solid, matrix) for shape, matrix in placed for solid in shape.Solids]
         shells: list[tuple[Any, Floats]] = []
-        left: list[Mesh] = []
+        loose: list[Mesh] = []
         for shape, matrix in placed:
             closed, others = _surfaces(shape)
             shells += [(solid, matrix) for solid in closed]
-            left += [_meshed(surface).moved(matrix).moved(np.diag([MM, MM, MM, 1.0])) for surface in others]
+            loose += [_meshed(surface).moved(matrix).moved(np.diag([MM, MM, MM, 1.0])) for surface in others]
         if shells:
             self.problems.append(shell_note(len(shells), len(solids)))
         solids += shells
         bodies: list[Body] = []
         for number, (solid, matrix) in enumerate(solids, start=1):
             where = f"solid {number} of {len(solids)}: " if len(solids) > 1 else ""
-            solid_and_place, moved = self._find(solid, where)
-            if solid_and_place.props is not None:
-                bodies.append(_placed(solid_and_place, matrix @ moved, solid, matrix))
+            known, moved = self._find(solid, where)
+            if known.props is not None:
+                bodies.append(_placed(known, matrix @ moved, solid, matrix))
         faces = any(shape.Faces for shape, _ in shapes)
         settled = together(bodies, _common, self.problems)
         if settled.mixed:
             self.problems.append(cavity_note(settled))
-        self.problems += loose_notes(left, bodies, settled.solids)
+        self.problems += loose_notes(loose, bodies, settled.solids)
         wires = any(shape.Edges for shape, _ in shapes)
         return Measured(settled.solids, tuple(self.problems), None, faces, wires)
 
     def _find(self, solid: Any, where: str) -> tuple[_Solid, Floats]:
-        """Return the solid or an equal one that was measured before, and (4, 4) [mm] from there to here."""
+        """Find an equal solid that was measured before, or measure this one; returns it, and (4, 4) [mm] from
+        it to this one.
+        """
         here = matrix_of(solid.Placement)
         for body in self.known:
             if solid.isPartner(body.shape) and solid.Orientation == body.shape.Orientation:
@@ -422,8 +420,8 @@ class _Product:
         return _Solid(solid, props)
 
     def _integrated(self, solid: Any, centre: Floats, radius: float) -> Moments:
-        """Integrate the solid ourselves; the result is not finite where FreeCAD does not give the geometry in
-        full.
+        """Integrate the solid ourselves; the result is not finite if FreeCAD does not give the complete
+        geometry.
         """
         faces = list(faces_of(solid))
 
@@ -440,7 +438,7 @@ class _Product:
 
 
 def _weighed(solid: Any, ours: Moments, notes: list[Note]) -> Moments:
-    """Return our moments, or FreeCAD's if there are none of ours, or if a mesh is nearer to FreeCAD's."""
+    """Return our moments; or FreeCAD's, if we have none, or if a mesh is nearer to FreeCAD's."""
     volume = float(solid.Volume)
     if abs(ours.volume - volume) <= AGREE * abs(volume):
         return ours
@@ -454,7 +452,7 @@ def _weighed(solid: Any, ours: Moments, notes: list[Note]) -> Moments:
         )
         tensor = np.array(solid.MatrixOfInertia.A, dtype=np.float64).reshape(4, 4)[:3, :3]
         return Moments(volume, np.array(tuple(solid.CenterOfMass)), tensor, 0.0)
-    if ours.drift > STATED:  # where faces close, it is FreeCAD that is wrong
+    if ours.drift > STATED:  # if the faces close, FreeCAD is wrong
         apart = abs(volume / ours.volume - 1)
         message = f"FreeCAD's own volume differs by {apart:.1%}; the geometry may be bad"
         notes.append(Note(GeometryCode.NOT_CONVERGENT, message))
@@ -462,19 +460,21 @@ def _weighed(solid: Any, ours: Moments, notes: list[Note]) -> Moments:
 
 
 def _nearer_to_mesh(solid: Any, ours: float, theirs: float) -> bool:
-    """Return True if our volume [mm^3] is nearer to the one that FreeCAD's tessellation encloses."""
+    """Return True if our volume [mm^3] is nearer to that of FreeCAD's tessellation than FreeCAD's own."""
     enclosed = abs(mesh_volume(_meshed(solid)))
     return abs(abs(ours) - enclosed) < abs(abs(theirs) - enclosed)
 
 
 def _meshed(shape: Any) -> Mesh:
-    """Return FreeCAD's triangles of a shape, in mm."""
+    """Let FreeCAD mesh a shape, in mm."""
     points, facets = shape.tessellate(max(0.005 * float(shape.BoundBox.DiagonalLength), 1e-6))
     return Mesh(np.array([(p.x, p.y, p.z) for p in points]), np.array(facets, dtype=np.int64))
 
 
 def _placed(solid_placed: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
-    """Return a measured solid after ``moved``; ``solid`` after ``matrix`` ((4, 4) [mm]) is the same."""
+    """Move a measured solid by ``moved``; ``solid`` moved by ``matrix`` ((4, 4) [mm]) is at the same
+    place.
+    """
     assert solid_placed.props is not None
     props, metres = solid_placed.props, in_metres(moved)
     volumes, coms, units = place([props.volume_m3], [props.com_m], [props.inertia_unit], [metres])
@@ -487,7 +487,7 @@ def _placed(solid_placed: _Solid, moved: Floats, solid: Any, matrix: Floats) -> 
 
 
 def _surfaces(shape: Any) -> tuple[list[Any], list[Any]]:
-    """Return the surfaces of a shape that stand in no solid: those that close, as solids, and the others."""
+    """Divide the surfaces of a shape in no solid into closed ones, made into solids, and the others."""
     inside = {shell.hashCode() for solid in shape.Solids for shell in solid.Shells}
     loose = [shell for shell in shape.Shells if shell.hashCode() not in inside]
     face_codes = {face.hashCode() for shell in shape.Shells for face in shell.Faces}
@@ -508,7 +508,7 @@ def _surfaces(shape: Any) -> tuple[list[Any], list[Any]]:
 
 
 def _common(body: Body, other: Body) -> SolidProps | None:
-    """Return what two solids have in common, by FreeCAD's boolean operation; None if that fails."""
+    """Find what two solids have in common by FreeCAD's boolean operation; None if that fails."""
     try:
         both = _shape(body).common(_shape(other))
         least = min(body.props.volume_m3, other.props.volume_m3)

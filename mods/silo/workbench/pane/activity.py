@@ -53,7 +53,7 @@ class EntryBatch(StrEnum):
     REVISED = "revised"
 
 
-# Seconds between two of a batch; from so many on they are one box, which has so many names.
+# Seconds between two events of a batch; from how many events on they are one box; how many names it has.
 PAUSE_S, FEWEST, MOST_NAMES = 60.0, 3, 6
 
 
@@ -149,7 +149,7 @@ class PaneEntry:
         """Drop the buttons of answered questions about copied identities.
 
         is_answered
-            says so of a *Same part*.
+            returns True for the action of an answered *Same part*.
         """
         answered = [
             any(action.do is Do.SAME and is_answered(action) for action in line.actions)
@@ -165,8 +165,8 @@ class PaneEntry:
 
 
 def not_in_silo_key(path: str) -> str:
-    """Return the key of the box for a document without an item; a commit of it that arrives takes its
-    place.
+    """Return the key of the box for a document without an item; the box of a commit that arrives
+    replaces it.
     """
     return f"not-in-silo:{path}"
 
@@ -174,8 +174,8 @@ def not_in_silo_key(path: str) -> str:
 def gathered(entries: Iterable[PaneEntry]) -> tuple[PaneEntry, ...]:
     """Merge the entries of one batch into one box.
 
-    A batch is of one kind and one person, and has no pause of more than :data:`PAUSE_S` in it. Its box stands
-    where its newest one would.
+    A batch has one kind and one person, and no pause of more than :data:`PAUSE_S`. Its box is at the place of
+    its newest entry.
     """
     made: list[list[PaneEntry]] = []
     last: dict[tuple[str, str], list[PaneEntry]] = {}
@@ -219,7 +219,7 @@ def _together(group: list[PaneEntry]) -> PaneEntry:
 def shortened(
     lines: tuple[EntryLine, ...], most: int = MOST_LINES, actions: tuple[Action, ...] = ()
 ) -> tuple[EntryLine, ...]:
-    """Return the first lines, and how many more there are; ``actions`` is the way to see those."""
+    """Return the first lines, and a line with the number of further ones; ``actions`` lead to these."""
     if len(lines) <= most:
         return lines
     left = len(lines) - most + 1
@@ -238,7 +238,7 @@ class Activity:
     entries: tuple[PaneEntry, ...] = ()
 
     def add(self, entry: PaneEntry) -> Activity:
-        """Add an entry. An entry with the same key and a higher rank stays as it is."""
+        """Add an entry. An entry with the same key and a higher rank is not replaced."""
         mine = {entry.key, *entry.also}
         # Events may come by the thousand, and hardly one has to do with another.
         related = [e for e in self.entries if e.key in mine or entry.key in e.also]
@@ -287,7 +287,7 @@ def presence_text(newer: Newer, label: str) -> str:
 
 
 def banner(shown: PaneState) -> Banner:
-    """Return the banner for a state: the connection, and what colleagues committed of the open documents."""
+    """Make the banner for a state: the connection, and what colleagues committed of the open documents."""
     made = _connection(shown)
     if not shown.presence:
         return made
@@ -371,7 +371,7 @@ def rows(
     said: str = "",
     pause: Pause | None = None,
 ) -> tuple[WaitingRow, ...]:
-    """Return the entries, those first that a person has to look at.
+    """Make a row of each entry; those that need a person come first.
 
     said
         the reason that the pane shows above them; no row repeats it.
@@ -382,9 +382,11 @@ def rows(
 
 
 def can_send(entries: Iterable[QueueEntry], server_url: str) -> bool:
-    """Return True if *Send now* would send something: not all waits for a person, an address or settings."""
+    """Return True if *Send now* would send something: not all entries wait for a person, an address or
+    settings.
+    """
     here = _address(server_url)
-    # What a server that was set back has lost is sent by the same press.
+    # The same press also sends what a server that was set back has lost.
     return bool(here) and not all(
         _is_urgent(entry, here) and (entry.is_away(here) or not entry.newer.get("set_back"))
         for entry in entries
@@ -392,7 +394,7 @@ def can_send(entries: Iterable[QueueEntry], server_url: str) -> bool:
 
 
 def heading(entries: Sequence[QueueEntry], server_url: str) -> str:
-    """Return how many things wait, and for whom."""
+    """Say how many entries wait, and for whom."""
     here = _address(server_url)
     urgent = sum(_is_urgent(entry, here) for entry in entries)
     text, many = (
@@ -408,18 +410,18 @@ def heading(entries: Sequence[QueueEntry], server_url: str) -> str:
 
 
 def meant_for_another(entries: Iterable[QueueEntry], server_url: str) -> tuple[int, ...]:
-    """Return entries that wait for another address than the one in use."""
+    """Return the numbers of the entries for another address than the one in use."""
     here = _address(server_url)
     return tuple(entry.id for entry in entries if entry.is_away(here))
 
 
 def _address(server_url: str) -> str:
-    """Return the address in use, as entries have theirs; "" for none."""
+    """Return the address in use in the form that entries have; "" for none."""
     return canonical(server_url) if server_url else ""
 
 
 def _is_urgent(entry: QueueEntry, here: str) -> bool:
-    """Return True if it waits for a person, not for the server."""
+    """Return True if the entry waits for a person, not for the server."""
     return entry.state is State.HELD or entry.is_away(here)
 
 

@@ -37,7 +37,7 @@ FIRST, MORE = 40, 60
 
 
 def _waits(shown: PaneState) -> object:
-    """Return what is drawn of what waits."""
+    """Return the values from which the waiting entries are drawn."""
     return shown.waiting, shown.server, shown.theirs, shown.reason
 
 
@@ -81,7 +81,7 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
             Tone.QUIET,
         )
         self._older = widgets.link_button(translate("Silo", "Show older…"), self._show_older)
-        # In the list: in a low window it would leave the news no room, and its own lines neither.
+        # It is in the list: in a low window it would otherwise leave no room for the news.
         self._list.addWidget(self._waiting)
         self._list.addWidget(self._empty)
         self._list.addWidget(self._older)
@@ -90,7 +90,7 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
         return area
 
     def draw(self, shown: PaneState) -> None:
-        """Show a state; only what changed is made again."""
+        """Show a state; only what changed is drawn again."""
         before, self._shown = self._shown, shown
         self._banner.draw(banner(shown))
         self._busy.draw(shown)
@@ -149,7 +149,7 @@ OnAction = Callable[[Action], None]
 
 
 def buttons(actions: Iterable[Action], on_action: OnAction) -> Any:
-    """Return a row of link buttons."""
+    """Make a row of link buttons."""
     made = []
     for action in actions:
         address = action.target if action.do is Do.VIEW else ""
@@ -189,7 +189,7 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
             layout.addWidget(widgets.picture(entry.icon), 0, QtCore.Qt.AlignmentFlag.AlignTop)
         title = widgets.label(entry.title, bold=True)
         if entry.who:
-            # Below the title: a long name would leave it no room.
+            # It is below the title, since a long name would leave it no room.
             column = QtWidgets.QVBoxLayout()
             column.setSpacing(0)
             column.addWidget(title)
@@ -210,7 +210,7 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
 
 
 def _ground(widget: Any) -> str:
-    """Return the ground of a box. In a dark theme the palette may still be the light one."""
+    """Return the background of a box. In a dark theme the palette may still be the light one."""
     return "rgba(255, 255, 255, 13)" if widgets.is_dark(widget) else "palette(base)"
 
 
@@ -233,16 +233,16 @@ class BannerWidget(QtWidgets.QFrame):  # type: ignore[misc]
         self._layout.setSpacing(2)
 
     def forget(self) -> None:
-        """Draw again next time, whatever the state."""
+        """Forget what was drawn, so that the next state is drawn completely."""
         self._drawn = None
 
     def draw(self, shown_banner: Banner) -> None:
-        """Show a state of the connection."""
+        """Show the state of the connection."""
         if shown_banner == self._drawn:
             return
         self._drawn = shown_banner
         widgets.clear(self._layout)
-        # Else the ground of the boxes, for which the colours are chosen; a theme's own may have any shade.
+        # Else the ground of the boxes, to which the colours fit; a theme's own may have any shade.
         ground = shown_banner.ground or _ground(self)
         self.setStyleSheet(f"QFrame#siloBanner {{ background: {ground}; border-radius: 4px; }}")
         text = widgets.label(shown_banner.text)
@@ -308,7 +308,7 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
         self.hide()
 
     def draw(self, shown: PaneState) -> None:
-        """Show what waits."""
+        """Show the entries that wait."""
         widgets.clear(self._layout)
         self.setVisible(bool(shown.waiting))
         if not shown.waiting:

@@ -41,11 +41,11 @@ class Dock(QtWidgets.QDockWidget):  # type: ignore[misc]  # PySide has no types
         window.restoreDockWidget(self)
 
     def make(self) -> Any:
-        """Make the content."""
+        """Make the content of the dock."""
         raise NotImplementedError
 
     def show_and_raise(self) -> None:
-        """Show the dock, also where it is a tab behind another one."""
+        """Show the dock, even if it is a tab behind another one."""
         self.show()
         self.raise_()
 
@@ -54,7 +54,7 @@ class Dock(QtWidgets.QDockWidget):  # type: ignore[misc]  # PySide has no types
             self._content = self.make()
             self.setWidget(self._content)
             if self.width() < NARROW:
-                # Never placed by the user so far: wide enough to read, narrow enough to work beside.
+                # If the user has never placed it: wide enough to read, narrow enough to work beside it.
                 self.parent().resizeDocks([self], [WIDTH], QtCore.Qt.Orientation.Horizontal)
 
 
@@ -77,7 +77,7 @@ class ActivityDock(Dock):
         return Pane(self._on_action)
 
     def update_shown(self, shown: PaneState) -> None:
-        """Draw a new state; while nobody looks, only remember it."""
+        """Draw a new state; only remember it while the dock is not visible."""
         self._shown = shown
         if self._content is not None and self.isVisible():
             self._content.draw(shown)
@@ -100,12 +100,12 @@ class ProjectDock(Dock):
         self._flow = flow
 
     def make(self) -> ProjectPane:
-        """Make the view."""
+        """Make the project view."""
         from silo.workbench.revisions.dialog import ProjectPane
 
         return ProjectPane(self._flow())
 
     def refresh(self) -> None:
-        """Look at the files again, if somebody sees them."""
+        """Look at the files again, if the dock is visible."""
         if self._content is not None and self.isVisible():
             self._content.refresh()

@@ -48,7 +48,7 @@ Page = Callable[[str], str]
 
 
 def of_sent(sent: Sent, page: Page, now: float | None = None) -> PaneEntry:
-    """Return the box of one commit."""
+    """Make the box of one commit."""
     lines = (*_revision_lines(sent), *_status_lines(sent), *_resolved_lines(sent), *_product_lines(sent))
     tone = max((line.tone for line in lines), key=_WEIGHT.__getitem__, default=Tone.GOOD)
     url = (sent.result.resolve_url if sent.result is not None else "") or sent.page
@@ -72,8 +72,8 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> PaneEntry:
 
 
 def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> PaneEntry | None:
-    """Return the box that says that the team works with another FreeCAD; None if it does not, or if the
-    server does not say.
+    """Make the box that says that the team works with another FreeCAD; None if it does not, or if the server
+    does not say.
 
     wanted
         the team's version, such as "1.0".
@@ -103,7 +103,7 @@ def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> Pan
 
 
 def _batch_of(sent: Sent, tone: Tone) -> EntryBatch | None:
-    """Return a commit without anything that a person should see is one of many."""
+    """Return the batch to which a commit belongs if it has nothing that a person must see; otherwise None."""
     quiet = tone not in (Tone.WARNING, Tone.ERROR)
     return EntryBatch.COMMITTED if quiet and sent.status not in (Status.MERGED, Status.BLOCKED) else None
 
@@ -144,7 +144,7 @@ def _badges(sent: Sent) -> tuple[EntryLine, ...]:
 
 
 def badges(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> tuple[EntryLine, ...]:
-    """Return the counts of a merge, as the spec's box has them; what is zero is left out."""
+    """Write the counts of a merge as the spec's box has them, without those that are zero."""
     texts = count_texts(diff, warnings, translate)
     if not texts:
         return (EntryLine(no_changes(translate), Tone.QUIET),)
@@ -201,7 +201,7 @@ def _status_lines(sent: Sent) -> tuple[EntryLine, ...]:
 
 
 def _blocked_actions(path: str, missing: int) -> tuple[Action, ...]:
-    """Return what a person can do about components that are missing; nothing else is left out of a BOM."""
+    """Return what a person can do about missing components; only these may be left out of a BOM."""
     if not missing:
         return ()
     singular, many = translate("Silo", "Sync without it"), translate("Silo", "Sync without them")
@@ -225,8 +225,8 @@ def _resolved_lines(sent: Sent) -> tuple[EntryLine, ...]:
 
 
 def _product_lines(sent: Sent) -> tuple[EntryLine, ...]:
-    """Return what is open in the sub-assemblies, and what the product weighs and costs, as the server keeps
-    it.
+    """Write what is open in the sub-assemblies, and what the product weighs and costs, as the server
+    has it.
     """
     if sent.summary is None:
         return ()
@@ -241,10 +241,10 @@ def _product_lines(sent: Sent) -> tuple[EntryLine, ...]:
     return (*shortened(lines, MOST_OPEN), *((EntryLine(" · ".join(values), Tone.QUIET),) if values else ()))
 
 
-# However many of a kind there are, the box has room for the other kinds and their buttons.
+# Even if there are many of one kind, the box has room for the other kinds and their buttons.
 MOST_FINDINGS, MOST_CONFLICTS, MOST_OPEN = 6, 4, 4
 
-# Told elsewhere in the box, or in the preview only.
+# Reported elsewhere in the box, or only in the preview.
 _NOT_HERE = (FindingCode.UNREGISTERED, FindingCode.CONSOLIDATION)
 
 
@@ -303,7 +303,7 @@ def _show(entry: BomEntry | None, resolved: Resolved) -> tuple[Action, ...]:
 
 
 def unregistered_lines(resolved: Resolved) -> tuple[EntryLine, ...]:
-    """Return ``⚠ 2 components have no Silo part number [Register Parts…]``, and which they are."""
+    """Write ``⚠ 2 components have no Silo part number [Register Parts…]``, and their names."""
     count = len(resolved.unresolved)
     if not count:
         return ()
@@ -320,7 +320,7 @@ def unregistered_lines(resolved: Resolved) -> tuple[EntryLine, ...]:
 
 
 def of_event(event: ServerEvent, page: Page, now: float | None = None) -> PaneEntry | None:
-    """Return the box of one event; None for those that people need not see."""
+    """Make the box of one event; None for events that people need not see."""
     when = time.time() if now is None else now
     if event.merge is not None:
         return of_merge(event.merge, page, when, event.id)
@@ -344,7 +344,7 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> PaneEn
 
 
 def commit_of_event(event: ServerEvent) -> tuple[str, Newer] | None:
-    """Return the identity and the commit that an event announces; None for any other, and for mere
+    """Read the identity and the commit that an event announces; None for any other event, and for a change of
     properties.
     """
     data = event.data if isinstance(event.data, dict) else {}
@@ -358,7 +358,7 @@ def commit_of_event(event: ServerEvent) -> tuple[str, Newer] | None:
 
 
 def of_gap(when: float) -> PaneEntry:
-    """Return the box for what was not heard: the server lost its log, or counts again."""
+    """Make the box that says that events are missing: the server lost its log, or counts again."""
     text = translate("Silo", "The server no longer has the events since then. See its own activity page.")
     return PaneEntry(
         key="gap",
@@ -370,7 +370,7 @@ def of_gap(when: float) -> PaneEntry:
 
 
 def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = None) -> PaneEntry:
-    """Return the box of a merge that the server announced (spec §5, SSE Event)."""
+    """Make the box of a merge that the server announced (spec §5, SSE Event)."""
     lines = badges(merge.diff, merge.warnings)
     return PaneEntry(
         key=f"sync:{merge.sync_id}" if merge.sync_id else f"event:{event_id}:{MERGE}",
@@ -385,20 +385,21 @@ def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = 
 
 
 def _moment(moment: datetime | None, now: float) -> float:
-    """Return when an event happened: for an old event as the server says, else now.
+    """Return when an event happened: for an old event by the server's time, for a recent one now.
 
-    Servers send whole seconds, and their clocks are a little off: just now, the order of arrival is truer.
+    Servers send whole seconds, and their clocks are a little off: for recent events, the order of arrival is
+    more exact.
     """
     stamp = moment.timestamp() if moment is not None else now
     return stamp if abs(stamp - now) > _JUST_NOW_S else now
 
 
 def _event_words(kind: str, number: str, data: dict[str, Any]) -> tuple[str, str]:
-    """Return title and key of an event; the key of a revision is that of our own upload of it."""
+    """Return the title and the key of an event; the key of a revision is that of our own upload of it."""
     revision = data.get("revision_number", data.get("revision"))
     if kind == "revision.created" and isinstance(revision, int):
         if revision == 1 and _text(data, "comment") in ("", "created"):
-            return "", ""  # An item is born with it, and that is shown already.
+            return "", ""  # Each new item has it, and the new item is shown already.
         text = translate("Silo", "Revision {n} of {number}", n=revision, number=number)
         return text, _revision_key(number, revision)
     words = {
@@ -420,6 +421,6 @@ def _view(path: str, page: Page) -> tuple[Action, ...]:
     try:
         url = page(path)
     except SiloError:
-        # Another server's page: a message must not send people where the settings do not.
+        # Another server's page: a message must not lead people away from the server of the settings.
         return ()
     return (Action(Do.VIEW, translate("Silo", "View in Silo →"), target=url),)

@@ -144,14 +144,14 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
     # -- what is shown ----------------------------------------------------------------------------------
 
     def busy(self) -> None:
-        """Show that a comparison is under way."""
+        """Show that a comparison is running."""
         self._problem.hide()
         self._summary.setText(translate("Silo", "Comparing with Silo…"))
         self._preview = None
         self._enable()
 
     def fail(self, error: SiloError) -> None:
-        """Show why there is no comparison."""
+        """Show why the comparison failed."""
         self._summary.setText("")
         self._tell(str(error))
         self._enable()
@@ -186,7 +186,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         return "\n".join(lines)
 
     def tell_view(self, text: str, *, agrees: bool | None) -> None:
-        """Show the result of a comparison with the 3D view, or why a line counts so many (``agrees``
+        """Show the result of a comparison with the 3D view, or why a line has this quantity (``agrees``
         None).
         """
         text = spoken(text)
@@ -217,7 +217,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self._wrap()
 
     def _spread(self, item: Any) -> None:
-        """Give sentences the whole width; open what is short enough."""
+        """Let sentences use the whole width, and open the items that are short enough."""
         kind = item.data(1, QtCore.Qt.ItemDataRole.UserRole)
         item.setFirstColumnSpanned(kind in _WIDE)
         item.setExpanded(item.childCount() <= 12)
@@ -230,7 +230,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         QtCore.QTimer.singleShot(0, self._wrap)
 
     def _wrap(self) -> None:
-        """Break the sentences to the width that there is; the view itself would cut them."""
+        """Break the sentences to the present width; the view itself would cut them."""
         tree = self.table
         metrics, whole = tree.fontMetrics(), tree.viewport().width() - 2 * tree.indentation() - 12
         items = QtWidgets.QTreeWidgetItemIterator(tree)

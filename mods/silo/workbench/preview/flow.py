@@ -126,22 +126,22 @@ class Preview:
 
     @property
     def number(self) -> str:
-        """Return part number of the assembly; "" while it has none."""
+        """Return the part number of the assembly; "" while it has none."""
         return self.top.resolved.assembly.part_number or ""
 
     @property
     def unregistered(self) -> tuple[BomEntry, ...]:
-        """Return components without a part number, the assembly itself included."""
+        """Return the components without a part number, the assembly itself included."""
         return self.top.resolved.unregistered
 
     @property
     def movable(self) -> tuple[Finding, ...]:
-        """Return the broken links for which one file fits."""
+        """Return the broken links for which exactly one file fits."""
         return tuple(finding for finding in self.broken if finding.did_you_mean)
 
     @property
     def to_send_below(self) -> int:
-        """Return sub-assemblies whose sync has something to send."""
+        """Count the sub-assemblies for which a sync has something to send."""
         return sum(1 for compared in self.compared[:-1] if compared.to_send)
 
 
@@ -181,10 +181,10 @@ MOST_ROWS = 3000
 
 
 def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[PreviewRow, ...]:
-    """Return the table: the lines of the assembly, then what is left out and why.
+    """Make the table: the lines of the assembly, then what is left out and why.
 
     most
-        so many rows of sub-assemblies at most, each of which gets its share; one row sums up the rest.
+        the most rows of sub-assemblies; each sub-assembly gets its share, and one row sums up the rest.
     """
     by_key = {compared.resolved.assembly.key: compared for compared in preview.compared}
     base = os.path.dirname(preview.snapshot.path)
@@ -230,7 +230,7 @@ def _assembly_rows(
     """Yield the assembly's own lines in its own order, then those that only the server has.
 
     room
-        so many rows may stand below them.
+        how many rows may be below them.
     """
     states = _states(compared.diff)
     share = _share(room, compared.resolved.entries)
@@ -268,9 +268,7 @@ def _assembly_rows(
 def _below(
     entry: BomEntry, lines: Known, names: Mapping[str, str], above: Keys, room: int
 ) -> Iterator[PreviewRow]:
-    """Yield the lines of a sub-assembly; none where it stands above itself (a loop is reported as a
-    finding).
-    """
+    """Yield the lines of a sub-assembly; none if it is above itself (a finding reports the loop)."""
     compared = lines.get(entry.key) if entry.is_assembly and entry.key not in above else None
     if compared is None:
         return
@@ -317,7 +315,7 @@ def _notes() -> dict[RowKind, str]:
 
 
 def _own_words(compared: Compared) -> str:
-    """Return whether the BOM of a sub-assembly is in Silo."""
+    """Say if the BOM of a sub-assembly is in Silo."""
     if compared.is_new:
         return translate("Silo", "its own BOM is not in Silo yet")
     return translate("Silo", "its own BOM differs from Silo") if compared.to_send else ""
@@ -340,7 +338,7 @@ def _unregistered_row(entry: BomEntry, preview: Preview, children: tuple[Preview
 
 
 def _counted(entry: BomEntry, head: BomEntry) -> dict[str, Any]:
-    """Return the fields of a row for what stands in the model, directly below an assembly."""
+    """Return the fields of a row for an entry of the model, directly below an assembly."""
     return {
         "document": head.doc_path,
         "objects": entry.instances,
@@ -349,7 +347,7 @@ def _counted(entry: BomEntry, head: BomEntry) -> dict[str, Any]:
     }
 
 
-# Told as rows of their own.
+# Shown as separate rows.
 _ELSEWHERE = (FindingCode.UNREGISTERED,)
 _ORDER = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
 
@@ -367,7 +365,7 @@ def _finding_row(finding: Finding, preview: Preview, base: str) -> PreviewRow:
 
 
 def summary(preview: Preview) -> str:
-    """Return one line over the table."""
+    """Write the line above the table."""
     diff = preview.top.diff
     parts = (
         (len(diff.added), translate("Silo", "{n} to add")),
@@ -378,7 +376,7 @@ def summary(preview: Preview) -> str:
         (sum(entry.missing for entry in preview.top.resolved.entries), translate("Silo", "{n} missing")),
     )
     texts = [text.replace("{n}", str(count)) for count, text in parts if count]
-    new = sum(singular.is_new for singular in preview.compared[:-1])
+    new = sum(compared.is_new for compared in preview.compared[:-1])
     below = [
         counted(count, singular, many)
         for count, singular, many in (
@@ -406,8 +404,8 @@ def summary(preview: Preview) -> str:
 
 
 def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:
-    """Return snapshots whose BOMs a sync sends, children before parents; without ``below`` the top one
-    only.
+    """Return the snapshots whose BOMs a sync sends, children before parents; without ``below`` only the top
+    one.
     """
     snapshots = []
     for compared in preview.compared[:-1] if below else ():
@@ -417,7 +415,7 @@ def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:
 
 
 def _part_of(snapshot: Snapshot, resolved: Resolved) -> Snapshot:
-    """Return a sub-assembly as a snapshot of its own, cut from that of its parent."""
+    """Cut the snapshot of a sub-assembly from that of its parent."""
     head = resolved.assembly
     original = _find(snapshot.extraction, head.key)
     mine = tuple(f for f in resolved.findings if any(place.doc_path == head.doc_path for place in f.where))
@@ -486,8 +484,9 @@ class PreviewFlow:
         self._to_mend: set[str] = set()
 
     def start(self, doc: Any, *, mend: bool = False) -> None:
-        """Compare a document's assembly with the server; ``mend``: its broken links first, where a file
-        fits."""
+        """Compare a document's assembly with the server; ``mend``: first mend its broken links, if a file
+        fits.
+        """
         taken = self._take(doc)
         if taken is None:
             return
@@ -501,12 +500,14 @@ class PreviewFlow:
         self._ask(taken)
 
     def again(self, path: str) -> None:
-        """Compare again where a window is open: what it shows has changed."""
+        """Compare again in an open window, since what it shows has changed."""
         if path in self._open and (taken := self._taken_again(path)) is not None:
             self._ask(taken)
 
     def _taken_again(self, path: str) -> Snapshot | None:
-        """Return the document of an open window as it is now; the window says where it was closed."""
+        """Take a new snapshot of the document of an open window; if the document is closed, the window says
+        so.
+        """
         doc = self._opened(path, path)
         return None if doc is None else self._take(doc)
 
@@ -565,7 +566,7 @@ class PreviewFlow:
             call(self._open[path])
 
     def verify(self, preview: Preview) -> None:
-        """Compare what FreeCAD shows with the BOM as it is now, and select what no line explains."""
+        """Compare what FreeCAD shows with the present BOM, and select what no line explains."""
         path = preview.snapshot.path
         taken = self._taken_again(path)
         if taken is None or taken.extraction is None:
@@ -597,7 +598,7 @@ class PreviewFlow:
         self._with_dialog(window, lambda dialog: dialog.tell_view(text, agrees=None))
 
     def relink(self, preview: Preview) -> None:
-        """Lead broken links to the files that were meant, where one fits; then compare again."""
+        """Lead broken links to the files that were meant, if exactly one fits; then compare again."""
         try:
             mended = [label for finding in preview.movable for label in self._desk.relink(finding)]
         except SiloError as error:
@@ -609,7 +610,8 @@ class PreviewFlow:
     def sync(self, preview: Preview, below: bool, allow_missing: bool) -> None:
         """Sync what is shown; ``below``: its sub-assemblies first; ``allow_missing``: with broken links.
 
-        A document that was edited since is compared again instead: its BOM and its file must be of one state.
+        If the document was edited since, it is compared again instead, because its BOM and its file must be
+        of the same state.
         """
         path = preview.snapshot.path
         now = self._taken_again(path)

@@ -68,7 +68,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._categories: dict[str, str] = {}
         # How each row was drawn. Only what looks different is drawn again: there may be hundreds.
         self._drawn: dict[int, object] = {}
-        # Where in the table each row stands, between the headings of the sections; and back.
+        # The place of each row in the table, between the headings of the sections; and back.
         self._places: list[int] = []
         self._row_at: dict[int, int] = {}
         self._filling = False
@@ -216,7 +216,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
 
     @property
     def rows(self) -> Sequence[EditedRow]:
-        """Return the rows as they stand."""
+        """Return the rows as they are now."""
         return self._rows
 
     def fill(self, offer: Offer) -> None:
@@ -253,9 +253,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.resizeRowsToContents()
 
     def _lay_out(self) -> None:
-        """Lay out the rows with a heading before each section; without it if there is only that of
-        components.
-        """
+        """Lay out the rows with a heading above each section; without it if there are only components."""
         texts = headings(self._rows)
         # No heading if there are only components of one folder.
         with_headings = len(set(texts)) > 1 or any(row.section for row in self._rows)
@@ -302,12 +300,12 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.tell(str(error))
 
     def tell(self, text: str) -> None:
-        """Show a problem, of one or more lines; "" takes it away."""
+        """Show a problem, of one or more lines; "" removes it."""
         self._problem.setText(visible(spoken(text), 1000))
         self._problem.setVisible(bool(text))
 
     def registered(self, order: Order, result: Registration) -> None:
-        """Show that a component is registered, or could not be."""
+        """Show that a component was registered, or why it was not."""
         for row in self._rows:
             if row.candidate is order.candidate:
                 row.result, row.running = result, False
@@ -315,7 +313,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._refresh()
 
     def undeclared(self, row: EditedRow, *, no_part: bool) -> None:
-        """Show that the object was undeclared: no part, or undecided."""
+        """Show that the object is no longer declared: it is no part, or undecided."""
         if row in self._rows:
             article = row.candidate.article
             if article is not None:
@@ -324,7 +322,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             self._refresh()
 
     def taken_back(self, order: Order, error: SiloError | None) -> None:
-        """Show that a registration is undone, or could not be."""
+        """Show that a registration was undone, or why it was not."""
         for row in self._rows:
             if row.candidate is order.candidate:
                 row.result = Registration(order.proposal, error=error) if error is not None else None
@@ -332,7 +330,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._refresh()
 
     def show_pictures(self, pictures: Mapping[str, bytes]) -> None:
-        """Show what FreeCAD keeps in the files."""
+        """Show the pictures that FreeCAD keeps in the files."""
         self._filling = True
         for number, row in enumerate(self._rows):
             shown = QtGui.QPixmap()
@@ -418,7 +416,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         return [row for place, row in pairs if not self.table.isRowHidden(place)]
 
     def selected(self) -> list[EditedRow]:
-        """Return the rows that a person has chosen, from above."""
+        """Return the rows that a person has selected, from the top."""
         places = sorted({index.row() for index in self.table.selectionModel().selectedRows()})
         chosen = [self._rows[self._row_at[place]] for place in places if place in self._row_at]
         visible = self._visible()
@@ -544,7 +542,7 @@ def _button_text(row: EditedRow) -> str:
 
 
 def _flags(row: EditedRow, column: int) -> Any:
-    """Return what a person can do with a cell."""
+    """Return what a person can do with a cell, as Qt's flags."""
     flag = QtCore.Qt.ItemFlag
     flags = flag.ItemIsEnabled | flag.ItemIsSelectable
     is_supply = column in (SUPPLIER, SUPPLIER_NUMBER)

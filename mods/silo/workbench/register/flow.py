@@ -42,7 +42,7 @@ APART = "apart"
 
 
 def section_words() -> dict[str, str]:
-    """Return the sections of the dialog for people."""
+    """Return the names of the dialog's sections, for people."""
     return {
         "": translate("Silo", "Components"),
         "standard": translate("Silo", "Standard parts"),
@@ -53,7 +53,7 @@ def section_words() -> dict[str, str]:
 
 
 def type_words() -> dict[str, str]:
-    """Return item types for people."""
+    """Return the names of item types, for people."""
     return {
         "part": translate("Silo", "Part"),
         "assembly": translate("Silo", "Assembly"),
@@ -63,7 +63,7 @@ def type_words() -> dict[str, str]:
 
 
 def source_words() -> dict[str, str]:
-    """Return where a part comes from, for people."""
+    """Return the words for where a part comes from."""
     return {
         "manufactured": translate("Silo", "made here"),
         "purchased": translate("Silo", "bought"),
@@ -81,7 +81,7 @@ class Filter(StrEnum):
 
 
 def filter_words() -> dict[Filter, str]:
-    """Return the filters for people."""
+    """Return the names of the filters, for people."""
     return {
         Filter.ALL: translate("Silo", "all rows"),
         Filter.UNSURE: translate("Silo", "unsure"),
@@ -91,7 +91,7 @@ def filter_words() -> dict[Filter, str]:
 
 
 def state_words() -> dict[ComponentState, str]:
-    """Return the states for people."""
+    """Return the words for the states, for people."""
     return {
         ComponentState.READY: "",
         ComponentState.EDITED: translate("Silo", "its unsaved edits are saved too"),
@@ -139,7 +139,7 @@ class EditedRow:
 
     @classmethod
     def of(cls, candidate: Candidate, file: str = "") -> EditedRow:
-        """Return a row as it is offered."""
+        """Make a row of a candidate."""
         return cls(
             candidate,
             **{name: getattr(candidate.proposal, name) for name in CHOSEN},
@@ -150,14 +150,14 @@ class EditedRow:
 
     @property
     def section(self) -> str:
-        """Return the section that the row stands in, a key of :func:`section_words`."""
+        """Return the section of the row, a key of :func:`section_words`."""
         if (article := self.candidate.article) is not None:
             return "no part" if article.no_part else "declared" if article.declared else "modelled"
         return "standard" if self.candidate.entry.is_standard else ""
 
     @property
     def finished(self) -> bool:
-        """Return True if it has its number."""
+        """Return True if the component has its number."""
         return self.result is not None and self.result.error is None
 
     @property
@@ -168,7 +168,7 @@ class EditedRow:
 
     @property
     def can_undeclare(self) -> bool:
-        """Return True if it is modelled in the file and the decision about it can be taken back."""
+        """Return True if it is modelled in the file, and the decision about it can be undone."""
         return self.candidate.decided and self.candidate.state.usable and not self.running
 
     @property
@@ -178,7 +178,7 @@ class EditedRow:
 
     @property
     def can_choose(self) -> bool:
-        """Return True while its number can be chosen; a copied identity can be kept without writing to the
+        """Return True while its number can be chosen; a copied identity can be kept without writing the
         file.
         """
         return self.editable or (bool(self.candidate.same_as) and not self.finished and not self.running)
@@ -194,12 +194,12 @@ class EditedRow:
         return self.can_choose and self.number == SAME
 
     def keep(self) -> None:
-        """Leave the row as it is."""
+        """Leave the row unchanged."""
         self.result = Registration(self.candidate.proposal, part_number=self.candidate.same_as)
         self.checked = False
 
     def order(self) -> Order:
-        """Return the row as an order for the worker."""
+        """Make an order of the row, for the worker."""
         existing = next((s for s in self.candidate.similar if s.part_number == self.number), None)
         chosen = {name: getattr(self, name).strip() for name in CHOSEN}
         if self.sourcing != "purchased":
@@ -207,7 +207,7 @@ class EditedRow:
         return Order(self.candidate, existing=existing, apart=self.number == APART, **chosen)
 
     def fits(self, only: Filter, words: str) -> bool:
-        """Return True if a filter shows the row, and all of these words are in it."""
+        """Return True if a filter shows the row, and the row contains all of these words."""
         text = f"{self.component()} {self.name} {self.category} {self.supplier} {self.note()[0]}".casefold()
         similar = bool(self.candidate.similar or self.candidate.twin or self.candidate.same_as)
         shown = {
@@ -220,14 +220,14 @@ class EditedRow:
 
     @property
     def guesses(self) -> bool:
-        """Return True while its category is one that nobody has looked at."""
+        """Return True while its category is a guess that nobody has looked at."""
         same = self.category == self.candidate.proposal.category
         return (
             self.candidate.proposal.is_guess and same and not (self.checked or self.finished or self.running)
         )
 
     def component(self) -> str:
-        """Return which component this is."""
+        """Return the name of the component."""
         return self._component
 
     @cached_property
@@ -242,8 +242,8 @@ class EditedRow:
         return plain(f"{self.file} · {entry.label}" if self.candidate.shares_file else self.file, 80)
 
     def number_text(self, numbers: Mapping[str, str], taken: int) -> str:
-        """Return the number that it has, or would get; ``taken`` rows before it want one of the same
-        category.
+        """Return the number that it has, or would get; ``taken``: how many rows before it want one of the
+        same category.
         """
         if self.finished and self.result is not None:
             return self.result.part_number or ""
@@ -266,22 +266,22 @@ class EditedRow:
         return text.replace("{number}", following)
 
     def choices(self) -> dict[str, str]:
-        """Return what can be chosen as its number."""
-        result = {}
+        """Return the choices for its number."""
+        texts = {}
         if self.candidate.same_as:
-            result[SAME] = translate("Silo", "same part: keep {number}", number=self.candidate.same_as)
+            texts[SAME] = translate("Silo", "same part: keep {number}", number=self.candidate.same_as)
         if not self.candidate.state.usable:
-            return result
+            return texts
         new = translate("Silo", "new part: a new number")
-        result[NEW] = new if self.candidate.same_as else translate("Silo", "a new number")
+        texts[NEW] = new if self.candidate.same_as else translate("Silo", "a new number")
         if self.candidate.article is not None and len(self.candidate.article.objects) > 1:
-            result[APART] = translate("Silo", "different parts: a number for each copy")
+            texts[APART] = translate("Silo", "different parts: a number for each copy")
         for similar in self.candidate.similar:
-            result[similar.part_number] = f"{similar.part_number} {plain(similar.name, 60)}"
-        return result
+            texts[similar.part_number] = f"{similar.part_number} {plain(similar.name, 60)}"
+        return texts
 
     def note(self) -> tuple[str, Tone]:
-        """Return the last column: what happened, what is in the way, or what to look at."""
+        """Write the last column: what happened, what is in the way, or what to look at."""
         if self.result is not None and self.result.error is not None:
             return plain(str(self.result.error), 300), Tone.ERROR
         if self.finished:
@@ -309,13 +309,13 @@ class EditedRow:
         else:
             text = translate("Silo", "would count once; check it if it is a part")
             many = translate("Silo", "would count {n} times; check it if it is a part")
-        result = [counted(article.entry.quantity, text, many)]
+        texts = [counted(article.entry.quantity, text, many)]
         if article.source:
             source = translate("Silo", "imported from {file}", file=os.path.basename(article.source))
-            result.append(source)
+            texts.append(source)
         if article.alike == "label":
-            result.append(translate("Silo", "equal by their labels only"))
-        return result
+            texts.append(translate("Silo", "equal by their labels only"))
+        return texts
 
     def _suspicions(self) -> list[str]:
         suspicions = []
@@ -342,14 +342,14 @@ def _similar_words(similar: Similar) -> str:
 
 
 def group(rows: Sequence[EditedRow], row: EditedRow) -> list[EditedRow]:
-    """Return the rows that carry the same identity as this one, itself among them."""
+    """Return the rows that carry the same identity as this one, including itself."""
     if not row.candidate.same_as:
         return [row]
     return [other for other in rows if other.candidate.same_as == row.candidate.same_as]
 
 
 def choose(rows: Sequence[EditedRow], row: EditedRow, number: str) -> None:
-    """Take over what the person chose as a row's number, and what follows from it for its group."""
+    """Take over the number that the person chose for a row, and what follows from it for its group."""
     row.number, row.checked = number, True
     asked = [other for other in group(rows, row) if other.number == ASK and not other.finished]
     last = len(asked) == 1 and all(
@@ -361,7 +361,7 @@ def choose(rows: Sequence[EditedRow], row: EditedRow, number: str) -> None:
 
 
 def set_all(rows: Iterable[EditedRow], column: str, value: str, categories: Mapping[str, str]) -> None:
-    """Take over one value for all of these rows; what a person said of a row's category is no guess.
+    """Take over one value for all of these rows; a category that a person chose is no guess.
 
     column
         of :data:`silo.registering.orders.CHOSEN`. In a name ``{name}`` is the present name, ``{n}`` counts.
@@ -380,8 +380,8 @@ def set_all(rows: Iterable[EditedRow], column: str, value: str, categories: Mapp
 
 
 def grouped(candidates: Iterable[Candidate]) -> list[Candidate]:
-    """Return components by folder, in the order of their first ones, the assembly's folder last; then the
-    others.
+    """Group the components by folder, in the order of their first ones. The assembly's folder comes last,
+    then the components without a folder.
     """
     plain_ones = [candidate for candidate in candidates if _folder_of(candidate)]
     folders = list(dict.fromkeys(_folder_of(candidate) for candidate in plain_ones))
@@ -398,9 +398,7 @@ def _folder_of(candidate: Candidate) -> str:
 
 
 def headings(rows: Sequence[EditedRow]) -> list[str]:
-    """Return the heading that each row stands under; components have that of their folder if there are
-    several.
-    """
+    """Return the heading above each row; a component has that of its folder if there are several folders."""
     folders = {_folder_of(row.candidate) for row in rows} - {""}
     words = section_words()
     base = os.path.dirname(os.path.commonpath(folders)) if folders else ""
@@ -413,7 +411,7 @@ def headings(rows: Sequence[EditedRow]) -> list[str]:
 
 
 def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> None:
-    """Take over the chosen type; the category follows where it is still the one that was proposed.
+    """Take over the chosen type; the category follows if it is still the one that was proposed.
 
     categories
         code → description, as the schema has them.
@@ -423,7 +421,7 @@ def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> Non
 
 
 def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]:
-    """Return the number column of all rows."""
+    """Write the number column of all rows."""
     taken: dict[str, int] = {}
     texts = []
     for row in rows:
@@ -434,23 +432,23 @@ def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]
 
 
 def notices(offer: Offer) -> str:
-    """Return the notices about the whole offer: mistakes in the site's rules, and that nobody looked for
-    look-alikes.
+    """Write the notices about the whole offer: mistakes in the site's rules, and that Silo was not
+    searched.
     """
-    value = [rules_text(getattr(offer.categories, "problem", ""), translate)]
+    texts = [rules_text(getattr(offer.categories, "problem", ""), translate)]
     if offer.unsearched:
-        value.append(
+        texts.append(
             translate(
                 "Silo",
                 "Silo was not searched for parts that look alike: {problem}",
                 problem=plain(offer.unsearched, 300),
             )
         )
-    return "\n".join(filter(None, value))
+    return "\n".join(filter(None, texts))
 
 
 def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
-    """Return what the dialog says above its rows; ``more`` of them do not fit in."""
+    """Write the text above the rows; ``more``: how many rows are not shown."""
     components = [row for row in rows if row.candidate.article is None]
     if not components:
         return translate(
@@ -531,7 +529,7 @@ class RegisterFlow:
         self._last: dict[str, list[tuple[Order, Registration]]] = {}
 
     def start(self, doc: Any) -> None:
-        """Show the components of a document that have no number."""
+        """Open a dialog with the components of a document that have no number."""
         try:
             taken = self._commits.snapshot(doc)
         except SiloError as error:
@@ -561,7 +559,7 @@ class RegisterFlow:
             translate("Silo", "Reading pictures"),
             lambda _control: {file: picture for file in files if (picture := picture_in(file))},
             done=show,
-            failed=lambda _error: None,  # the rows stand without them
+            failed=lambda _error: None,  # the rows are shown without them
         )
 
     def _dialog(self, taken: Snapshot) -> None:
@@ -595,10 +593,10 @@ class RegisterFlow:
         )
 
     def undeclare(self, path: str, row: EditedRow, *, no_part: bool = False) -> None:
-        """Take back decisions about what is modelled in the assembly's file; an item stays.
+        """Undo decisions about what is modelled in the assembly's file; an item stays.
 
         no_part
-            a person says that it is no part, and the file keeps that.
+            a person says that it is no part, and the file records that.
         """
         clean = self._desk.unedited()
         try:
@@ -650,7 +648,7 @@ class RegisterFlow:
 
         def finished(_result: Any = None) -> None:
             self._with_dialog(path, lambda dialog: dialog.stopped())
-            # The numbers that were foretold are taken now.
+            # The numbers that were shown before are used now.
             for category in sorted({order.category for order in orders}):
                 self.number(path, category)
             self._save_parents(clean if registered else [], lambda: self._send(path, registered))
@@ -667,7 +665,7 @@ class RegisterFlow:
         return any(not order.candidate.entry.is_standard for order, _ in self._last.get(path, ()))
 
     def take_back(self, path: str) -> None:
-        """Undo what the last press of Register did: new items are archived, and the files forget them."""
+        """Undo the last press of Register: new items are archived, and the files forget them."""
         done = self._last.pop(path, [])
         ids = {result.item_id for _, result in done}
         clean = self._desk.unedited()
@@ -705,7 +703,7 @@ class RegisterFlow:
         self._session.ask(translate("Silo", "Undoing"), run, done=finished, failed=failed)
 
     def _save_parents(self, clean: list[Any], then: Callable[[], None]) -> None:
-        """Save the documents that FreeCAD marked because their parts were saved, one in a turn."""
+        """Save, one in a turn, the documents that FreeCAD marked because their parts were saved."""
         if not clean:
             then()
             return
@@ -720,7 +718,7 @@ class RegisterFlow:
         """Upload the files that have an item now, and sync the assembly's BOM with the new lines."""
         if not registered:
             return
-        # A copy that became a part of its own is no question any more.
+        # A copy that became a separate part needs no decision any more.
         own = {candidate.entry.doc_path for candidate in registered}
         self._session.answered(lambda asked: not own.isdisjoint(asked.objects))
         registered_now = translate("Silo", "Registered")
@@ -743,7 +741,7 @@ class RegisterFlow:
 
 
 def whole(taken: Snapshot) -> Extraction:
-    """Return the extraction of a snapshot; for a part, one that holds nothing but the part."""
+    """Return the extraction of a snapshot; for a part, an extraction of the part alone."""
     if taken.extraction is not None:
         return taken.extraction
     label = taken.label or os.path.basename(taken.path)

@@ -39,7 +39,7 @@ _DATA = QtCore.Qt.ItemDataRole.UserRole
 
 
 def revision_texts(revision: Revision) -> list[str]:
-    """Return number, time, who, comment."""
+    """Write the cells of a revision: number, time, user, comment."""
     when = revision.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if revision.created_at else ""
     return [
         str(revision.revision_number),
@@ -60,7 +60,9 @@ def _revisions_table() -> Any:
 
 
 def _fill_in(tree: Any, history: ItemHistory, *, newest: str = "") -> None:
-    """Show the revisions and choose the first row; ``newest``: the comment of one above them, number 0."""
+    """Show the revisions, and choose the first row; ``newest``: the comment of an additional first row, with
+    number 0.
+    """
     rows = [(0, [translate("Silo", "newest"), "", "", newest], "")] if newest and history.revisions else []
     rows += [
         (revision.revision_number, revision_texts(revision), revision.comment)
@@ -103,7 +105,7 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         self._layout.addLayout(widgets.line(None, *actions, close))
 
     def _first(self, lines: Sequence[str], most: int) -> Sequence[str]:
-        """Return the first lines; a button shows all of them."""
+        """Return the first lines, and offer a button that shows all of them."""
         self._all = lines
         self.more.setText(more_text(len(lines) - most))
         self.more.setVisible(len(lines) > most)
@@ -113,7 +115,7 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         self._closed = True
 
     def _alive(self, call: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Return True while the window is open: an answer that comes later is dropped."""
+        """Wrap ``call`` so that it does nothing after the window is closed."""
         return lambda result: None if self._closed else call(result)
 
     def say(self, text: str, tone: Tone = Tone.QUIET) -> None:
@@ -126,7 +128,9 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         self.say(str(error), Tone.ERROR)
 
     def fetch(self, part_number: str, revision: int | None, folder: Path) -> None:
-        """Fetch into a folder, then open it; report what was left alone, and ask about edits."""
+        """Fetch the files into a folder, then open the item's; report what was left alone, and ask about
+        edits.
+        """
         self.say(translate("Silo", "Fetching…"))
         self._first((), 0)
 
@@ -245,7 +249,7 @@ class OpenDialog(_Window):
         return str(row.data(0, _DATA)) if row is not None else ""
 
     def _offer_newest(self, folder: str, here: str) -> None:
-        """Offer to fetch what is newer, with all that it links to."""
+        """Offer to fetch what is newer, with all linked files."""
         number = self._number()
         self.newest.setVisible(True)
         self._newest = lambda: self.fetch(number, None, Path(folder).expanduser())
@@ -355,7 +359,7 @@ class HistoryDialog(_Window):
 
 
 def ask_choices(parent: Any, files: Sequence[Theirs]) -> list[tuple[Theirs, Choice]]:
-    """Ask what to do about new versions over local edits; nothing is done to a file without an answer."""
+    """Ask what to do about new versions over local edits; no file is touched without an answer."""
     window = QtWidgets.QDialog(parent)
     layout = widgets.lay_out(
         window, "SiloChoices", translate("Silo", "Edited here, and newer in Silo"), 620, 260, modal=True
@@ -501,8 +505,9 @@ class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no typ
 
 
 def mark_in_tree(states: Mapping[str, tuple[str, Tone]]) -> None:
-    """Show how files stand at their documents in FreeCAD's tree: colour and tool tip of the entry alone, so
-    that no document changes."""
+    """Show the state of files at their documents in FreeCAD's tree. Only the entry gets a colour and a tool
+    tip, so that no document changes.
+    """
     documents = host.documents_by_path()
     open_now = {str(doc.Label) for doc in documents.values()}
     labels = {str(doc.Label): states[path] for path, doc in documents.items() if path in states}
@@ -520,6 +525,6 @@ def mark_in_tree(states: Mapping[str, tuple[str, Tone]]) -> None:
 
 
 def ask_folder(parent: Any, start: str) -> str:
-    """Return the folder that a person chose; "" if none was chosen."""
+    """Let a person choose a folder; "" if they choose none."""
     title = translate("Silo", "Choose a folder")
     return str(QtWidgets.QFileDialog.getExistingDirectory(parent, title, start))

@@ -78,13 +78,13 @@ class Differences:
 
 
 def ghosts(client: SiloClient, part_number: str, revision: int, control: Control) -> list[Ghost]:
-    """Fetch what a revision shows. For a worker."""
+    """Fetch the model of a revision, and find what it shows. For a worker."""
     import numpy as np
 
     from silo.drawing import products
 
     scene = client.get_scene(part_number, revision)
-    result: list[Ghost] = []
+    found: list[Ghost] = []
     meshes: dict[int, dict[str, Mesh]] = {}
     for occurrence in scene.occurrences:
         control.check()
@@ -96,8 +96,8 @@ def ghosts(client: SiloClient, part_number: str, revision: int, control: Control
             )
         if (mesh := meshes[occurrence.geometry].get(occurrence.key)) is not None:
             matrix = np.array(occurrence.matrix).reshape(4, 4).T
-            result.append(Ghost(tuple(occurrence.path), matrix, mesh.moved(matrix)))
-    return result
+            found.append(Ghost(tuple(occurrence.path), matrix, mesh.moved(matrix)))
+    return found
 
 
 def _in_words(differences: Differences | None, revision: int) -> str:
@@ -127,7 +127,7 @@ class RevisionFlow:
         """Carry out what a person chose in the commit dialog or in the pane.
 
         taken
-            called when theirs is in the place of mine.
+            called when their file is in the place of mine.
         """
         if choice is Choice.TAKE:
             self._take(path, theirs, taken)
@@ -217,7 +217,7 @@ class RevisionFlow:
         )
 
     def _replace(self, path: str, content: Path | None, theirs: Theirs) -> None:
-        """Put theirs in the place of mine, and keep a copy of mine. ``content`` None: theirs is there
+        """Put their file in the place of mine, and keep a copy of mine. ``content`` None: theirs is there
         already.
         """
         from silo.files import content_hash
@@ -309,7 +309,7 @@ class RevisionFlow:
 
     @property
     def recent(self) -> list[Item]:
-        """Return what the server in use showed last without any words."""
+        """Return the items that the server in use showed last for a search without words."""
         url, items = self._recent
         return items if url == self._session.shown.server.url else []
 
@@ -334,8 +334,9 @@ class RevisionFlow:
         done: Callable[[Pulled], None],
         failed: Callable[[SiloError], None],
     ) -> None:
-        """Fetch a file with all that it links to. What FreeCAD has open, and what has edits that are not in
-        Silo, is left alone; ``overwrite`` replaces the latter and keeps copies."""
+        """Fetch a file with all linked files. Files that FreeCAD has open, or that have edits that are not in
+        Silo, are left alone; ``overwrite`` replaces the latter and keeps copies.
+        """
         from silo.platform import Spelling  # late: FreeCAD's start waits for this module
 
         real = Spelling().real  # a link may have opened the file under another spelling of its name
@@ -378,7 +379,7 @@ class RevisionFlow:
         """Fetch the revisions of a document's item.
 
         base
-            what the document was made from.
+            the base from which the document was made.
         """
         outbox = self._session.outbox
 
@@ -436,18 +437,18 @@ class ProjectRow:
 
     @property
     def is_fine(self) -> bool:
-        """Return True if Silo has it as it is here."""
+        """Return True if Silo has the file as it is here."""
         return self.state.name == "SAME" and not self.edits
 
     @property
     def tone(self) -> Tone:
-        """Return how its state is meant."""
+        """Return the tone for its state."""
         if self.is_fine:
             return Tone.GOOD
         return Tone.WARNING if self.state.name in ("BOTH", "NO_ITEM") else Tone.CHANGED
 
     def words(self) -> str:
-        """Return its state for people."""
+        """Describe its state, for people."""
         texts = {
             "SAME": translate("Silo", "in Silo"),
             "NEW": translate("Silo", "not in Silo"),
@@ -476,8 +477,8 @@ class ProjectView:
     notes: tuple[str, ...] = ()
 
     def shown(self, words: str, *, only_left: bool) -> list[ProjectRow]:
-        """Return the rows with all of these words; ``only_left``: those that Silo has not as they are
-        here.
+        """Return the rows that contain all of these words; ``only_left``: only those that differ from
+        Silo.
         """
         wanted = words.casefold().split()
         return [
@@ -488,7 +489,7 @@ class ProjectView:
         ]
 
     def heading(self) -> str:
-        """Return how many files there are, and how many of them Silo does not have as they are here."""
+        """Say how many files there are, and how many of them differ from Silo."""
         left = sum(not row.is_fine for row in self.rows)
         return translate("Silo", "{n} files, {left} of them different from Silo", n=len(self.rows), left=left)
 
@@ -504,7 +505,7 @@ class ProjectFlow:
         self.view = ProjectView()
 
     def roots(self) -> list[str]:
-        """Return the project that was shown last, and those of the open documents."""
+        """Return the root of the project that was shown last, and those of the projects of open documents."""
         folders = {os.path.dirname(path) for path in self._desk.open_paths()}
         project_roots = {project.root for folder in folders if (project := Project.of(folder)) is not None}
         last = self._preferences.text("ProjectFolder")
@@ -518,7 +519,9 @@ class ProjectFlow:
     def look(
         self, root: str, done: Callable[[ProjectView], None], failed: Callable[[SiloError], None]
     ) -> None:
-        """Find out how the files of a project stand; without a connection, as far as the folder remembers."""
+        """Find out how the files of a project stand; without a connection, as far as the folder
+        remembers it.
+        """
         edited = self._edited()
 
         def work(client: SiloClient | None) -> ProjectView:
@@ -538,8 +541,8 @@ class ProjectFlow:
         self._session.ask(title, lambda client, _control: work(client), told, offline)
 
     def _edited(self) -> set[str]:
-        """Return the open files with edits; what FreeCAD only marked has none, as far as time allows to
-        compare.
+        """Return the open files with edits, as far as there is time to compare; marks of FreeCAD alone do not
+        count.
         """
         documents, until = self._desk.documents, time.thread_time() + MOST_S
         edited_documents = ((one_path(path), self._desk.find(path)) for path in self._desk.open_paths())
@@ -550,7 +553,7 @@ class ProjectFlow:
         }
 
     def commit_all(self, comment: str) -> None:
-        """Save what is edited, and send all files that Silo does not have as they are here."""
+        """Save what is edited, and send all files that differ from Silo."""
         paths = {row.path for row in self.view.rows}
         self._commits.commit_folder(self.view.root, paths & self._edited(), comment)
 
@@ -606,7 +609,7 @@ def _project_view(root: str, client: SiloClient | None, store: Store, edited: Se
 
 
 def file_in_project(folder: str, item: str) -> str:
-    """Return the file of an item that lies in a project already; "" if there is none."""
+    """Find the file of an item in a project; "" if there is none."""
     if (project := Project.of(folder)) is None:
         return ""
     items = project.files().items()
@@ -623,7 +626,7 @@ def _history_of(client: SiloClient, part_number: str) -> ItemHistory:
 
 
 def over_edits(pulled: Pulled) -> list[Theirs]:
-    """Return the new versions of files that have edits which are not in Silo."""
+    """Return the new versions of files whose edits are not in Silo."""
     return [
         Theirs(str(file.path), file.part_number, file.revision, newer={"revision_number": file.revision})
         for file in pulled.files
@@ -632,25 +635,25 @@ def over_edits(pulled: Pulled) -> list[Theirs]:
 
 
 def left_alone(pulled: Pulled) -> Sequence[str]:
-    """Return what a pull did not do, in sentences."""
+    """Say what a pull did not do, in sentences."""
     from silo.vault.pull import PullState
 
     texts = {
         PullState.EDITED: translate("Silo", "{name} has edits that are not in Silo; it was left alone."),
         PullState.OPEN: translate("Silo", "{name} is open in FreeCAD; it was left alone."),
     }
-    result = [
+    lines = [
         texts[file.state].replace("{name}", file.path.name) for file in pulled.files if file.state in texts
     ]
     lost = translate("Silo", "{path}, which {name} links to, was not fetched: {reason}")
     for link in pulled.lost:
         text = filled(lost, path=link.path or "?", name=link.position, reason=link.reason)
-        result.append(plain(text, 300))
-    return result
+        lines.append(plain(text, 300))
+    return lines
 
 
 def _not_here(path: str) -> list[str]:
-    """Return the files that a file links to and that are not there."""
+    """Return the files to which a file links and that are missing."""
     from silo.fcstd.linked import recorded_paths
     from silo.files import FoundFile, Locator
 

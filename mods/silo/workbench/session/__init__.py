@@ -55,7 +55,7 @@ def collection_off() -> Iterator[None]:
 
 
 def collect_due() -> None:
-    """Collect what is due and was held back; to be called in the GUI thread."""
+    """Collect the garbage that was held back; call it in the GUI thread."""
     if not _holding or not _was_on:
         return
     due = [a > b > 0 for a, b in zip(gc.get_count()[:2], gc.get_threshold()[:2], strict=True)]
@@ -85,11 +85,11 @@ class Control:
         self._tell = tell
 
     def progress(self, detail: str = "", fraction: float | None = None) -> None:
-        """Say how far the job is."""
+        """Report how far the job is."""
         self._tell(detail, fraction)
 
     def check(self) -> None:
-        """Stop here, by :class:`CancelledError`, where somebody asked for it."""
+        """Raise :class:`CancelledError` if somebody asked the job to stop."""
         from silo.bom.errors import CancelledError  # late: FreeCAD's start waits for this module
 
         if self.cancelled.is_set():
@@ -138,7 +138,7 @@ class Worker:
         self._closed = False
 
     def submit(self, job: Job) -> bool:
-        """Queue a job; False where an equal one (``same_as``) waits already, or the worker is closed."""
+        """Queue a job; False if an equal one (``same_as``) waits already, or the worker is closed."""
         with self._change:
             twice = job.same_as and any(other.same_as == job.same_as for other, _ in self._waiting)
             if twice or self._closed:
@@ -159,13 +159,13 @@ class Worker:
                 self._current[1].cancelled.set()
 
     def left(self, seconds: float = 0.0) -> int:
-        """Return how many jobs run or wait, after at most so many seconds for them to become none."""
+        """Wait at most so many seconds until no job remains, and return how many run or wait."""
         with self._change:
             self._change.wait_for(lambda: self._current is None and not self._waiting, seconds)
             return len(self._waiting) + (self._current is not None)
 
     def close(self, timeout: float = 1.0) -> bool:
-        """Ask the running job to end, drop the waiting ones. True where the thread has ended."""
+        """Ask the running job to end, and drop the waiting ones. Returns True if the thread has ended."""
         with self._change:
             self._closed = True
             self._waiting.clear()
@@ -179,9 +179,7 @@ class Worker:
 
     @property
     def idle(self) -> bool:
-        """Return True if nothing runs and nothing waits, and the end of each job was handed to
-        ``deliver``.
-        """
+        """Return True if no job runs or waits, and the end of each job was handed to ``deliver``."""
         return not self.left()
 
     def _next(self) -> tuple[Job, Control] | None:
@@ -194,7 +192,7 @@ class Worker:
         while (queued := self._next()) is not None:
             self._tell(queued[0], "", None)
             with collection_off():
-                # Handed over before the worker counts as idle: a caller that waits for that must not miss it.
+                # Passed on before the worker counts as idle: a caller that waits for that must not miss it.
                 self._deliver(self._finish(*queued))
             with self._change:
                 self._current = None
@@ -229,7 +227,7 @@ class Worker:
 
 
 def in_gui(deliver: Deliver, call: Callable[[], Any], control: Control) -> Any:
-    """Run for a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
+    """Run ``call`` in the GUI thread for a job; wait, and return or raise what it returns or raises."""
     from silo.bom.errors import SiloError
 
     finished = threading.Event()

@@ -66,11 +66,11 @@ class Online:
 
     @property
     def address(self) -> str:
-        """Return the server in use; "" if none is configured."""
+        """Return the address of the server in use; "" if none is configured."""
         return self._client.base_url if self._client is not None else ""
 
     def another(self) -> SiloClient:
-        """Return one more client of the server, for another thread, which closes it."""
+        """Make one more client of the server for another thread, which closes it."""
         client: SiloClient = self._make_client(self._server)
         return client
 
@@ -92,7 +92,7 @@ class Online:
         )
 
     def connect(self, preferences: ServerPreferences, store: TokenStore, *, live: bool) -> ServerChoice:
-        """Use the server that the settings name; begin to listen to it where ``live``."""
+        """Use the server of the settings; with ``live``, begin to listen to it."""
         self._use(choose_server(preferences, store, file_server=file_server()))
         if self.address:
             # Another token or address may be what was wanted.
@@ -101,18 +101,18 @@ class Online:
         return self._server
 
     def need_client(self, preferences: ServerPreferences, store: TokenStore) -> None:
-        """Have a client; :class:`ConfigError` where no server is configured."""
+        """Make sure that there is a client; :class:`ConfigError` if no server is configured."""
         if self._client is None:
             self._use(choose_server(preferences, store, file_server=file_server()))
         _ = self.client
 
     def pause(self) -> Pause | None:
-        """Return why nothing is sent to the server now; None if nothing keeps it."""
+        """Return the pause that keeps anything from being sent to the server now; None if there is none."""
         pause = self._outbox.pause(self.address) if self.address else None
         return pause if pause is not None and pause.left(self._outbox.clock()) else None
 
     def wake(self) -> None:
-        """Let the connection look at the pause again, which has ended."""
+        """Let the connection look again at a pause that has ended."""
         if self._listener is not None and self._listener.state.kind is not Connection.ONLINE:
             self._listener.retry_now()
 
@@ -203,8 +203,8 @@ def _client(server: ServerChoice) -> SiloClient:
 
 
 def file_server() -> object | None:
-    """Return the server in the configuration file of the command line; None if there is none."""
-    # The environment is looked at before; here it is only asked where the file is.
+    """Read the server in the configuration file of the command line; None if there is none."""
+    # The environment was read before; here it only says where the file is.
     env = {name: value for name, value in os.environ.items() if not name.startswith("SILO_")}
     try:
         return resolve_server(env=env)
@@ -225,17 +225,19 @@ class LastIds:
         self._due = 0.0
 
     def get(self, url: str) -> str | None:
-        """Return where to resume; None for a server that was never listened to."""
+        """Return the id from which to resume; None for a server that we never listened to."""
         return self._known.get(url)
 
     def set(self, url: str, event_id: str) -> None:
-        """Remember an event; a crash may repeat those of colleagues of the last :data:`SAVE_EVERY_S`."""
+        """Remember an event; after a crash, colleagues' events of the last :data:`SAVE_EVERY_S` may be
+        repeated.
+        """
         self._known[url] = event_id
         if monotonic() >= self._due:
             self.save()
 
     def save(self) -> None:
-        """Write to disk what is new. A lost write costs repeated events, so nothing is synced here."""
+        """Write what is new to disk. A lost write costs repeated events, so the disk is not synced here."""
         self._due = monotonic() + SAVE_EVERY_S
         if self._known == self._saved:
             return

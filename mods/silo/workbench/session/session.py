@@ -125,7 +125,7 @@ class Colleagues:
             for identity in map(str.lower, identities)
             if self.newer.get(identity) is seen.get(identity)
         }
-        self.newer = {key: identity for key, identity in self.newer.items() if key not in stale}
+        self.newer = {key: newer for key, newer in self.newer.items() if key not in stale}
 
     def heard(self, identity: str, newer: Newer) -> None:
         """Note that the server announced a commit."""
@@ -145,8 +145,8 @@ class Colleagues:
             self.newer = {key: later for key, later in self.newer.items() if key != identity}
 
     def sent(self, still_going: Iterable[str]) -> None:
-        """Note that a run of sending has ended. What was announced meanwhile and is not ours is a
-        colleague's. Of ``still_going`` something is still on its way.
+        """Note that a run of sending has ended. If a commit that was announced meanwhile is not ours, it is a
+        colleague's. Commits of ``still_going`` are still on their way.
         """
         unsure, self._unsure, self._going = self._unsure, {}, set()
         for identity, newer in unsure.items():
@@ -204,7 +204,7 @@ class Session:
     # -- the server -------------------------------------------------------------------------------------
 
     def begin(self, *, live: bool) -> None:
-        """Connect, where a server is configured; send what an earlier FreeCAD left behind."""
+        """Connect, if a server is configured; send what an earlier FreeCAD left."""
         self._live = live
         self._net.submit(
             Job(translate("Silo", "Connecting"), self._connect, done=self._connected, failed=self.problem)
@@ -223,7 +223,7 @@ class Session:
         return self.outbox.entries(), self._online.pause() if self._online is not None else None
 
     def _need_online(self) -> Online:
-        """Make it in the worker, because its import would hold up FreeCAD's start."""
+        """Make it when a worker first needs it, because its import would delay FreeCAD's start."""
         if self._online is None:
             from silo.workbench.session.online import Online
 
@@ -255,12 +255,12 @@ class Session:
     # -- commits ----------------------------------------------------------------------------------------
 
     def keep(self, commit: Commit, failed: Callable[[SiloError], None], base: Base | None = None) -> None:
-        """Put a commit on disk, then send it. ``failed`` is called where the disk does not take it.
+        """Put a commit on disk, then send it. ``failed`` is called if the disk cannot be written.
 
-        ``base``: what the document was made from, which this commit is from now on.
+        ``base``: the base of the document; from now on, this commit is its base.
 
-        Its row does not wait for the copies of others: from its row on, a commit is not lost whatever
-        happens.
+        Its row does not wait for the copies of other commits: as soon as the row is on disk, the commit
+        cannot be lost.
         """
         title = translate("Silo", "Keeping the commit")
         self._colleagues.sending(commit.identity)
@@ -285,7 +285,7 @@ class Session:
         self._rows.submit(Job(title, stage, failed=failed))
 
     def after_keeping(self, then: Callable[[], None]) -> None:
-        """Call something in the GUI thread, once all commits of before are on disk with their copies."""
+        """Call something in the GUI thread after all earlier commits are on disk with their copies."""
         title = translate("Silo", "Keeping the commit")
 
         def behind(_control: Control) -> None:
@@ -294,7 +294,7 @@ class Session:
         self._rows.submit(Job(title, behind))
 
     def send(self, *, force: bool) -> None:
-        """Send what waits, nothing in a pause; ``force`` ends all pauses of the server first."""
+        """Send what waits, but nothing in a pause; ``force`` first ends all pauses of the server."""
 
         def run(control: Control) -> Any:
             online = self._need_online()
@@ -371,7 +371,9 @@ class Session:
         self._listener.sent(sent)
 
     def _draw(self) -> None:
-        """Draw the files that have arrived, so that Silo shows them in 3D; their commits are done."""
+        """Draw the files that have arrived, so that Silo shows them in 3D; their commits are finished
+        already.
+        """
         files, self._undrawn = self._undrawn, {}
         if not files or self._drawing is None:
             return
@@ -394,14 +396,14 @@ class Session:
         self._models.submit(Job(title, run, done=done))
 
     def tick(self) -> None:
-        """Try what waits again when its time has come; a timer calls this."""
+        """Send what waits again when its time has come; a timer calls this."""
         # A log-in by the command line ends the pause of a wrong token.
         is_refused = self.shown.connection == "refused"
         if (self.shown.waiting or self._owed or is_refused) and self._net.idle:
             self.send(force=False)
 
     def retry(self, entry_id: int) -> None:
-        """Send something that a person had to look at once more."""
+        """Send again an entry that waited for a person."""
         self._change(lambda: self.outbox.retry(entry_id), send=True)
 
     def send_here(self, entry_ids: Iterable[int]) -> None:
@@ -416,15 +418,15 @@ class Session:
         self._change(move, send=True)
 
     def retry_all(self) -> None:
-        """End the pauses of the server: connect, and send all that waits, now."""
+        """End the pauses of the server: connect, and send everything that waits, now."""
         self.send(force=True)
 
     def discard(self, entry_id: int, *, keep: bool = False) -> None:
-        """Forget something that waits; the document is not touched. ``keep``: a copy of its file stays."""
+        """Forget an entry that waits; the document is not touched. ``keep``: a copy of its file stays."""
         self._change(lambda: self.outbox.discard(entry_id, keep=keep))
 
     def save_copy(self, entry_id: int, target: Path) -> None:
-        """Write the file of something that waits somewhere else."""
+        """Write the file of an entry that waits to another place."""
         self._change(lambda: self.outbox.save_copy(entry_id, target))
 
     def _change(self, change: Callable[[], None], *, send: bool = False) -> None:
@@ -440,7 +442,7 @@ class Session:
         self._disk.submit(Job(translate("Silo", "Outbox"), run, done=done, failed=self.problem))
 
     def _waits(self, looked: _Looked, **more: Any) -> None:
-        """Show what waits; a worker finds out what the colleagues changed for whom commits are held."""
+        """Show what waits. A worker finds out what colleagues changed, if commits are held because of it."""
         waiting, pause = looked
         asked = {entry.id: entry for entry in waiting if entry.newer and entry.path}
         their_versions = {
@@ -494,7 +496,7 @@ class Session:
         done: Callable[[Any], None],
         failed: Callable[[SiloError], None],
     ) -> None:
-        """Work for a worker that needs no server of the session (settings, keyring)."""
+        """Do work that needs no server of the session (settings, keyring) in a worker."""
         self._aside.submit(Job(title, work, done=done, failed=failed))
 
     def look(self, work: Callable[[], object]) -> None:
@@ -502,14 +504,14 @@ class Session:
         self._looks.submit(Job("Reading files", lambda _control: work()))
 
     def newer_than(self, identity: str, since: float) -> Newer | None:
-        """Return what a colleague has committed of an item since then (:func:`time.monotonic`), as far as the
-        server announced it.
+        """Return a colleague's commit of an item after ``since`` (:func:`time.monotonic`), if the server
+        announced one.
         """
         newer = self.shown.newer.get(identity.lower())
         return newer if newer is not None and newer.at > since else None
 
     def in_gui(self, call: Callable[[], Any], control: Control) -> Any:
-        """Run for a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
+        """Run ``call`` in the GUI thread for a job; wait, and return or raise what it returns or raises."""
         return in_gui(self._deliver, call, control)
 
     def cancel(self) -> None:
@@ -518,11 +520,11 @@ class Session:
 
     def close(self, wait: Callable[[Callable[[float], int]], object] = lambda left: left(60.0)) -> None:
         """Close when FreeCAD ends: wait for the disk, never for the network. What is not sent waits for the
-        next time.
+        next start.
 
         wait
-            is given a function that waits for so many seconds and returns how much the disk still has to
-            do; it ends when that is nothing, or when a person wants no longer to wait.
+            gets a function that waits for so many seconds and returns how many files are still to be written;
+            ``wait`` ends when there are none, or when a person does not want to wait any longer.
         """
         self._net.cancel()
         if self._unfinished(0.0):
@@ -538,7 +540,7 @@ class Session:
 
     @property
     def idle(self) -> bool:
-        """Return True if no worker has anything to do."""
+        """Return True if all workers are idle."""
         return self._rows.idle and self._disk.idle and self._net.idle
 
     # -- what is shown ----------------------------------------------------------------------------------
@@ -548,7 +550,7 @@ class Session:
         self._show(activity=self.shown.activity.add(entry))
 
     def answered(self, is_answered: Callable[[Action], bool]) -> None:
-        """Note that questions of the boxes have their answer (:meth:`Entry.without_questions`)."""
+        """Note that questions in the boxes are answered (:meth:`Entry.without_questions`)."""
         self._show(activity=self.shown.activity.answered(is_answered))
 
     def _busy(self, busy: Busy | None) -> None:

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from silo.api.client import BrowserLogin
 
 
-# So often the server is asked if the user has let FreeCAD in.
+# How often the server is asked if the user has let FreeCAD in.
 LOGIN_MS = 1500
 KEYRING, PREFERENCE = "keyring", "preference"
 
@@ -157,7 +157,7 @@ class PreferencePage:
     # -- FreeCAD's two calls ----------------------------------------------------------------------------
 
     def loadSettings(self) -> None:
-        """Show the settings as they are."""
+        """Show the present settings."""
         self.url.setText(self._preferences.text("ApiUrl"))
         self.certificate.setText(self._preferences.text("SslCertPath"))
         self.schema.setText(self._preferences.text("Schema"))
@@ -202,7 +202,7 @@ class PreferencePage:
         self.token.setPlaceholderText(kept if server.token else missing)
 
     def saveSettings(self) -> None:
-        """Keep what the user entered; FreeCAD calls this for every page, changed or not."""
+        """Save what the user entered; FreeCAD calls this for every page, changed or not."""
         before = self._all()
         self._preferences.set("ApiUrl", self.url.text().strip())
         self._preferences.set("SslCertPath", self.certificate.text().strip())
@@ -237,7 +237,7 @@ class PreferencePage:
     # -- testing ----------------------------------------------------------------------------------------
 
     def test(self) -> None:
-        """Ask the server who we are, with what is entered now."""
+        """Ask the server who we are, with the present entries."""
         self._tell(translate("Silo", "Asking the server…"), Tone.QUIET)
         wanted = self._entered()
         preferences, keyring = read_known(self._preferences), self._keyring
@@ -296,7 +296,7 @@ class PreferencePage:
 
 def _breathe() -> None:
     # FreeCAD's preference window, when a Python command opens it, keeps Python's lock for as long as it is
-    # open (measured, 0.20 to 1.1), so no worker would get on: sleeping lets go of the lock.
+    # open (measured, 0.20 to 1.1), so no worker could continue; sleeping releases the lock.
     time.sleep(0.003)
 
 
@@ -328,7 +328,7 @@ _open: list[Any] = []
 
 
 def stub_commands(missing: Sequence[str]) -> dict[str, Command]:
-    """Return the one command that works without packages."""
+    """Make the one command that works without packages."""
 
     return {
         INSTALL: Command(
@@ -356,7 +356,7 @@ class InstallDock(Dock):
         self.show()
 
     def make(self) -> Any:
-        """Make the sentence and its button."""
+        """Make the widget with the sentence and its button."""
         content = QtWidgets.QWidget()
         layout = QtWidgets.QVBoxLayout(content)
         text = translate("Silo", "Silo cannot start yet: FreeCAD's Python lacks {names}.")
@@ -368,7 +368,7 @@ class InstallDock(Dock):
 
 
 def install() -> str:
-    """Install the packages for this FreeCAD, and return where they are. Raises SiloError. Worker."""
+    """Install the packages for this FreeCAD, and return their folder. Raises SiloError. Worker."""
     from silo.freecads import ask_freecad, install_packages
 
     return install_packages(ask_freecad(host.program(), Path(host.user_data_folder())))
@@ -406,7 +406,7 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         layout.addLayout(widgets.line(None, self.button, close))
 
     def begin(self) -> None:
-        """Install, in a thread; the window stays usable, and may be closed."""
+        """Install in a thread; the window stays usable, and may be closed."""
         self.button.setEnabled(False)
         self.bar.show()
         self.text.setText(translate("Silo", "Installing. This takes a minute or two…"))

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 SERVICE = "silo-mod"
 
-# Back ends that only say no, or keep what they are given where everybody can read it.
+# Back ends that refuse everything, or that keep a token where everybody can read it.
 _USELESS = ("fail", "null", "plaintext", "chainer_empty")
 
 
@@ -41,7 +41,7 @@ class Keyring:
         self._module = module
 
     def name(self) -> str:
-        """Return what the keyring calls itself; "" if there is none that can be trusted."""
+        """Return the name of the keyring; "" if there is none that can be trusted."""
         module = self._load()
         if module is None:
             return ""
@@ -56,7 +56,7 @@ class Keyring:
         return str(getattr(backend, "name", "") or type(backend).__name__)
 
     def get(self, url: str) -> str:
-        """Return the token kept for a server; "" if there is none."""
+        """Read the token that is kept for a server; "" if there is none."""
         if not self.name():
             return ""
         try:
@@ -65,7 +65,7 @@ class Keyring:
             return ""
 
     def set(self, url: str, token: str) -> None:
-        """Keep a token; "" removes it. :class:`ConfigError` where the keyring does not take it."""
+        """Keep a token; "" removes it. :class:`ConfigError` if the keyring refuses it."""
         if not self.name():
             raise ConfigError("this system has no keyring that could keep the token")
         module = self._load()
@@ -114,7 +114,7 @@ class ServerChoice:
 
     @property
     def configured(self) -> bool:
-        """Return True if there is a server to talk to."""
+        """Return True if a server is configured."""
         return bool(self.url)
 
 
@@ -134,7 +134,7 @@ class ServerPreferences:
 
 
 def read_known(preferences: Preferences) -> ServerPreferences:
-    """Return the server settings of the preference page."""
+    """Read the server settings of the preference page."""
     certificate = preferences.text("SslCertPath").strip()
     verify: bool | str = certificate or True
     return ServerPreferences(
@@ -150,7 +150,7 @@ def choose_server(
     env: Mapping[str, str] = os.environ,
     file_server: Any = None,
 ) -> ServerChoice:
-    """Return the server to use.
+    """Choose the server to use.
 
     file_server
         what :func:`silo.api.config.resolve_server` found in the configuration file (``url``, ``token``,
@@ -184,7 +184,9 @@ def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
 
 
 def look(preferences: ServerPreferences, keyring: Keyring) -> tuple[ServerChoice, str]:
-    """Return the server in use, and the keyring's name ("" for none). Worker: a keyring may take its time."""
+    """Find the server in use, and the keyring's name ("" for none). Worker, since a keyring may take its
+    time.
+    """
     from silo.workbench.session.online import file_server
 
     return choose_server(preferences, keyring, file_server=file_server()), keyring.name()
@@ -198,10 +200,11 @@ def keep_token(keyring: Keyring, url: str, token: str) -> None:
 
 
 def test(wanted: ServerPreferences, preferences: ServerPreferences, keyring: Keyring) -> str:
-    """Ask the server who we are; the answer in words, or the error that explains what is wrong. Worker.
+    """Ask the server who we are. Returns the answer in words, or raises the error that explains what is
+    wrong. Worker.
 
-    wanted, known
-        what is entered on the page, and what was saved before.
+    wanted, preferences
+        the entries on the page, and what was saved before.
     """
     from silo.api.client import SiloClient
     from silo.workbench.session.online import file_server
@@ -223,7 +226,7 @@ def test(wanted: ServerPreferences, preferences: ServerPreferences, keyring: Key
 
 
 def begin_login(wanted: ServerPreferences, preferences: ServerPreferences) -> BrowserLogin:
-    """Return the page that lets FreeCAD in. Worker."""
+    """Begin a login through the browser, and return its page. Worker."""
     from silo.api.client import SiloClient
 
     url = wanted.url or preferences.url
@@ -238,7 +241,7 @@ def begin_login(wanted: ServerPreferences, preferences: ServerPreferences) -> Br
 
 
 def is_let_in(login: BrowserLogin, wanted: ServerPreferences, preferences: ServerPreferences) -> bool:
-    """Return True once the user has let FreeCAD in. Worker."""
+    """Return True if the user has let FreeCAD in. Worker."""
     from silo.api.client import SiloClient
 
     with SiloClient(wanted.url or preferences.url, login.token, verify=wanted.verify) as client:
@@ -250,7 +253,7 @@ def is_let_in(login: BrowserLogin, wanted: ServerPreferences, preferences: Serve
 
 
 def in_use(server: ServerChoice, env: Mapping[str, str]) -> str:
-    """Return which server and token are in use, and where they come from."""
+    """Say which server and token are in use, and where they come from."""
     if not server.configured:
         return translate("Silo", "No server is set up. To try it out, run: silo-mod serve")
     where = translate("Silo", "In use: {url} ({from}).", url=plain(server.url, 100))
