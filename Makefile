@@ -55,37 +55,34 @@ demo: $(SERVER)
 	$(BIN)/silo-mod demo $(DEMO)
 
 test: setup
-	$(IN_MEMORY) $(BIN)/python -m pytest $(SPREAD) --dist worksteal -m "not freecad and not browser"
+	$(IN_MEMORY) $(BIN)/python -m pytest $(SPREAD) --dist worksteal -m "not freecad and not browser" --ignore=tests/browser
 
-# Of the suites that read and write files, what neither looks a name up nor replaces a file; `make test` runs these.
-NOT_ON_FILES = $(addprefix --ignore=tests/,fcstd/test_fuzz.py fcstd/test_xmltext.py $(addprefix outbox/test_,laws.py \
-	pauses.py faults.py two_designers.py) $(addprefix cli/test_,agreed.py conflicts.py doctor.py log.py login.py \
-	night_report.py output.py piped.py queue.py serve.py server_commands.py workflows.py))
-SINGLE = $(filter-out tests/test_docs.py,$(wildcard tests/test_*.py))
-
-# The suites that read and write files, with files as Windows has them; PostgreSQL's test library is POSIX only. Of
-# client and server those whose subject is files: nothing else of them replaces or deletes. Servers that fail are no
-# matter of files, nor are crashes one of names.
-ON_FILES = $(addprefix tests/api/test_,caller.py config.py files.py revisions.py) \
-	tests/contract/test_files.py tests/contract/test_hostile_values.py $(addprefix tests/server/test_,backup.py \
-	deploy.py failures.py file_store.py housekeeping.py kill.py processes.py requests.py settings.py)
+# Where files are replaced, removed and locked: all but a few of the places that do so are reached from one of these.
+# PostgreSQL's test library is POSIX only.
+ON_WINDOWS = $(addprefix tests/,api/test_config.py api/test_files.py contract/test_files.py fcstd/test_relink.py \
+	fcstd/test_stamp.py outbox/test_send.py outbox/test_store.py vault/test_git.py vault/test_index.py \
+	vault/test_pull.py workbench/commit workbench/register/test_flow.py workbench/revisions workbench/session \
+	$(addprefix cli/test_,bom_diff.py commands.py login.py night_job.py project.py register.py) \
+	$(addprefix inertia/,geometry/test_cache.py output/test_files.py) registering/test_orders.py \
+	$(addprefix server/test_,backup.py file_store.py housekeeping.py) \
+	$(addprefix test_,addon_install.py batch.py durable.py folders.py open_in_freecad.py platform.py))
 test-windows-files: setup
 	$(IN_MEMORY) PYTHONPATH=tests/support $(BIN)/python -m pytest -p windows_files $(SPREAD) --dist worksteal \
-		-k "not postgres and not one_item_in_trouble" \
-		-m "not freecad and not browser" $(NOT_ON_FILES) tests/cli tests/fcstd tests/outbox tests/vault \
-		tests/workbench $(SINGLE) $(ON_FILES)
+		-k "not postgres" -m "not freecad and not browser" $(ON_WINDOWS)
 
-# The suites that name files, on a mounted disk that finds a name in any case and normal form. The queue names its own
-# copies, and what only shows things in FreeCAD names none.
-NO_NAMES = $(addprefix --ignore=tests/workbench/,mass pane preview session settings)
+# Where files are found by their names, on a mounted disk that finds a name in any case and normal form.
+BY_NAME = $(addprefix tests/,fcstd/test_links.py fcstd/test_relink.py fcstd/test_stamp.py fcstd/test_suggest.py \
+	vault/test_git.py vault/test_index.py vault/test_pull.py workbench/commit workbench/register \
+	workbench/revisions $(addprefix cli/test_,bom_diff.py night_job.py project.py) \
+	$(addprefix test_,batch.py open_in_freecad.py spelling.py))
 test-other-disk: setup
-	PYTHONPATH=tests/support $(BIN)/python -m pytest -p other_disk_tests $(SPREAD) --dist worksteal \
-		-k "not postgres and not one_item_in_trouble and not test_crash" \
-		-m "not freecad and not browser" $(NOT_ON_FILES) $(NO_NAMES) tests/cli tests/fcstd tests/vault \
-		tests/workbench $(SINGLE)
+	$(IN_MEMORY) PYTHONPATH=tests/support $(BIN)/python -m pytest -p other_disk_tests $(SPREAD) --dist worksteal \
+		-k "not postgres" -m "not freecad and not browser" $(BY_NAME)
 
+# Only the files with such tests: to collect all others takes each process ten seconds.
+ON_MACHINE = $(shell grep -rlE --include='test_*.py' 'mark\.(freecad|browser)' tests)
 test-machine: setup
-	$(BIN)/python -m pytest $(SPREAD) --dist loadscope -m "freecad or browser"
+	$(IN_MEMORY) $(BIN)/python -m pytest $(SPREAD) --dist loadscope -m "freecad or browser" tests/browser $(ON_MACHINE)
 
 translations: setup
 	$(BIN)/python scripts/translations.py $(LANGUAGE)

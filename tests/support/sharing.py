@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pytest
 
 # What takes longest begins first: at the end, one process would work on it alone.
-_LONG = re.compile(r"tests/(browser/test_accessibility|freecad/test_(matrix|gui_))")
+_LONG = re.compile(r"tests/(browser/test_accessibility|freecad/test_(matrix|drawing|package|gui_))")
 _VERSION = re.compile(r"[\[-](\d+\.\d+)(?=[\]-])")
 
 
