@@ -152,3 +152,31 @@ def test_a_purchaser_fills_the_table_of_suppliers_and_orders(api: Api, visit: Vi
     page.get_by_label("without what was ordered already").check()
     page.get_by_role("button", name="Show").click()
     expect(bought).to_contain_text("0 of 300")
+
+
+def test_boxes_and_quantities_stay_on_the_next_page_of_an_order(api: Api, visit: Visit) -> None:
+    """What is chosen on two pages is ordered at once; without a script the page says that it cannot be."""
+    top = api.item(item_type="assembly")
+    numbers = [f"{top}-{number:03}" for number in range(501)]
+    rows = "".join(f"{number},2\n" for number in numbers)
+    api.good("POST", bom(top, "import?make=M01"), body=f"PN,Qty\n{rows}".encode())
+    path, only_here = f"/items/{top}/order", "count for this page only"
+    scriptless = visit("editor", java_script_enabled=False)
+    scriptless.goto(path)
+    expect(scriptless.get_by_text(only_here)).to_be_visible()
+    page = visit("editor")
+    page.goto(path)
+    expect(page.get_by_text(only_here)).to_have_count(0)
+    page.get_by_label(f"Choose {numbers[0]}").check()
+    page.get_by_label(f"How much of {numbers[0]}").fill("7")
+    page.get_by_role("link", name="Next").click()
+    expect(page.locator("#count")).to_have_text("1 chosen, 1 of them not shown")
+    page.get_by_label(f"Choose {numbers[-1]}").check()
+    page.get_by_role("link", name="Previous").click()
+    expect(page.locator("#count")).to_have_text("2 chosen, 1 of them not shown")
+    expect(page.get_by_label(f"Choose {numbers[0]}")).to_be_checked()
+    expect(page.get_by_label(f"How much of {numbers[0]}")).to_have_value("7")
+    page.get_by_role("button", name="Note chosen as ordered").click()
+    notice(page, "2 noted as ordered")
+    ordered = api.get(f"/api/items/{top}/orders")["orders"]
+    assert {one["part_number"]: one["quantity"] for one in ordered} == {numbers[0]: "7", numbers[-1]: "2"}

@@ -163,13 +163,14 @@ def _some(rows: Sequence[OrderRow]) -> dict[str, bool]:
 
 
 def _fact_of(row: OrderRow) -> str:
-    """Write what the box of a row records, without the quantity."""
-    offer = row.offer
-    fact: dict[str, Any] = {"part_number": row.item.part_number, "unit": row.unit}
-    if offer is not None:
-        fact |= {"supplier": offer.of.supplier, "number": offer.of.number, "currency": offer.of.currency}
-        fact["price"] = None if offer.price is None else str(offer.price)
-    return json.dumps(fact, sort_keys=True)
+    """Write what the box of a row records, without the quantity. The price is last: behind the last space is
+    the mark of a box, and a row with another price has to be chosen again.
+    """
+    fact: dict[str, Any] = {"part_number": row.item.part_number, "unit": row.unit, "price": None}
+    if offer := row.offer:
+        of, price = offer.of, None if offer.price is None else str(offer.price)
+        fact = {"supplier": of.supplier, "number": of.number, "currency": of.currency, **fact, "price": price}
+    return json.dumps(fact)
 
 
 @router.post("/items/{part_number}/order")
