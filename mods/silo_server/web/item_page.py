@@ -146,7 +146,7 @@ class StructureRow(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Return what names the branch, "" if it can be none."""
+        """Return the key that names the branch, "" if the line can be no branch."""
         if self.above is None:
             return ""
         return hashlib.blake2b(f"{self.above} {self.line.id}".encode(), digest_size=4).hexdigest()
@@ -185,7 +185,7 @@ class ShownStructure:
 
     @cached_property
     def found(self) -> Sequence[tree.FlatRow]:
-        """Return what the filter finds: in the flat list, or first on each way down the tree."""
+        """Find the parts that match the filter: of the flat list, or first on each way down the tree."""
         if self.look.is_flat:
             return [row for row in self.leaves if self.fitting(row.line)]
         return tree.found_parts(self.graph, self.fitting)

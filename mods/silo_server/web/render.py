@@ -78,8 +78,9 @@ def _(text: str, **values: object) -> str:
 
 
 def plural(number: int, one: str, many: str = "", words: str = "") -> str:
-    """Count as :func:`silo.bom.errors.counted` does, in the language of the page; ``words``: how many of that
-    ``number``, as a table says it.
+    """Count as :func:`silo.bom.errors.counted` does, in the language of the page.
+
+    ``words`` replaces the number, such as ``12 of 340``.
     """
     return f"{words or number} {_CATALOGUES[LANGUAGE.get()].ngettext(one, many or one + 's', number)}"
 
@@ -350,7 +351,7 @@ def spoken(text: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """Say a message as a sentence: a capital first, and a full stop if it has no end."""
+    """Write a message as a sentence: a capital first, and a full stop if it has no end."""
     text = spoken(text)
     return f"{text[:1].upper()}{text[1:]}{'' if not text or text.endswith(('.', '?', '!')) else '.'}"
 

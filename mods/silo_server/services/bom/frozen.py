@@ -203,11 +203,11 @@ def frozen_product(tx: Tx, item: Item, release: Release) -> ProductContent:
 
 def _part(made: Mapping[str, Any]) -> RolledItem:
     texts = (made["part_number"], made.get("name", ""), made.get("description", ""))
-    said, listed = made.get("sourcing_type"), made.get("supplier_parts", ())
+    sourcing, listed = made.get("sourcing_type"), made.get("supplier_parts", ())
     properties = with_supplier(made.get("properties", {}), listed)
-    is_bought = bought(said, properties.get("supplier"))
+    is_bought = bought(sourcing, properties.get("supplier"))
     return RolledItem(
-        *texts, properties, made.get("thumbnail"), is_bought, sourcing_type=said, supplier_parts=listed
+        *texts, properties, made.get("thumbnail"), is_bought, sourcing_type=sourcing, supplier_parts=listed
     )
 
 

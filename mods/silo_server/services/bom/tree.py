@@ -197,8 +197,8 @@ def sought(words: str, item_type: str, parts: Mapping[int, RolledItem]) -> Calla
         if item_type and child_type != item_type:
             return False
         part = parts[child_id]
-        said = filter(None, map(part.properties.get, SOUGHT))
-        return test(part.part_number, part.name, part.description, *map(str, said))
+        texts = filter(None, map(part.properties.get, SOUGHT))
+        return test(part.part_number, part.name, part.description, *map(str, texts))
 
     return lambda line: fitting(line.child_id, line.child_item_type)
 
@@ -239,9 +239,7 @@ def found_parts(graph: Graph, fitting: Callable[[Line], bool]) -> list[FlatRow]:
 
 
 def leaves_in(graph: Graph, rows: Sequence[FlatRow], closed: Collection[int] = ()) -> Sequence[FlatRow]:
-    """Return these rows of a flat list with the leaf parts of their assemblies; ``closed`` as in
-    :func:`flatten`.
-    """
+    """Replace the assemblies among rows of a flat list by their leaf parts; ``closed`` as :func:`flatten`."""
     if {item_id for item_id in graph.lines if graph.components(item_id)}.isdisjoint(
         row.line.child_id for row in rows
     ):
@@ -520,15 +518,15 @@ def some_parts(tx: Tx, item_ids: Collection[int]) -> dict[int, RolledItem]:
         row.archived_at,
     ).where(one_of(tx, row.id, item_ids))
     parts = {}
-    for part_id, number, name, about, text, key, offers, said, kind, version, archived in tx.conn.execute(
+    for part_id, number, name, about, text, key, offers, sourcing, kind, version, archived in tx.conn.execute(
         query
     ):
         properties, listed = _read_json(text)[0], json.loads(offers) if offers else ()
         if listed:
             properties = with_supplier(properties, listed)
-        is_bought, has_bom = bought(said, properties.get("supplier")), kind == "assembly" or version > 0
+        is_bought, has_bom = bought(sourcing, properties.get("supplier")), kind == "assembly" or version > 0
         parts[part_id] = RolledItem(
-            number, name, about, properties, key, is_bought, has_bom, said, listed, archived
+            number, name, about, properties, key, is_bought, has_bom, sourcing, listed, archived
         )
     return parts
 
