@@ -345,20 +345,23 @@ def test_pages_read_a_bom_once_and_no_whole_parts(
     def note(_conn: Any, _cursor: Any, sql: str, values: Any, *_: Any) -> None:
         asked.append((sql, values))
 
-    def reads(page: str) -> tuple[int, int]:
+    def reads(page: str) -> tuple[int, int, int]:
         asked.clear()
         assert visitors["viewer"].get(f"/items/{top}{page}").status == 200
         whole = [values for sql, values in asked if "items.origins" in sql and "json_each" in sql]
         lines = sum("FROM bom_lines JOIN items" in sql and "parent_id" in sql for sql, _ in asked)
-        return lines, max((len(json.loads(values[0])) for values in whole), default=0)
+        parts = sum("items.supplier_parts, items.sourcing_type" in sql for sql, _ in asked)
+        return lines, parts, max((len(json.loads(values[0])) for values in whole), default=0)
 
     event.listen(Engine, "before_cursor_execute", note)
     try:
-        found = {page: reads(page) for page in ("/bom", "/order", "?q=1", "?view=flat&q=1", "/changes")}
+        pages = ("/order", "?q=1", "?q=1&sort=cost", "?view=flat&q=1", "/bom", "/changes")
+        found = {page: reads(page) for page in pages}
     finally:
         event.remove(Engine, "before_cursor_execute", note)
-    assert found.pop("/changes")[1] == 1
-    assert set(found.values()) == {(1, 0)}, found
+    assert found.pop("/changes")[2] == 1
+    assert found.pop("/bom") == (1, 0, 0)
+    assert set(found.values()) == {(1, 1, 0)}, found
 
 
 def returned_late(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:

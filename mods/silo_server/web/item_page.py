@@ -205,11 +205,12 @@ class ShownStructure:
 
     def _known(self, children: Collection[int]) -> dict[int, tuple[RolledItem, MassAndCost, Summary | None]]:
         """Read each child, its mass and cost, and its summary; without a BOM it has what it states."""
-        parts = tree.some_parts(self._tx, children)
+        # A filter has read all of them.
+        parts = self.parts if self.look.is_filtered else tree.some_parts(self._tx, children)
         by_item = summaries(self._tx, {child for child in children if parts[child].has_bom})
         return {
-            child: (part, found.as_part if found else own_worth(part.properties), found)
-            for child, part in parts.items()
+            child: (parts[child], found.as_part if found else own_worth(parts[child].properties), found)
+            for child in children
             for found in [by_item.get(child)]
         }
 

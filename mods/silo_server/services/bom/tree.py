@@ -194,8 +194,8 @@ def sought(words: str, item_type: str, parts: Mapping[int, RolledItem]) -> Calla
 
     @cache
     def fitting(child_id: int, child_type: str) -> bool:
-        if item_type and child_type != item_type:
-            return False
+        if not words or (item_type and child_type != item_type):
+            return item_type in ("", child_type)
         part = parts[child_id]
         texts = filter(None, map(part.properties.get, SOUGHT))
         return test(part.part_number, part.name, part.description, *map(str, texts))
