@@ -315,7 +315,9 @@ BOM unchanged|BOM blocked|BOM unregistered|BOM failed|reading {n} s|server {n} s
 it is missing|{n} removed|{n} added|{n} quantity changed|{n} unreferenced|{n} in conflict|{n} broken
 {n} kept as intentional|{n} set to the assembly's quantity|{n} kept at Silo's quantity|{n} refused
 {n} question open|{n} questions open|{n} unreferenced line|{n} unreferenced lines|{n} unregistered
-changes|event streams|summaries to be kept|Supplier|Needed|Ordered|Cost|bought|made|unsaid
+changes|event streams|Link|Part|Qty|Matched|Material|Parts|Source|exact|normalised|wildcard|sub assembly
+zero|parent|remaining|order|{n} warning|{n} warnings|summaries to be kept|Supplier|Needed|Ordered|Cost|bought
+made|unsaid
 {n} conflict|{n} conflicts|at least {low} and at most {high}|viewer|editor|admin|review|released|obsolete
 draft|Draft|archived|changed|mass|size|volume|material|description|quantity {before} → {after}|notes|unit
 source|reason|revision|hidden|unreferenced|metadata|rel type
@@ -326,7 +328,7 @@ String should have at most {n} characters|String should have at least {n} charac
 """
 # What no person reads as it stands, and what has a catalogue of its own.
 _WITHOUT = re.compile(
-    r"silo/(workbench/(gui|pane|preview|register|smoke|headless|settings/__init__)|inertia/|drawing/|"
+    r"silo/(workbench/(gui|pane|preview|register|smoke|headless|settings/__init__)|drawing/page|"
     r"testing\.py|cli/shapes\.py|bom/(headers|standard)\.py|api/wire\.py|"
     r"fcstd/properties\.py)|silo_server/services/bom/(frozen|transfer)\.py"
 )
@@ -351,8 +353,8 @@ _NO_TEXT = re.compile(
             # tables of words in files, link maps, fields, values for programmers
             r"(^|; )\w+; \w+;|^grs; |netto|pièce|einzeln|^(no value|not (set|specified)|nicht |kein )",
             r"^(aucune|sans|sin|nessun) |^name part_number|^(BomTable|MassProps|InertiaReport)\(|import main",
-            r"Link map for|^Each line is a|^as your robot|anything within|silo-mod (links|inertia) FILE",
-            r"^Links of the URDF|parts: \[\]|^STEP, FCStd|\}  #",
+            r"Link map for|Each line is a part|^as your robot|anything within|silo-mod (links|inertia) FILE",
+            r"Links of the URDF that|parts: \[\]|^STEP, FCStd|\}  #|^rule decided|material <|grs; ",
             # commands, and what only repeats a sentence
             r"^\s*silo-mod ([a-z-]+ |\[)|^silo-mod \w+$|^silo-mod \{version\}|^silo-mod: \{(?!text)\w+\}$",
             r"^silo-mod: \{(error\}\. |why\}: )",

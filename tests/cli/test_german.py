@@ -122,6 +122,17 @@ def test_the_language_is_that_of_the_environment(
     assert spoken("not in Silo") == said
 
 
+def test_masses_are_german_for_people_and_english_for_machines(german: None, run: Any) -> None:
+    """Headings, where a mass comes from, and warnings."""
+    arm = Path(__file__).parents[2] / "examples" / "arm" / "arm.step"
+    out = run("inertia", arm).out
+    assert "Es gibt keine Stückliste; die vorgegebene Dichte (1000 kg/m³) wurde verwendet" in out
+    assert not {"Part", "warnings", "whole", "default", "mass"} & set(re.findall(r"\w+", out))
+    assert "There is no BOM" in run("inertia", arm, "--json").out
+    missing = run("inertia", arm.with_name("none.step"))
+    assert (missing.code, "kann nicht geöffnet werden" in missing.err) == (2, True)
+
+
 def test_texts_of_the_pane_are_german_on_the_command_line_too(german: None) -> None:
     """What both show stands in a call for Qt."""
     for text in (

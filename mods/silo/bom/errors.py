@@ -106,7 +106,7 @@ class Sentences:
     """
 
     LONGEST = 1000
-    OURS = re.compile(r"\{(words|role|status)\d*\}")
+    OURS = re.compile(r"\{(words|role|status|decided_by)\d*\}")
 
     def __init__(self, catalogue: Mapping[str, str]) -> None:
         self._catalogue = {text: done for text, done in catalogue.items() if text}
@@ -139,7 +139,9 @@ class Sentences:
             return f"{before}{self(core, whole)}{text[len(before) + len(core) :]}" if core else text
         for between in ("  ", ". ", "; ", ": ", " (", ", "):
             if between in text:
-                return between.join(self(piece, False) for piece in text.split(between))
+                # Behind a path or a name the rest may be a sentence with a colon of its own.
+                pieces = text.split(between, 1 if between == ": " else -1)
+                return between.join(self(piece, False) for piece in pieces)
         core = text.rstrip(").:;?!…")
         return f"{self(core, whole)}{text[len(core) :]}" if core not in ("", text) else text
 

@@ -16,6 +16,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo import spoken
 from silo.bom.errors import ConfigError, Exit, InputError, counted, listed
 from silo.cli import common
 
@@ -252,7 +253,7 @@ def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly, *,
     if quiet:
         from silo.inertia.output import report_warnings
 
-        console(sys.stderr).print(report_warnings(report, whole=not sys.stderr.isatty()))
+        console(sys.stderr).print(report_warnings(report, whole=not sys.stderr.isatty(), say=spoken))
         return
     if args.json:
         from silo.inertia.output import report_json
@@ -262,7 +263,7 @@ def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly, *,
         return
     from silo.inertia.output import report_tables
 
-    console().print(report_tables(report, whole=not sys.stdout.isatty()))
+    console().print(report_tables(report, whole=not sys.stdout.isatty(), say=spoken))
 
 
 def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:

@@ -35,6 +35,9 @@ from silo.inertia.model import CHECK_TOLERANCE, Floats, MassProps, TensorProblem
 from silo.inertia.report import Decided, InertiaReport, LinkResult, PartResult, PartWarning, Source
 from silo.platform import replacing
 
+# Says a finished sentence in the language of a person, as ``silo.spoken`` does.
+Say = Callable[[str], str]
+
 _MARGIN = 1e-14
 """Relative; above what printing fifteen digits may change, far below what matters."""
 
@@ -319,9 +322,8 @@ SOURCE_WORDS = {
 
 def how(part: PartResult) -> str:
     """Say how a part found its row: "normalised, by quantity"."""
-    if part.decided_by in (Decided.ONLY, Decided.SAME_DATA):
-        return part.rule.replace("_", " ")
-    return f"{part.rule.replace('_', ' ')}, by {part.decided_by}"
+    words = part.rule.replace("_", " ")
+    return words if part.decided_by in (Decided.ONLY, Decided.SAME_DATA) else f"{words}, by {part.decided_by}"
 
 
 def material_of(part: PartResult) -> str:
@@ -333,27 +335,27 @@ def material_of(part: PartResult) -> str:
     return f"{text} → {name}" if text else name
 
 
-def report_tables(report: InertiaReport, *, whole: bool = False) -> RenderableType:
-    """Write links, parts and warnings for a terminal.
+def report_tables(report: InertiaReport, *, whole: bool = False, say: Say = str) -> RenderableType:
+    """Write links, parts and warnings for a terminal, in the words of ``say``.
 
     ``whole``: all rows, each on one line, for a pipe.
     """
-    tables = (_links_table(report, whole=whole), _parts_table(report, whole=whole))
-    return Group(tables[0], Text(), tables[1], Text(), report_warnings(report, whole=whole))
+    tables = (_links_table(report, say, whole=whole), _parts_table(report, say, whole=whole))
+    return Group(tables[0], Text(), tables[1], Text(), report_warnings(report, whole=whole, say=say))
 
 
-def _table(title: str, headings: Iterable[str]) -> Table:
+def _table(title: str, headings: Iterable[str], say: Say) -> Table:
     """Lay out a table; ``headings`` of columns that are flush right begin with ">"."""
-    table = Table(title=_plain(title), title_justify="left")
+    table = Table(title=_plain(say(title)), title_justify="left")
     for heading in headings:
-        table.add_column(heading.lstrip(">"), justify="right" if heading[0] == ">" else "left")
+        table.add_column(say(heading.lstrip(">")), justify="right" if heading[0] == ">" else "left")
     return table
 
 
-def _links_table(report: InertiaReport, *, whole: bool) -> Table:
+def _links_table(report: InertiaReport, say: Say, *, whole: bool) -> Table:
     tensor = ">Ixx Iyy Izz / Ixy Ixz Iyz  kg m²"
     headings = ("Link", ">Mass kg", ">Centre of mass m", tensor, ">Parts", ">Warnings")
-    table = _table(f"{report.assembly or 'assembly'}: mass properties", headings)
+    table = _table(f"{report.assembly or 'assembly'}: mass properties", headings, say)
     for link in report.links.values():
         name, mass, com, moments, products, parts = _link_cells(link)
         warnings = str(sum(w.link_name == link.name for w in report.warnings))
@@ -362,10 +364,10 @@ def _links_table(report: InertiaReport, *, whole: bool) -> Table:
     if report.total is not None and not _is_one_body(report):
         table.add_section()
         cells = (
-            "whole assembly",
+            say("whole assembly"),
             _short(report.total.mass),
             _vector(report.total.com, 1.0),
-            f"in no link: {_short(_loose(report))} kg" if report.unclaimed else "",
+            say(f"in no link: {_short(_loose(report))} kg") if report.unclaimed else "",
             str(sum(part.quantity for _, part in report.parts())),
             str(len(report.warnings)),
         )
@@ -394,28 +396,30 @@ def _loose(report: InertiaReport) -> float:
 _PART_HEADINGS = ("Link", "Part", ">Qty", ">Volume cm³", ">Mass kg", "Source", "Matched", "Material")
 
 
-def _part_cells(link: str, part: PartResult) -> tuple[str, ...]:
+def _part_cells(link: str, part: PartResult, say: Say = str) -> tuple[str, ...]:
     return (
-        link or "(no link)",
+        link or say("(no link)"),
         part.name,
         str(part.quantity),
         f"{part.volume * 1e6:.5g}",
         _short(part.mass),
-        SOURCE_WORDS[part.source],
-        how(part),
+        say(SOURCE_WORDS[part.source]),
+        say(how(part)),
         material_of(part),
     )
 
 
-def _parts_table(report: InertiaReport, *, whole: bool) -> RenderableType:
+def _parts_table(report: InertiaReport, say: Say, *, whole: bool) -> RenderableType:
     skip = int(_is_one_body(report))  # the link's name
-    table = _table("Parts and where their masses come from", _PART_HEADINGS[skip:])
+    table = _table("Parts and where their masses come from", _PART_HEADINGS[skip:], say)
     rows = report.parts()
     most = len(rows) if whole else MAX_PART_ROWS
     for link, part in rows[:most]:
-        table.add_row(*map(_plain, _part_cells(link, part)[skip:]), style="yellow" if part.warnings else "")
+        table.add_row(
+            *map(_plain, _part_cells(link, part, say)[skip:]), style="yellow" if part.warnings else ""
+        )
     if len(rows) > most:
-        table.caption = f"… and {len(rows) - most} more; --report parts.csv has them all"
+        table.caption = say(f"… and {len(rows) - most} more; --report parts.csv has them all")
     return table
 
 
@@ -423,23 +427,23 @@ def _is_one_body(report: InertiaReport) -> bool:
     return len(report.links) == 1 and not report.unclaimed
 
 
-def report_warnings(report: InertiaReport, *, whole: bool = False) -> Text:
+def report_warnings(report: InertiaReport, *, whole: bool = False, say: Say = str) -> Text:
     """Write the warnings for a terminal, a line for each cause: mass at stake, parts, the first message.
 
-    ``whole``: with all places.
+    ``whole``: with all places; ``say`` says them in the language of a person.
     """
     if not report.warnings:
-        return Text("No warnings.", style="green")
-    text = Text(f"{counted(len(report.warnings), 'warning')}\n", style="yellow")
+        return Text(say("No warnings."), style="green")
+    text = Text(f"{say(counted(len(report.warnings), 'warning'))}\n", style="yellow")
     for cause in report.causes():
         groups = _grouped(cause.warnings, with_links=not _is_one_body(report))
         where = list(dict.fromkeys(place for places in groups.values() for place in places))
         mass = f"{_short(cause.mass)} kg in " if cause.mass > 0 else ""
         places = ", ".join(where) if whole else listed(where, MAX_PLACES)
         text.append(f"  {mass}{places}: " if where else "  ", style="bold")
-        text.append(_clean(next(iter(groups))[0]))
+        text.append(_clean(say(next(iter(groups))[0])))
         more = f"; {len(groups) - 1} more like it, each in --json and in a report" if len(groups) > 1 else ""
-        text.append(f"{more}  [{cause.code}]\n", style="dim")
+        text.append(f"{say(more)}  [{cause.code}]\n", style="dim")
     return text
 
 
