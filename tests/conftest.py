@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import importlib.util
 import os
 import shutil
@@ -46,6 +47,23 @@ with suppress(ImportError):
     from argon2 import PasswordHasher
 
     PasswordHasher.__init__.__defaults__ = (1, 8, 1, *PasswordHasher.__init__.__defaults__[3:])
+
+# uvicorn looks ten times a second if it is to end, and waits as long again for its connections. Tests end
+# hundreds of servers.
+with suppress(ImportError):
+    import uvicorn.server
+
+    class _Quick:
+        """asyncio with short pauses."""
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(asyncio, name)
+
+        @staticmethod
+        async def sleep(seconds: float) -> None:
+            await asyncio.sleep(seconds / 10)
+
+    uvicorn.server.asyncio = _Quick()
 
 # A shell that runs tests in the background ignores Ctrl-C for them; their programs would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
