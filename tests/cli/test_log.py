@@ -109,6 +109,6 @@ def test_what_changed_in_the_product_since(run: Any, silo: Any, history: str, ge
 def test_what_cannot_be_shown_is_an_error_with_a_reason(run: Any, silo: Any, gearbox: Path) -> None:
     """No file, a file without an item, a server that does not know it."""
     missing = run("log", gearbox.with_name("None.FCStd"))
-    assert (missing.code, "is no file" in missing.err) == (2, True)
+    assert (missing.code, "is not a file. Give the path of an FCStd file" in missing.err) == (2, True)
     unregistered = run("log", gearbox)
     assert (unregistered.code, "register it (silo-mod register)" in unregistered.err) == (2, True)

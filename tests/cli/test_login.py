@@ -6,7 +6,9 @@ from __future__ import annotations
 import io
 import os
 import re
+import select
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -153,3 +155,28 @@ def test_the_shell_completes_every_command(run: Any, shell: str, tmp_path: Path)
     if program is not None:
         (tmp_path / "script").write_text(script)
         subprocess.run([program, "-n", tmp_path / "script"], check=True)
+
+
+@pytest.mark.skipif(shutil.which("zsh") is None, reason="needs zsh")
+def test_zsh_completes_a_command_and_an_option(run: Any, tmp_path: Path) -> None:
+    """As a person types it, in a terminal."""
+    (tmp_path / "script").write_text(run("completion", "zsh").out)
+    begin = f'autoload -Uz compinit && compinit -u -D; eval "$(cat {tmp_path}/script)"; print be"gun"'
+    child, terminal = pytest.importorskip("pty").fork()
+    if child == 0:  # pragma: no cover
+        os.execvpe("zsh", ["zsh", "-f", "-i"], {**os.environ, "TERM": "dumb", "PS1": "% "})
+    try:
+        for typed, shown in (
+            (f"{begin}\n", b"begun"),
+            ("silo-mod who\t", b"whoami"),
+            ("\x15silo-mod sync --rec\t", b"--recursive"),
+        ):
+            os.write(terminal, typed.encode())
+            seen = b""
+            while shown not in seen:
+                assert select.select([terminal], [], [], 60)[0], seen
+                seen += os.read(terminal, 65536)
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        os.close(terminal)

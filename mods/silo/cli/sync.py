@@ -454,7 +454,7 @@ def run_log(args: argparse.Namespace) -> int:
             _show_changes(args, client.get_changes(number, args.since, args.until or ""))
         return Exit.DONE
     if not os.path.isfile(path):
-        raise InputError(f"{args.file} is no file")
+        raise InputError(f"{args.file} is not a file. Give the path of an FCStd file.")
     identity = _identity(args.file, path)
     with common.client_of(args) as client:
         item = _item_of(client, args.file, identity)
