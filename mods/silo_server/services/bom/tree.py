@@ -244,7 +244,12 @@ def leaves_in(graph: Graph, rows: Sequence[FlatRow], closed: Collection[int] = (
         row.line.child_id for row in rows
     ):
         return rows
-    lines = [row.line._replace(state=replace(row.line.state, quantity=float(row.total))) for row in rows]
+    lines = [
+        row.line
+        if row.total == row.line.state.quantity
+        else row.line._replace(state=replace(row.line.state, quantity=float(row.total)))
+        for row in rows
+    ]
     return flatten(Graph(graph.root, {**graph.lines, graph.root.id: lines}), closed)
 
 
