@@ -1,10 +1,10 @@
 # `make demo` and `make test` do all their own set-up; nothing else is needed but python3 (>= 3.11) with venv.
 PYTHON ?= python3
 VENV ?= .venv
-# How many processes share the tests; 0 for none. Half as many again as processors, for tests also wait: for servers,
-# disks and windows. Not more than eight, for each takes some 400 MB, and a container may be shown more processors
-# than it has.
-WORKERS ?= $(shell n=$$(getconf _NPROCESSORS_ONLN || echo 2); n=$$((n + (n + 1) / 2)); echo $$((n < 8 ? n : 8)))
+# How many processes share the tests; 0 for none. Twice as many as processors, for tests also wait: for servers, disks
+# and windows. Not more than eight, for each takes some 400 MB, and a container may be shown more processors than it
+# has.
+WORKERS ?= $(shell n=$$(getconf _NPROCESSORS_ONLN || echo 2); echo $$((n < 4 ? 2 * n : 8)))
 # The queue and the databases write through to the disk, thousands of times: in memory that takes no time. Only where
 # /dev/shm has room for all tests, as much memory again is free for the tests themselves, and programs may be started
 # there.
