@@ -350,12 +350,20 @@ def test_with_json_a_disk_that_says_no_is_an_object_too(run: Any, gearbox: Path,
     assert "taken" in json.loads(ran.out)["error"]["message"]
 
 
+# Commands that ask no server.
+LOCAL = ("mass", "inertia", "links")
+# Commands that take other paths, or no file of FreeCAD's and no server that somebody else runs.
+ELSEWHERE = {
+    *("serve", "backup", "restore", "summaries", "demo", "login", "logout", "install-addon", "completion"),
+    *("schema", "bom-diff", "relink"),
+}
 # Commands that read a file or ask a server, as docs/headless.md lists them.
 FAULTY = {
     **{
         name: WITH_PATHS[name]
-        for name in ("bom", "diff", "sync", "commit", "status", "register", "log", "mass")
+        for name in ("bom", "diff", "sync", "commit", "status", "register", "log", *LOCAL)
     },
+    "where-used": "where-used @ --root .",
     "bom --resolve": "bom @ --resolve",
     "pull": "pull A01-0001",
     "search": "search plate",
@@ -372,6 +380,7 @@ def test_exit_codes_are_those_of_the_table(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Commands by faults; no fault is a stack trace."""
+    assert {line.split()[0] for line in FAULTY.values()} | ELSEWHERE == set(parsers())
     assert run("register", gearbox, "--yes").code == Exit.DONE
     assert run("sync", gearbox, "--recursive").code == Exit.DONE
     url = silo.client.base_url
@@ -398,7 +407,11 @@ def test_exit_codes_are_those_of_the_table(
             codes = []
             for path, address, token in faults.values():
                 about_server = path == gearbox
-                if about_server if command == "mass" else not about_server and "@" not in line:
+                if (
+                    about_server
+                    if command in (*LOCAL, "bom-diff", "where-used")
+                    else not about_server and "@" not in line
+                ):
                     codes.append("–")
                     continue
                 monkeypatch.setenv("SILO_API_URL", address)
