@@ -56,7 +56,7 @@ def still(canvas: Locator, other_than: bytes = b"") -> bytes:
 
     def is_still() -> bool:
         seen.append(picture_of(canvas))
-        in_full = canvas.evaluate("canvas => canvas.parentElement.dataset.drawn") == "in full"
+        in_full = measured(canvas, "canvas => canvas.parentElement.dataset.drawn") == "in full"
         return in_full and seen[-1] == seen[-2] != other_than
 
     wait_until(is_still, "another picture that stays")
@@ -101,7 +101,7 @@ def test_what_is_lit_is_in_the_first_picture(visit: Visit, top: str) -> None:
     page = visit("viewer")
     model = opened(page, f"/items/{top}")
     still(model.locator("canvas"))
-    page.evaluate("Viewer.SETTLED = 1e6, Viewer.SMALL = 1e6")
+    measured(page, "() => (Viewer.SETTLED = Viewer.SMALL = 1e6)")
     page.get_by_role("button", name="Show M1-BOLT in the model").click()
     model.locator("[data-drawn='in part']").wait_for()
     wait_until(

