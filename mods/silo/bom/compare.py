@@ -356,7 +356,8 @@ def summary(diff: BomDiff) -> str:
     ]
     if diff.conflicts:
         parts.append(f"{len(diff.conflicts)} in conflict")
-    return "BOM updated: " + ", ".join(parts)
+    words = ", ".join(parts)
+    return f"BOM updated: {words}"
 
 
 def resolve_url(part_number: str) -> str:
