@@ -150,6 +150,23 @@ def test_english_reads_no_catalogue(run: Any) -> None:
     assert silo._sentences.cache_info().currsize == 0
 
 
+def test_sentences_of_several_parts_are_german_as_a_whole(german: None) -> None:
+    """What is made of a list, of a count, or has a number put into it."""
+    assert spoken("BOM updated: 1 added, 2 unreferenced, 1 in conflict") == (
+        "Stückliste erneuert: 1 hinzugekommen, 2 nicht verwendet, 1 im Konflikt"
+    )
+    hint = "[Silo BOM] F01-0001 has 8 individual links. Consider using a link array (ElementCount)"
+    assert spoken(f"{hint} for cleaner assembly management.").startswith(
+        "[Silo-Stückliste] F01-0001 hat 8 einzelne Verknüpfungen. Eine Anordnung"
+    )
+    copies = (
+        "2 files carry the same Silo identity, that of S01-0001: a.FCStd, b.FCStd. Is it the same part, or"
+    )
+    assert spoken(f"{copies} is one of them a new part that needs its own number?").startswith(
+        "2 Dateien tragen dieselbe Silo-Identität, die von S01-0001: a.FCStd, b.FCStd. Ist es"
+    )
+
+
 def test_names_stay(german: None) -> None:
     """A part may be called as a word of ours, and look like the beginning or the end of a sentence."""
     for name in ("missing", "Open frame", "server", "cover moved", "a: b", "in Silo", "x (file)", "…"):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -316,7 +317,8 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
             return
         self._layout.addWidget(widgets.label(heading(shown.waiting, shown.server.url), bold=True))
         if shown.pause is not None:
-            pause_sentence = pause_text(shown.pause, shown.server.url, time.time(), translate)
+            pause = replace(shown.pause, reason=spoken(shown.pause.reason))
+            pause_sentence = pause_text(pause, shown.server.url, time.time(), translate)
             self._layout.addWidget(widgets.label(plain(pause_sentence, 400), wrap=True))
         ordered = rows(shown.waiting, shown.server.url, shown.theirs, shown.reason, shown.pause)
         first = ordered[: self._most]
