@@ -8,7 +8,6 @@ import os
 import re
 import select
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -162,9 +161,16 @@ def test_zsh_completes_a_command_and_an_option(run: Any, tmp_path: Path) -> None
     """As a person types it, in a terminal."""
     (tmp_path / "script").write_text(run("completion", "zsh").out)
     begin = f'autoload -Uz compinit && compinit -u -D; eval "$(cat {tmp_path}/script)"; print be"gun"'
-    child, terminal = pytest.importorskip("pty").fork()
-    if child == 0:  # pragma: no cover
-        os.execvpe("zsh", ["zsh", "-f", "-i"], {**os.environ, "TERM": "dumb", "PS1": "% "})
+    terminal, inside = pytest.importorskip("pty").openpty()
+    child = subprocess.Popen(
+        ["zsh", "-f", "-i"],
+        stdin=inside,
+        stdout=inside,
+        stderr=inside,
+        env={**os.environ, "TERM": "dumb", "PS1": "% "},
+        start_new_session=True,
+    )
+    os.close(inside)
     try:
         for typed, shown in (
             (f"{begin}\n", b"begun"),
@@ -177,6 +183,6 @@ def test_zsh_completes_a_command_and_an_option(run: Any, tmp_path: Path) -> None
                 assert select.select([terminal], [], [], 60)[0], seen
                 seen += os.read(terminal, 65536)
     finally:
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
+        child.kill()
+        child.wait()
         os.close(terminal)
