@@ -156,12 +156,13 @@ def test_the_shell_completes_every_command(run: Any, shell: str, tmp_path: Path)
         subprocess.run([program, "-n", tmp_path / "script"], check=True)
 
 
+@pytest.mark.usefixtures("needs_pty")
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="needs zsh")
 def test_zsh_completes_a_command_and_an_option(run: Any, tmp_path: Path) -> None:
     """As a person types it, in a terminal."""
     (tmp_path / "script").write_text(run("completion", "zsh").out)
     begin = f'autoload -Uz compinit && compinit -u -D; eval "$(cat {tmp_path}/script)"; print be"gun"'
-    terminal, inside = pytest.importorskip("pty").openpty()
+    terminal, inside = os.openpty()
     child = subprocess.Popen(
         ["zsh", "-f", "-i"],
         stdin=inside,
