@@ -104,7 +104,7 @@ def test_two_people_edit_one_item(api: Api, visit: Visit) -> None:
     mine.get_by_label("Mass [kg]").fill("2")
     mine.get_by_label("Supplier", exact=True).fill("Mine")
     mine.get_by_role("button", name="Save").click()
-    expect(mine.get_by_role("alert")).to_contain_text("admin changed this item while you were editing")
+    expect(mine.get_by_role("alert")).to_contain_text("Meanwhile admin changed this item")
     expect(mine.locator(".hint.warn")).to_have_text("Now in Silo: Theirs")
     expect(mine.get_by_label("Name", exact=True)).to_have_value("Hand lever")
     assert api.get(f"/api/items/{number}")["properties"] == {"supplier": "Theirs", "mass_kg": 1}

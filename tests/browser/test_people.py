@@ -164,7 +164,7 @@ def test_login_leads_where_one_wanted_to_go(machine: dict[str, str], visit: Visi
     page.get_by_label("User name").fill("admin")
     page.get_by_label("Password").fill("not the password")
     page.get_by_role("button", name="Log in").click()
-    expect(page.get_by_role("alert")).to_contain_text("user name or password is wrong")
+    expect(page.get_by_role("alert")).to_contain_text("User name or password is wrong.")
     assert page.locator('#main input[name="next"]').input_value() == path
     inside = visit("viewer")
     inside.goto(path)

@@ -143,7 +143,7 @@ def change(call: Writer, part_number: str, form: Form) -> Response:
         # What others changed and this person did not is taken over; the rest is asked about.
         merged = {**now, **{name: typed.get(name, "") for name in [*edit.mine, *clashes]}}
         problem = _(
-            "%(user)s changed this item while you were editing, so nothing was saved yet.",
+            "Meanwhile %(user)s changed this item, so nothing was saved yet.",
             user=isolate(item.updated_by),
         )
         return _again(call, part_number, FormState(merged, now, [problem], clashes, 412))

@@ -353,7 +353,9 @@ def spoken(text: str) -> str:
 def sentence(text: str) -> str:
     """Write a message as a sentence: a capital first, and a full stop if it has no end."""
     text = spoken(text)
-    return f"{text[:1].upper()}{text[1:]}{'' if not text or text.endswith(('.', '?', '!')) else '.'}"
+    if re.match(r"[^\W\d_]+[ :,]", text):  # a word, no part number
+        text = text[:1].upper() + text[1:]
+    return f"{text}{'' if not text or text.endswith(('.', '?', '!')) else '.'}"
 
 
 def segment(text: str) -> str:
