@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -442,7 +443,8 @@ def test_a_large_file_keeps_little_of_each_link(tmp_path: Path) -> None:
     assert [entry.quantity for entry in found.entries] == [number // 2, number // 2]
     assert [entry.individual_links for entry in found.entries] == [number // 2, number // 2]
     text = len(document._xml.text)
-    assert (peak - text) / number < 1400  # Python 3.14 keeps a tenth more than 3.11
+    most = 1150 if sys.version_info < (3, 14) else 1400  # its objects are larger
+    assert (peak - text) / number < most
     first = document.getObject("Link00000")
     assert first is not None
     assert "properties" not in vars(first)
