@@ -236,6 +236,19 @@ def test_a_second_click_sends_nothing(visit: Visit, user: str) -> None:
     expect(page.get_by_role("rowheader", name="laptop")).to_have_count(1)
 
 
+def test_no_form_is_shown_before_it_is_guarded(api: Api, visit: Visit, user: str) -> None:
+    """Somebody may be quicker than a script that comes later."""
+    (number,) = api.items(1)
+    page = enter(visit, user, "/items")
+    page.add_init_script(
+        "const add = addEventListener; window.addEventListener = (type, ...rest) => {"
+        " if (type === 'beforeunload') window.formsBefore = document.forms.length; add(type, ...rest); }"
+    )
+    page.goto(f"/items/{number}/bom")
+    expect(page.get_by_role("button", name="Add line")).to_be_visible()
+    assert measured(page, "() => window.formsBefore") == 0
+
+
 def test_what_is_typed_in_another_form_is_not_left_without_a_question(
     api: Api, visit: Visit, user: str
 ) -> None:

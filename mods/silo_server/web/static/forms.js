@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// Forms that are sent: a second click sends nothing twice, and what somebody typed into another form of the page
+// Guards forms before any is shown: a second click sends nothing twice, and what somebody typed into another form
 // is not lost without a question.
 
 // The key of a notice is for this page alone: the address that somebody keeps or sends has none.
