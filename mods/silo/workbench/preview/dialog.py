@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from silo.bom.errors import SiloError
 from silo.workbench.gui import widgets
@@ -16,6 +16,7 @@ from silo.workbench.words import counted, plain, spoken, tip, translate
 if TYPE_CHECKING:
     from silo.workbench.preview.flow import PreviewFlow
 
+_DATA = QtCore.Qt.ItemDataRole.UserRole
 # Of the sentences below the table, only the first are broken into lines.
 MOST_WRAPPED = 200
 
@@ -40,8 +41,16 @@ _SIGNS = {
     RowKind.UNCHANGED: "=",
 }
 
-# Columns.
-NUMBERS = (2, 3)
+
+class Column(NamedTuple):
+    """A column of the table: heading, content, and the least and the most width [px]."""
+
+    heading: str
+    text: Callable[[PreviewRow], str]
+    least: int = 0
+    most: int = 0
+    is_number: bool = False
+
 
 # Sentences rather than lines of a BOM.
 _WIDE = (RowKind.GROUP, RowKind.NOT_COUNTED)
@@ -55,6 +64,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self._path, self._flow = path, flow
         self.finished.connect(lambda _result: flow.closed(path))
         self._preview: Preview | None = None
+        self._columns = self._make_columns()
         text = translate("Silo", "BOM in Silo: {name}", name=plain(title, 80))
         layout = widgets.lay_out(self, "SiloPreview", text, 860, 560)
         self._title = widgets.label("", bold=True)
@@ -73,17 +83,27 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
 
     # -- made once --------------------------------------------------------------------------------------
 
-    def _make_table(self) -> Any:
-        headings = (
-            translate("Silo", "Part number"),
-            translate("Silo", "Name"),
-            translate("Silo", "Assembly"),
-            translate("Silo", "In Silo"),
-            translate("Silo", "What a sync does"),
+    def _make_columns(self) -> tuple[Column, ...]:
+        """Make the columns; the last has the rest of the width."""
+        return (
+            Column(
+                translate("Silo", "Part number"),
+                lambda row: f"{_SIGNS.get(row.kind, '')} {row.number}".strip(),
+                130,
+                240,
+            ),
+            Column(translate("Silo", "Name"), lambda row: row.name, 150, 280),
+            Column(translate("Silo", "Assembly"), lambda row: row.cad, 66, 110, is_number=True),
+            Column(translate("Silo", "In Silo"), lambda row: row.silo, 66, 180, is_number=True),
+            Column(translate("Silo", "What a sync does"), lambda row: plain(row.note, MOST_CELL)),
         )
-        tree = widgets.tree("rows", headings, NUMBERS, flat=False)
+
+    def _make_table(self) -> Any:
+        numbers = [number for number, column in enumerate(self._columns) if column.is_number]
+        headings = [column.heading for column in self._columns]
+        tree = widgets.tree("rows", headings, numbers, flat=False)
         tree.setAlternatingRowColors(True)
-        tree.itemDoubleClicked.connect(lambda item, _column: self._show(item))
+        tree.itemDoubleClicked.connect(lambda *_: self._show())
         return tree
 
     def _make_options(self, layout: Any) -> None:
@@ -106,13 +126,13 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self.show_button = button(
             translate("Silo", "Show"),
             "show",
-            lambda: self._show(self.table.currentItem()),
+            self._show,
             translate("Silo", "Select the instances in the 3D view and the tree"),
         )
         self.why_button = button(
             translate("Silo", "Why so many?"),
             "why",
-            lambda: self._why(self.table.currentItem()),
+            self._why,
             translate("Silo", "Show each chain of links and arrays from the assembly to the part"),
         )
         self.refresh_button = button(
@@ -210,16 +230,15 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             self.table.addTopLevelItem(more)
         for number in range(self.table.topLevelItemCount()):
             self._spread(self.table.topLevelItem(number))
-        for column in range(4):
-            self.table.resizeColumnToContents(column)
-        for column, least, most in ((0, 130, 240), (1, 150, 280), (2, 66, 110), (3, 66, 180)):
-            self.table.setColumnWidth(column, min(max(self.table.columnWidth(column) + 12, least), most))
+        for number, column in enumerate(self._columns[:-1]):
+            self.table.resizeColumnToContents(number)
+            width = self.table.columnWidth(number) + 12
+            self.table.setColumnWidth(number, min(max(width, column.least), column.most))
         self._wrap()
 
     def _spread(self, item: Any) -> None:
         """Let sentences use the whole width, and open the items that are short enough."""
-        kind = item.data(1, QtCore.Qt.ItemDataRole.UserRole)
-        item.setFirstColumnSpanned(kind in _WIDE)
+        item.setFirstColumnSpanned(item.data(1, _DATA) in _WIDE)
         item.setExpanded(item.childCount() <= 12)
         for number in range(item.childCount()):
             self._spread(item.child(number))
@@ -234,14 +253,12 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         tree = self.table
         metrics, whole = tree.fontMetrics(), tree.viewport().width() - 2 * tree.indentation() - 12
         items = QtWidgets.QTreeWidgetItemIterator(tree)
-        left = MOST_WRAPPED
+        left, last = MOST_WRAPPED, len(self._columns) - 1
         while left and (item := items.value()) is not None:
-            text = item.data(2, QtCore.Qt.ItemDataRole.UserRole)
-            if item.data(1, QtCore.Qt.ItemDataRole.UserRole) == RowKind.NOT_COUNTED.value:
-                item.setText(0, widgets.broken(text, metrics, whole))
-                left -= 1
-            elif text:
-                item.setText(4, widgets.broken(text, metrics, tree.columnWidth(4) - 12))
+            if text := item.data(2, _DATA):
+                spanned = item.isFirstColumnSpanned()
+                width = whole if spanned else tree.columnWidth(last) - 12
+                item.setText(0 if spanned else last, widgets.broken(text, metrics, width))
                 left -= 1
             items += 1
 
@@ -256,28 +273,24 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
                 yield self._item(row, children)
 
     def _item(self, row: PreviewRow, children: list[Any]) -> Any:
-        sign = _SIGNS.get(row.kind, "")
-        note = plain(row.note, MOST_CELL)
-        texts = [f"{sign} {row.number}".strip(), row.name, row.cad, row.silo, note]
+        texts = [column.text(row) for column in self._columns]
         if row.kind in _WIDE:
-            texts = [" ".join(filter(None, (row.number, row.name or note)))]
+            texts = [" ".join(filter(None, (row.number, row.name or texts[-1])))]
         item = QtWidgets.QTreeWidgetItem(texts)
-        sentence = texts[0] if row.kind is RowKind.NOT_COUNTED else "" if row.kind is RowKind.GROUP else note
-        item.setData(2, QtCore.Qt.ItemDataRole.UserRole, sentence)
+        item.setData(2, _DATA, "" if row.kind is RowKind.GROUP else texts[-1])
         tone = Tone.ERROR if row.number == "✗" else _TONES.get(row.kind, Tone.PLAIN)
-        if tone is not Tone.PLAIN:
-            for column in range(5):
-                item.setForeground(column, widgets.brush(tone, self.table))
-        for column in NUMBERS:
-            item.setTextAlignment(column, QtCore.Qt.AlignmentFlag.AlignRight)
+        for number, column in enumerate(self._columns):
+            if tone is not Tone.PLAIN:
+                item.setForeground(number, widgets.brush(tone, self.table))
+            if column.is_number:
+                item.setTextAlignment(number, QtCore.Qt.AlignmentFlag.AlignRight)
         if row.kind is RowKind.GROUP:
             widgets.embolden(item)
         if row.note:
-            item.setToolTip(0 if row.kind in _WIDE else 4, tip(row.note))
-        counted_in = (row.document, row.assembly, list(map(list, row.parts)))
-        item.setData(0, QtCore.Qt.ItemDataRole.UserRole, (row.document, list(row.objects)))
-        item.setData(3, QtCore.Qt.ItemDataRole.UserRole, counted_in)
-        item.setData(1, QtCore.Qt.ItemDataRole.UserRole, row.kind.value)
+            item.setToolTip(len(texts) - 1, tip(row.note))
+        what = (row.document, list(row.objects), row.assembly, list(map(list, row.parts)))
+        item.setData(0, _DATA, what)
+        item.setData(1, _DATA, row.kind.value)
         item.addChildren(children)
         return item
 
@@ -297,15 +310,19 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
 
     # -- what is asked for ------------------------------------------------------------------------------
 
-    def _show(self, item: Any) -> None:
-        data = item.data(0, QtCore.Qt.ItemDataRole.UserRole) if item is not None else None
-        if data and data[1]:
-            self._flow.show(data[0], tuple(data[1]))
+    def _counted(self) -> Any:
+        """Return what the selected row stands for: document, objects, assembly, parts."""
+        item = self.table.currentItem()
+        return (item.data(0, _DATA) if item is not None else None) or ("", (), "", ())
 
-    def _why(self, item: Any) -> None:
-        data = item.data(3, QtCore.Qt.ItemDataRole.UserRole) if item is not None else None
-        if data and data[2]:
-            document, assembly, parts = data
+    def _show(self) -> None:
+        document, objects, *_ = self._counted()
+        if objects:
+            self._flow.show(document, tuple(objects))
+
+    def _why(self) -> None:
+        document, _, assembly, parts = self._counted()
+        if parts:
             self._flow.why(self._path, document, assembly, [(path, name) for path, name in parts])
 
     def _sync(self) -> None:
