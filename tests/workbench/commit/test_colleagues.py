@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -51,13 +52,20 @@ def colleague(office: Office, name: str, content: bytes, base: int) -> None:
 def committed(office: Office, flow: CommitFlow, name: str, content: bytes) -> Document:
     """A document whose file is revision 1."""
     doc = office.document(name, content)
-    flow.start(doc)
-    office.settle()
+    commit(office, flow, doc)
     return doc
 
 
 def edit(doc: Document, content: bytes) -> None:
     doc.content, doc.changed = content, True
+
+
+def commit(office: Office, flow: CommitFlow, doc: Document, content: bytes | None = None) -> None:
+    """Commit a document, edited before if there is a content, and wait for the end."""
+    if content is not None:
+        edit(doc, content)
+    flow.start(doc)
+    office.settle()
 
 
 class Person:
@@ -74,10 +82,7 @@ class Person:
         look(answers.append)
         self.office.gui.run_until(lambda: self.office.session.idle and answers)
         self.seen = dict(answers[-1])
-        from dataclasses import replace
-
-        rows = []
-        choices = []
+        rows, choices = [], []
         for row in planned.rows:
             theirs = self.seen.get(row.path)
             if theirs is None:
@@ -106,9 +111,7 @@ def test_nothing_is_asked_where_nobody_else_committed(
     doc = committed(office, flow, "Plate", b"one")
     person = Person(office)
     for content in (b"two", b"three"):
-        edit(doc, content)
-        flow.start(doc)
-        office.settle()
+        commit(office, flow, doc, content)
         assert person.seen == {}
     assert office.files("Plate") == [b"one", b"two", b"three"]
 
@@ -121,8 +124,7 @@ def test_a_colleagues_commit_is_a_question_and_nothing_goes_without_a_choice(
     colleague(office, "Plate", b"one less", 1)
     edit(doc, b"one other")
     person = Person(office)
-    flow.start(doc)
-    office.settle()
+    commit(office, flow, doc)
     (theirs,) = person.seen.values()
     assert (theirs.who, theirs.revision, theirs.base, theirs.comment) == ("alice", 2, 1, "less")
     assert theirs.headline == "alice committed revision 2; yours was made from revision 1"
@@ -140,9 +142,7 @@ def test_a_notice_goes_once_the_server_has_nothing_newer(office: Office, flow: C
     flow.start(doc)
     assert (len(office.desk.asked), person.seen, office.session.shown.newer) == (1, {}, {})
     office.settle()
-    edit(doc, b"three")
-    flow.start(doc)
-    office.settle()
+    commit(office, flow, doc, b"three")
     assert (len(office.desk.asked), office.files("Plate")) == (1, [b"one", b"two", b"three"])
 
 
@@ -167,14 +167,11 @@ def test_on_top_at_a_persons_word(office: Office, flow: CommitFlow) -> None:
     colleague(office, "Plate", b"one less", 1)
     edit(doc, b"one other")
     person = Person(office, Choice.ON_TOP)
-    flow.start(doc)
-    office.settle()
+    commit(office, flow, doc)
     newest = office.silo.revisions(number_of(office, "Plate"))[0]
     assert newest.comment == "mine (on top of revision 2 by alice, which is not in it)"
     assert newest.base_revision == 2
-    edit(doc, b"next")
-    flow.start(doc)
-    office.settle()
+    commit(office, flow, doc, b"next")
     assert person.seen == {}
     assert office.files("Plate")[-1] == b"next"
 
@@ -189,21 +186,25 @@ def test_other_choices_are_handed_on(office: Office, flow: CommitFlow) -> None:
     wanted: list[Any] = []
     flow.choose = lambda *what: wanted.append(what)
     Person(office, Choice.TAKE)
-    flow.start(top)
-    office.settle()
+    commit(office, flow, top)
     assert office.files("Top") == [b"top", b"new top"]
     assert office.files("Leaf") == [b"one", b"theirs"]
     ((path, theirs, choice),) = wanted
     assert (path, theirs.revision, choice) == (leaf.FileName, 2, Choice.TAKE)
 
 
-def test_without_the_dialog_it_waits_in_the_pane(office: Office, flow: CommitFlow) -> None:
-    """The look at sending catches it; file and BOM are held with the question."""
+@pytest.mark.parametrize("hashed", [True, False])
+def test_without_the_dialog_it_waits_in_the_pane(office: Office, flow: CommitFlow, *, hashed: bool) -> None:
+    """The look at sending catches it; file and BOM are held with the question.
+
+    hashed
+        if not, nobody knows what the document is made from.
+    """
     doc = committed(office, flow, "Plate", b"one")
     colleague(office, "Plate", b"one less", 1)
-    edit(doc, b"one other")
-    flow.start(doc)
-    office.settle()
+    if not hashed:
+        office.desk.documents.bases.clear()
+    commit(office, flow, doc, b"one other")
     (held,) = office.session.shown.waiting
     assert (held.state, held.newer["revision_number"]) == (State.HELD, 2)
     assert office.files("Plate") == [b"one", b"one less"]
@@ -219,14 +220,12 @@ def test_the_pane_has_the_difference_of_a_held_commit(office: Office, flow: Comm
     bolt, top = office.document("Bolt"), office.document("Top")
     Path(bolt.FileName).write_bytes(part("Bolt", uuid=bolt.identity).bytes())
     top.content, top.parts = assembly(top.identity, 6), {bolt: 6}
-    flow.start(top)
-    office.settle()
+    commit(office, flow, top)
     colleague(office, "Top", assembly(top.identity, 4), 1)
     edit(top, assembly(top.identity, 8))
     top.parts = {bolt: 8}
     download, office.silo.download_file = office.silo.download_file, lost  # type: ignore[method-assign]
-    flow.start(top)
-    office.settle()
+    commit(office, flow, top)
     (held,) = office.session.shown.waiting
     assert (held.newer["revision_number"], office.session.shown.theirs) == (2, {})
     office.silo.download_file = download  # type: ignore[method-assign]
@@ -279,12 +278,10 @@ def test_a_file_that_somebody_replaced_is_asked_about_also_offline(office: Offic
         return None
 
     office.desk.decide = person
-    flow.start(doc)
-    office.settle()
+    commit(office, flow, doc)
     assert [row.replaced for row in asked[0].rows] == [True]
     office.desk.decide = lambda planned, _look: CommitAnswer(planned.rows, "mine")
-    flow.start(doc)
-    office.settle()
+    commit(office, flow, doc)
     kept = [path.read_bytes() for path in (office.folder / "data" / "kept-aside").rglob("*.FCStd")]
     assert kept == [b"by a colleague, not committed"]
     assert office.files("Plate")[-1] == b"mine"
@@ -345,12 +342,6 @@ def save(opened: Opened, doc: Doc, content: bytes) -> None:
     opened.slotFinishSaveDocument(doc, doc.FileName)
 
 
-def sha(content: bytes) -> str:
-    import hashlib
-
-    return hashlib.sha256(content).hexdigest()
-
-
 @pytest.mark.parametrize("busy", [False, True], ids=["a worker is there", "it has no time"])
 def test_own_saves_keep_the_origin_over_a_restart(tmp_path: Path, busy: bool) -> None:
     """Opened, saved twice, opened again by another FreeCAD: still made from what was opened first."""
@@ -365,9 +356,9 @@ def test_own_saves_keep_the_origin_over_a_restart(tmp_path: Path, busy: bool) ->
         assert not opened.of(doc).replaced
     if busy:
         opened.begin(lambda call: call())
-    assert opened.of(doc).settle(store) == sha(b"one")
+    assert opened.of(doc).settle(store) == sha256(b"one").hexdigest()
     again = Opened(lambda: store)
-    assert again.of(opened_as(again, path)).settle(store) == sha(b"one")
+    assert again.of(opened_as(again, path)).settle(store) == sha256(b"one").hexdigest()
 
 
 @pytest.mark.parametrize("is_sent", [False, True], ids=["it waits", "it is in Silo"])
@@ -391,7 +382,7 @@ def test_saved_first_and_committed_then_nothing_is_asked_after_a_restart(
         for content in contents:
             save(opened, doc, content)
         base = opened.of(doc)
-        assert base.settle(store) == (sha(b"two") if round_ else UNKNOWN)
+        assert base.settle(store) == (sha256(b"two").hexdigest() if round_ else UNKNOWN)
         commit = Commit(str(path), float(round_), "Plate", identity, file=path, origin=base.settle(store))
         base.committed(store.add(commit, client.base_url).sha256)
         if is_sent:
@@ -411,7 +402,7 @@ def test_a_file_that_another_wrote_is_replaced_and_its_origin_stays(tmp_path: Pa
     doc, theirs = opened_as(mine, path), opened_as(other, path)
     save(other, theirs, b"by the other")
     assert (mine.of(doc).replaced, other.of(theirs).replaced) == (True, False)
-    assert mine.of(doc).settle(store) == sha(b"one")
+    assert mine.of(doc).settle(store) == sha256(b"one").hexdigest()
 
 
 def test_a_document_that_was_made_here_has_no_origin(tmp_path: Path) -> None:
@@ -424,7 +415,7 @@ def test_a_document_that_was_made_here_has_no_origin(tmp_path: Path) -> None:
     doc.FileName = str(path)
     opened.slotChangedDocument(doc, "FileName")
     save(opened, doc, b"new")
-    assert opened.of(doc).settle(store) != sha(b"somebody's")
+    assert opened.of(doc).settle(store) != sha256(b"somebody's").hexdigest()
 
 
 def test_a_commit_is_what_comes_after_it_is_made_from(tmp_path: Path) -> None:
@@ -433,8 +424,8 @@ def test_a_commit_is_what_comes_after_it_is_made_from(tmp_path: Path) -> None:
     path.write_bytes(b"one")
     opened = Opened(lambda: store)
     doc = opened_as(opened, path)
-    opened.of(doc).committed(sha(b"two"))
-    assert opened.of(doc).settle(store) == sha(b"two")
+    opened.of(doc).committed(sha256(b"two").hexdigest())
+    assert opened.of(doc).settle(store) == sha256(b"two").hexdigest()
     opened.slotDeletedDocument(doc)
     assert opened.of(doc).origin == ""
     assert opened.of(doc).stamp == stamp_of(str(path))
@@ -444,8 +435,7 @@ def two_bolts(office: Office, flow: CommitFlow) -> tuple[Document, Document]:
     """Top with two bolts, committed as revision 1, and the bolt."""
     bolt, top = office.document("Bolt"), office.document("Top", b"two bolts")
     top.parts[bolt] = 2
-    flow.start(top)
-    office.settle()
+    commit(office, flow, top)
     return top, bolt
 
 
@@ -522,16 +512,3 @@ def test_a_bom_alone_of_a_file_that_was_saved_since(office: Office, flow: Commit
     office.settle()
     assert (bolts(office), office.session.shown.waiting) == ([3], ())
     assert office.desk.documents.base(top).origin == sha256(b"two bolts").hexdigest()
-
-
-def test_a_file_of_which_nobody_knows_the_origin_is_asked_about(office: Office, flow: CommitFlow) -> None:
-    """It was not hashed when it was opened: that is no reason to send it over a colleague's."""
-    doc = committed(office, flow, "Plate", b"one")
-    colleague(office, "Plate", b"one less", 1)
-    office.desk.documents.bases.clear()
-    edit(doc, b"from somewhere")
-    flow.start(doc)
-    office.settle()
-    assert office.files("Plate") == [b"one", b"one less"]
-    (held,) = office.session.shown.waiting
-    assert (held.state, held.newer["revision_number"]) == (State.HELD, 2)

@@ -202,15 +202,19 @@ def test_a_disk_that_does_not_take_it_is_a_box(office: Office, flow: CommitFlow)
     assert titles(office) == ["Not committed: Bolt"]
 
 
-class OtherDisk(Store):
-    """The project is on another disk than the outbox: no second names, and copies take their time."""
+class SlowDisk(Store):
+    """Copies wait until the test lets them go.
 
-    def __init__(self, path: Path) -> None:
+    apart
+        the project is on another disk than the outbox, so that there are no second names.
+    """
+
+    def __init__(self, path: Path, *, apart: bool = False) -> None:
         super().__init__(path)
-        self.gate = threading.Event()
+        self.gate, self.apart = threading.Event(), apart
 
     def hold(self, path: str, key: str) -> Path | None:
-        return None
+        return None if self.apart else super().hold(path, key)
 
     def finish(self, *arguments: Any, **more: Any) -> str:
         self.gate.wait(60)
@@ -219,7 +223,7 @@ class OtherDisk(Store):
 
 def test_a_save_before_the_copy_is_made_is_no_part_of_the_commit(office: Office, flow: CommitFlow) -> None:
     """The commit is reported as not done; a BOM never goes with a later file."""
-    office.session.outbox = disk = OtherDisk(office.session.outbox.path)
+    office.session.outbox = disk = SlowDisk(office.session.outbox.path, apart=True)
     doc = office.document("Plate", b"as committed")
     flow.start(doc)
     office.desk.pass_turns()
@@ -246,18 +250,6 @@ def test_the_bom_is_that_of_the_file_whatever_is_edited_meanwhile(office: Office
     number = next(s.item.part_number for s in office.silo.items.values() if s.item.name == "Top")
     assert office.files("Top") == [b"two bolts"]
     assert [line.quantity for line in office.silo.get_bom(number)] == [2]
-
-
-class SlowDisk(Store):
-    """Copies wait until the test lets them go."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        self.gate = threading.Event()
-
-    def finish(self, *arguments: Any, **more: Any) -> str:
-        self.gate.wait(60)
-        return super().finish(*arguments, **more)
 
 
 def test_a_second_commit_before_the_first_is_copied_is_made_from_it(office: Office, flow: CommitFlow) -> None:

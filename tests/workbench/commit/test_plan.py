@@ -86,17 +86,12 @@ def test_changed_documents_come_leaves_first_and_the_asked_one_last() -> None:
     """Spec, design decision 3: each parent refers to children that are committed already."""
     leaf = Doc("Leaf", changed=True)
     sub = Doc("Sub", leaf, changed=True)
-    top = Doc("Top", Doc("Untouched"), sub, leaf, changed=True)
+    deep = Doc("Deep", changed=True)
+    top = Doc("Top", Doc("Untouched", Doc("Lower", deep)), sub, leaf, changed=True)
+    deep.OutList.append(top)  # a ring
     planned = plan(top, Documents())
-    assert names(planned) == ["Leaf", "Sub", "Top"]
-    assert [row.is_top for row in planned.rows] == [False, False, True]
-
-
-def test_a_saved_document_is_committed_all_the_same() -> None:
-    """The person asked for it; the server says whether it is news."""
-    planned = plan(Doc("Top", Doc("Part")), Documents())
-    assert [(row.label, row.state) for row in planned.rows] == [("Top", DocumentState.SAVED)]
-    assert planned.is_simple
+    assert names(planned) == ["Deep", "Leaf", "Sub", "Top"]
+    assert [row.is_top for row in planned.rows] == [False] * 3 + [True]
 
 
 def test_what_was_only_recomputed_is_listed_and_not_wanted() -> None:
@@ -114,20 +109,6 @@ def test_what_was_only_recomputed_is_listed_and_not_wanted() -> None:
 def test_an_unregistered_one_is_asked_about() -> None:
     """Whether to register it as well."""
     assert not plan(Doc("Top"), Documents(), unregistered=True).is_simple
-
-
-def test_a_leaf_below_untouched_documents_is_found() -> None:
-    """What was changed three levels down belongs to the commit."""
-    deep = Doc("Deep", changed=True)
-    top = Doc("Top", Doc("Middle", Doc("Lower", deep)))
-    assert names(plan(top, Documents())) == ["Deep", "Top"]
-
-
-def test_documents_that_link_to_each_other() -> None:
-    """A ring ends, each document once, the asked one last."""
-    one, two = Doc("One", changed=True), Doc("Two", changed=True)
-    one.OutList, two.OutList = [two], [one]
-    assert names(plan(one, Documents())) == ["Two", "One"]
 
 
 @pytest.mark.parametrize(
@@ -182,29 +163,16 @@ def taken(rows: Iterable[DocumentRow], documents: Documents, *, unknown: str = "
 
 
 def test_each_is_saved_then_taken() -> None:
-    """In the order of the plan."""
+    """In the order of the plan, also what was only recomputed; what is saved already is not saved again."""
     documents = Documents()
-    top = Doc("Top", Doc("Sub", changed=True), changed=True)
+    top = Doc("Top", Doc("Sub", changed=True, recomputed=True), changed=True)
     sub, whole = taken(plan(top, documents).rows, documents)
     assert documents.saved == ["Sub", "Top"]
     assert [one.snapshot and one.snapshot.identity for one in (sub, whole)] == ["Sub-id", "Top-id"]
     assert [one.held for one in (sub, whole)] == [Path("/held") / sub.key, Path("/held") / whole.key]
     assert sub.key != whole.key
-
-
-def test_what_was_only_recomputed_is_saved_where_a_person_wants_it() -> None:
-    """FreeCAD's mark goes away."""
-    documents, leaf = Documents(), Doc("Leaf", changed=True, recomputed=True)
-    planned = plan(Doc("Top", leaf), documents)
-    taken(planned.rows, documents)
-    assert documents.saved == ["Leaf"]
-
-
-def test_what_is_saved_already_is_not_saved_again() -> None:
-    """Its time stamp would change for nothing."""
-    documents = Documents()
-    taken(plan(Doc("Top"), documents).rows, documents)
-    assert documents.saved == []
+    taken(plan(Doc("Saved"), documents).rows, documents)
+    assert documents.saved == ["Sub", "Top"]
 
 
 def test_a_failure_does_not_stop_the_others() -> None:

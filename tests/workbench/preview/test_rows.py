@@ -17,9 +17,11 @@ from server_testing import sqlite_database
 from silo.api.client import SiloClient
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.model import BomEntry, Extraction
+from silo.bom_sync import resolve, sync
 from silo.cli.common import read_assembly
 from silo.cli.main import main
 from silo.registering.orders import proposals_for, register_all
+from silo.testing import FakeSilo
 from silo.workbench.commit.plan import Snapshot
 from silo.workbench.preview.flow import Preview, PreviewRow, RowKind, ask, rows, summary, to_sync
 from silo.workbench.session import Control
@@ -172,9 +174,6 @@ def test_the_summary_counts_the_same(preview: Preview) -> None:
 
 def test_a_sub_assembly_whose_own_bom_is_not_in_silo_is_named(tmp_path: Path) -> None:
     """The lines of the assembly agree: that is not all that a person wants to know."""
-    from silo.bom_sync import resolve, sync
-    from silo.testing import FakeSilo
-
     silo = FakeSilo()
     uuids = {
         name: silo.create_item("kindred-rd", "A01", name, item_type="part", properties={}).id
@@ -214,66 +213,15 @@ def test_a_sync_with_its_sub_assemblies_sends_those_that_differ_first(
 def test_an_unregistered_sub_assembly_can_be_opened_too(story: GearboxStory) -> None:
     """Its own lines are below it, as the diff lists them."""
     found = read_assembly(str(story.top))
-    entries = tuple(_without_identity(entry) if entry.is_assembly else entry for entry in found.entries)
+    entries = tuple(replace(e, silo_uuid=None) if e.is_assembly else e for e in found.entries)
     table = rows(preview_of(story, replace(found, entries=entries)))
     (group,) = (row for row in table if row.kind is RowKind.GROUP and row.name.startswith("Without"))
     gearbox = next(row for row in group.children if row.name.startswith("Gearbox"))
     assert {row.name for row in gearbox.children} == {"Housing", "Shaft", "Gear"}
 
 
-def _without_identity(entry: BomEntry) -> BomEntry:
-    return replace(entry, silo_uuid=None)
-
-
-def nested(depth: int) -> Extraction:
-    """Each level holds the two assemblies below it: 2 ** depth lines when written out."""
-    below: tuple[BomEntry, ...] = ()
-    for level in range(depth):
-        below = tuple(
-            BomEntry(
-                f"/v/{side}{level}.FCStd", None, label=f"{side}{level}", is_assembly=True, children=below
-            )
-            for side in "AB"
-        )
-    return Extraction(BomEntry("/v/Top.FCStd", label="Top", is_assembly=True, level=0), below)
-
-
-def size(table: Iterable[PreviewRow]) -> int:
-    return sum(1 + size(row.children) for row in table)
-
-
-def test_a_tree_that_nobody_could_read_is_cut(story: GearboxStory) -> None:
-    """Thirty levels of two assemblies are a billion lines; the own lines of the top are all there."""
-    extraction = nested(30)
-    uuids = {name: str(uuid.uuid4()) for name in ("A", "B")}
-    for name, identity in uuids.items():
-        story.client.create_item("kindred-rd", "A01", name, item_type="assembly", idempotency_key=identity)
-    table = rows(preview_of(story, _known(extraction, uuids)))
-    assert size(table) < 5000
-    assert [row.name for row in table[:2]] == ["A", "B"]
-    assert "more" in _last(table[0]).name
-
-
-def _known(extraction: Extraction, uuids: dict[str, str]) -> Extraction:
-    done: dict[int, BomEntry] = {}
-
-    def known(entry: BomEntry) -> BomEntry:
-        if id(entry) not in done:
-            children = tuple(known(child) for child in entry.children)
-            done[id(entry)] = replace(entry, silo_uuid=uuids[entry.label[0]], children=children)
-        return done[id(entry)]
-
-    return replace(extraction, entries=tuple(known(entry) for entry in extraction.entries))
-
-
-def _last(row: PreviewRow) -> PreviewRow:
-    return _last(row.children[-1]) if row.children else row
-
-
 def test_a_missing_component_is_a_row_of_its_own_kind(tmp_path: Path) -> None:
     """With its quantity and where it should be; the line that the server knows it by stays."""
-    from silo.testing import FakeSilo
-
     silo = FakeSilo()
     uuids = {}
     for name in ("Top", "Lid", "Pin"):
@@ -283,8 +231,6 @@ def test_a_missing_component_is_a_row_of_its_own_kind(tmp_path: Path) -> None:
         BomEntry(str(tmp_path / f"{name}.FCStd"), uuids[name], quantity=2, object_name="Body")
         for name in ("Lid", "Pin")
     ]
-    from silo.bom_sync import resolve, sync
-
     sync(resolve(Extraction(top, tuple(known)), silo), silo, sync_id="one")
     lost = replace(known[0], silo_uuid=None, missing=True, label="Lid")
     preview = ask(

@@ -25,28 +25,44 @@ from silo.outbox.send import Sent, send_all
 from silo.outbox.store import OutboxError, Store
 from silo.platform import stamp_of
 from silo.workbench.commit.opened import Base
-from silo.workbench.session.online import LastIds
+from silo.workbench.session.online import LastIds, Online
 
 
-def commit(office: Office, name: str, content: bytes = b"content", *, hold: bool = True) -> Commit:
+def commit(
+    office: Office, name: str, content: bytes = b"content", *, hold: bool = False, identity: str = ""
+) -> Commit:
     """A commit of a document that is saved."""
     doc = office.document(name, content)
     office.desk.documents.save(doc)
-    made = Commit(doc.FileName, 1.0, name, doc.identity, file=Path(doc.FileName))
-    held = office.session.outbox.hold(doc.FileName, made.key) if hold else None
-    return made if held is None else Commit(doc.FileName, 1.0, name, doc.identity, key=made.key, file=held)
+    made = Commit(doc.FileName, 1.0, name, identity or doc.identity, file=Path(doc.FileName))
+    return replace(made, file=office.session.outbox.hold(doc.FileName, made.key)) if hold else made
 
 
-def failing(_error: SiloError) -> None:
-    raise AssertionError(_error)
+def keep(office: Office, made: Commit, base: Base | None = None) -> None:
+    """Hand a commit to the session, which must not fail."""
+
+    def failing(error: SiloError) -> None:
+        raise AssertionError(error)
+
+    office.session.keep(made, failing, base)
 
 
-def test_a_commit_is_kept_and_sent(office: Office) -> None:
-    """And nothing is left of it."""
-    office.session.keep(commit(office, "Bolt"), failing)
+def begin(office: Office) -> Online:
+    """Start the work of the session, without a live connection."""
+    office.session.begin(live=False)
     office.settle()
-    assert office.files("Bolt") == [b"content"]
-    assert (office.session.shown.waiting, [sent.part_number for sent in office.sent]) == ((), ["M01-0001"])
+    return office.session._need_online()
+
+
+def announce(online: Online, identity: str, revision: int) -> None:
+    """A colleague's commit, as the server tells it."""
+    data = {"id": identity, "part_number": "M01-0001", "revision_number": revision, "user": "alice"}
+    online._heard(ServerEvent("9", "revision.created", data), online.address)
+
+
+def restore(online: Online) -> None:
+    """The server says that it counts anew."""
+    online._heard(ServerEvent(None, RESET, {}), online.address)
 
 
 DRAWING = "print('a banner'); from silo.drawing.models import NoDrawer, work_with; work_with(NoDrawer)"
@@ -59,9 +75,7 @@ def test_a_model_is_drawn_after_its_commit_arrived(
     """By a child, which may print a banner, and die once while it starts; if it dies again, it is a line."""
     monkeypatch.chdir(office.folder)
     office.session._drawing = lambda: [sys.executable, "-c", f"import os\n{dies}\n{DRAWING}"]
-    doc = office.document("Box", Doc("Box").save(office.folder / "made.FCStd").read_bytes())
-    office.desk.documents.save(doc)
-    office.session.keep(Commit(doc.FileName, 1.0, "Box", doc.identity, file=Path(doc.FileName)), failing)
+    keep(office, commit(office, "Box", Doc("Box").save(office.folder / "made.FCStd").read_bytes()))
     office.settle()
     assert office.session._models.left(60) == 0
     office.gui.run_all()
@@ -76,14 +90,13 @@ def test_a_model_is_drawn_after_its_commit_arrived(
 def test_a_restored_server_that_counts_anew_gives_our_number_to_a_colleague(office: Office) -> None:
     """Before it says so, an event with that number is our own."""
     made = commit(office, "Bolt")
-    office.session.keep(made, failing)
+    keep(office, made)
     office.settle()
     online = office.session._need_online()
-    data = {"id": made.identity, "part_number": "M01-0001", "revision_number": 1, "user": "alice"}
-    announced = ServerEvent("9", "revision.created", data)
-    for events, names in (((announced,), []), ((ServerEvent(None, RESET, {}), announced), ["alice"])):
-        for event in events:
-            online._heard(event, online.address)
+    for restored, names in ((False, []), (True, ["alice"])):
+        if restored:
+            restore(online)
+        announce(online, made.identity, 1)
         office.gui.run_all()
         assert [one.who for one in office.session.shown.newer.values()] == names
 
@@ -92,19 +105,16 @@ def test_a_restored_server_that_counts_anew_gives_our_number_to_a_colleague(offi
 def test_after_a_restore_a_colleagues_commit_that_is_gone_is_no_news(office: Office, kept: int) -> None:
     """``kept``: so many of the two announced revisions are in the backup; 0: not even the item is."""
     made = commit(office, "Bolt")
-    office.session.begin(live=False)
-    office.settle()
-    online = office.session._need_online()
+    online = begin(office)
     for _ in range(kept):
         office.silo.upload_file("M01-0001", made.path, "theirs")
     if not kept:
         office.silo.items.clear()
-    data = {"id": made.identity, "part_number": "M01-0001", "revision_number": 2, "user": "alice"}
-    online._heard(ServerEvent("9", "revision.created", data), online.address)
+    announce(online, made.identity, 2)
     office.gui.run_all()
     assert [one.revision for one in office.session.shown.newer.values()] == [2]
     # Whether it is still there is asked at once, and the answer may be quick.
-    online._heard(ServerEvent(None, RESET, {}), online.address)
+    restore(online)
     office.settle()
     assert [one.revision for one in office.session.shown.newer.values()] == ([2] if kept == 2 else [])
 
@@ -112,9 +122,7 @@ def test_after_a_restore_a_colleagues_commit_that_is_gone_is_no_news(office: Off
 def test_looking_for_what_a_restore_took_can_be_stopped(office: Office) -> None:
     """A request for each notice, of which a day may bring hundreds; those stay then."""
     made = commit(office, "Bolt")
-    office.session.begin(live=False)
-    office.settle()
-    online, asked = office.session._need_online(), list[str]()
+    online, asked = begin(office), list[str]()
 
     def stop(name: str) -> None:
         asked.append(name)
@@ -122,10 +130,9 @@ def test_looking_for_what_a_restore_took_can_be_stopped(office: Office) -> None:
 
     office.silo.before = stop
     for number in (made.identity, "another"):
-        data = {"id": number, "part_number": "M01-0001", "revision_number": 2, "user": "alice"}
-        online._heard(ServerEvent("9", "revision.created", data), online.address)
+        announce(online, number, 2)
     office.gui.run_all()
-    online._heard(ServerEvent(None, RESET, {}), online.address)
+    restore(online)
     office.settle()
     assert (asked, len(office.session.shown.newer)) == (["revisions"], 2)
 
@@ -154,7 +161,7 @@ def _slow(office: Office) -> SlowStore:
 def test_closing_waits_for_the_disk(office: Office, slow: SlowStore) -> None:
     """Twelve commits, closed at once: all of them are copied, none is sent, none is lost."""
     for number in range(12):
-        office.session.keep(commit(office, f"P{number}", b"%d" % number), failing)
+        keep(office, commit(office, f"P{number}", b"%d" % number, hold=True))
     counts: list[int] = []
 
     def wait(left: Any) -> None:
@@ -196,7 +203,7 @@ def test_a_commit_that_a_full_disk_kept_is_not_reported_as_lost(office: Office, 
     office.session.outbox = disk = FullDisk(office.session.outbox.path)
     made = commit(office, "Bolt", hold=hold)
     base = Base(made.path, stamp_of(made.path), UNKNOWN)
-    office.session.keep(made, failing, base)
+    keep(office, made, base)
     office.session._waits(((), None))  # read before there was anything
     office.settle()
     assert base.origin == hashlib.sha256(b"content").hexdigest()  # the next commit is made from this one
@@ -207,50 +214,36 @@ def test_a_commit_that_a_full_disk_kept_is_not_reported_as_lost(office: Office, 
     assert (office.files("Bolt"), office.session.shown.waiting) == ([b"content"], ())
 
 
-@pytest.mark.parametrize("hold", [True, False])
-def test_a_commit_that_is_being_copied_is_not_sent_by_another_worker(
-    office: Office, slow: SlowStore, *, hold: bool
+@pytest.mark.parametrize(("hold", "elsewhere"), [(True, False), (False, False), (True, True)])
+def test_a_document_knows_what_it_is_made_from_whoever_sends_its_commit(
+    office: Office, slow: SlowStore, *, hold: bool, elsewhere: bool
 ) -> None:
-    """Or the document would not know what it is made from now, and its next commit would be held."""
-    made, later = commit(office, "Bolt", hold=hold), commit(office, "Plate")
+    """No other worker sends what is being copied; another program, such as the command line, may."""
+    made, later = commit(office, "Bolt", hold=hold), commit(office, "Plate", hold=True)
     base = Base(made.path, stamp_of(made.path), UNKNOWN)
-    office.session.keep(later, failing)
-    office.session.keep(replace(made, origin=UNKNOWN), failing, base)
+    keep(office, later)
+    keep(office, replace(made, origin=UNKNOWN), base)
     wait_until(lambda: len(slow.entries()) == 2, "both rows are there")
     # The copy of the other one is under way; meanwhile the sender comes along.
-    assert not send_all(slow, office.silo).sent
-    assert [entry.state for entry in slow.entries()] == [State.KEEPING] * 2
+    assert len(send_all(Store(slow.path) if elsewhere else slow, office.silo).sent) == 2 * elsewhere
+    assert [entry.state for entry in slow.entries()] == [State.KEEPING] * 2 * (not elsewhere)
     slow.gate.set()
     office.settle()
     assert office.session.shown.waiting == ()
     assert base.origin == hashlib.sha256(b"content").hexdigest()
 
 
-def test_a_commit_that_another_program_has_sent_is_known_as_well(office: Office, slow: SlowStore) -> None:
-    """Such as the command line, while this one was about to copy it."""
-    made, later = commit(office, "Bolt"), commit(office, "Plate")
-    base = Base(made.path, stamp_of(made.path), UNKNOWN)
-    office.session.keep(later, failing)
-    office.session.keep(replace(made, origin=UNKNOWN), failing, base)
-    wait_until(lambda: len(slow.entries()) == 2, "both rows are there")
-    assert len(send_all(Store(slow.path), office.silo).sent) == 2
-    slow.gate.set()
-    office.settle()
-    assert base.origin == hashlib.sha256(b"content").hexdigest()
-
-
 def test_who_does_not_want_to_wait_loses_nothing_either(office: Office, slow: SlowStore) -> None:
     """No row waits for a copy; the next start makes these from the second names."""
     for number in range(12):
-        office.session.keep(commit(office, f"P{number}", b"%d" % number), failing)
+        keep(office, commit(office, f"P{number}", b"%d" % number, hold=True))
     office.session._rows.left(30.0)
     # The first copy hangs, and nobody wants to wait for it.
     office.session.close(lambda left: None)
     assert [entry.state for entry in Store(slow.path).entries()] == [State.KEEPING] * 12
     slow.gate.set()
     office.session = office.start()
-    office.session.begin(live=False)
-    office.settle()
+    begin(office)
     assert [office.files(f"P{number}") for number in range(12)] == [[b"%d" % number] for number in range(12)]
     assert Store(slow.path).entries() == ()
 
@@ -265,33 +258,19 @@ def test_closing_does_not_wait_for_the_network(office: Office) -> None:
             released.wait(60)
 
     office.silo.before = hang
-    office.session.keep(commit(office, "Bolt"), failing)
+    keep(office, commit(office, "Bolt", hold=True))
     office.gui.run_until(reached.is_set)
     office.session.close(lambda left: left(30.0))
     assert [entry.label for entry in Store(office.session.outbox.path).entries()] == ["Bolt"]
     released.set()
 
 
-def test_what_an_earlier_freecad_left_is_sent_at_the_start(office: Office) -> None:
-    """Nothing is opened and nothing is pressed."""
-    store = Store(office.session.outbox.path)
-    doc = office.document("Bolt")
-    office.desk.documents.save(doc)
-    store.add(Commit(doc.FileName, 1.0, "Bolt", doc.identity, file=Path(doc.FileName)))
-    office.session.begin(live=False)
-    office.settle()
-    assert office.files("Bolt") == [b"content"]
-
-
 def test_what_waits_for_another_address_is_shown_and_can_be_sent_here(office: Office) -> None:
     """The server moved; an old spelling of the same address needs no person at all."""
     store = Store(office.session.outbox.path)
     for name, server in (("Old", "http://old.example/api"), ("Same", "HTTP://Silo.Invalid:80/api/")):
-        doc = office.document(name)
-        office.desk.documents.save(doc)
-        store.add(Commit(doc.FileName, 1.0, name, doc.identity, file=Path(doc.FileName)), server)
-    office.session.begin(live=False)
-    office.settle()
+        store.add(commit(office, name), server)
+    begin(office)
     (waiting,) = office.session.shown.waiting
     assert (waiting.label, office.files("Same")) == ("Old", [b"content"])
     office.session.send_here([waiting.id])
@@ -302,11 +281,8 @@ def test_what_waits_for_another_address_is_shown_and_can_be_sent_here(office: Of
 def test_a_person_saves_a_copy_and_discards(office: Office) -> None:
     """Of what cannot be sent."""
     store = Store(office.session.outbox.path)
-    doc = office.document("Bolt")
-    office.desk.documents.save(doc)
-    entry = store.add(Commit(doc.FileName, 1.0, "Bolt", "no-item", file=Path(doc.FileName)))
-    office.session.begin(live=False)
-    office.settle()
+    entry = store.add(commit(office, "Bolt", identity="no-item"))
+    begin(office)
     assert [(w.state, bool(w.reason)) for w in office.session.shown.waiting] == [(State.WAITING, True)]
     target = office.folder / "saved.FCStd"
     office.session.save_copy(entry.id, target)
@@ -320,8 +296,7 @@ def test_a_pause_that_is_over_is_not_shown_with_what_waits(office: Office) -> No
     made, store = commit(office, "Bolt"), Store(office.session.outbox.path)
     entries = [store.add(replace(made, key=key), office.silo.base_url) for key in ("a", "b", "c")]
     store.set_pause(office.silo.base_url, Pause(store.clock() + 600, "busy (429)", "busy", 1, told=True))
-    office.session.begin(live=False)
-    office.settle()
+    begin(office)
     assert office.session.shown.pause is not None
     office.session.discard(entries[0].id)
     office.settle()
@@ -366,9 +341,7 @@ def test_after_a_crash_the_events_of_our_own_merges_do_not_come_again(
     office: Office, *, event_first: bool
 ) -> None:
     """Those of colleagues are on disk every ten seconds only; our own at once, before or after the answer."""
-    office.session.begin(live=False)
-    office.settle()
-    online = office.session._need_online()
+    online = begin(office)
     written = online._last_ids._path
 
     def hear(number: int, sync_id: str) -> None:

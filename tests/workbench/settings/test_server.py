@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
+from desk import Group
 
 from silo.api.config import same_server
 from silo.bom.errors import ConfigError
@@ -22,25 +22,6 @@ from silo.workbench.settings.server import (
 )
 
 HOME, OTHER = "https://silo.example.com", "https://other.example.com"
-
-
-class Parameters:
-    """FreeCAD's parameter group, in memory."""
-
-    def __init__(self) -> None:
-        self.values: dict[str, Any] = {}
-
-    def GetString(self, name: str, default: str = "", /) -> str:
-        return str(self.values.get(name, default))
-
-    def SetString(self, name: str, value: str, /) -> None:
-        self.values[name] = value
-
-    def GetBool(self, name: str, default: bool = False, /) -> bool:
-        return bool(self.values.get(name, default))
-
-    def SetBool(self, name: str, value: bool, /) -> None:
-        self.values[name] = value
 
 
 @dataclass
@@ -58,7 +39,7 @@ EMPTY = Store({})
 
 def test_every_preference_has_its_default() -> None:
     """An untouched FreeCAD behaves as the documentation says."""
-    preferences = Preferences(Parameters())
+    preferences = Preferences(Group())
     for name, default in DEFAULTS.items():
         read = preferences.flag if isinstance(default, bool) else preferences.text
         assert read(name) == default
@@ -66,7 +47,7 @@ def test_every_preference_has_its_default() -> None:
 
 def test_an_unknown_preference_is_an_error() -> None:
     """A misspelled name must not read as a default."""
-    preferences = Preferences(Parameters())
+    preferences = Preferences(Group())
     with pytest.raises(KeyError, match="ApiURL: no such preference"):
         preferences.text("ApiURL")
     with pytest.raises(KeyError, match="SslVerify"):
@@ -75,18 +56,9 @@ def test_an_unknown_preference_is_an_error() -> None:
         preferences.set("SyncBom", "yes")
 
 
-def test_what_is_set_is_read_again() -> None:
-    """Texts and flags."""
-    preferences = Preferences(Parameters())
-    preferences.set("ApiUrl", HOME)
-    preferences.set("SyncBom", False)
-    assert preferences.text("ApiUrl") == HOME
-    assert not preferences.flag("SyncBom")
-
-
 def test_the_certificate_settings_are_one_value() -> None:
     """A file with authorities counts only while certificates are checked at all."""
-    preferences = Preferences(Parameters())
+    preferences = Preferences(Group())
     assert read_known(preferences).verify is True
     preferences.set("SslCertPath", " ca.pem ")
     assert read_known(preferences).verify == "ca.pem"
