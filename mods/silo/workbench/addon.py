@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from silo.workbench.words import plain, translate
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from silo.outbox.entry import Entry
     from silo.outbox.send import Sent
     from silo.workbench.commit.flow import CommitFlow
     from silo.workbench.commit.opened import Opened
@@ -336,31 +337,26 @@ class AddOn:
 
     def commit(self) -> None:
         """Commit the active document."""
-        doc = host.active_document()
-        if doc is None:
-            return
-        self.dock.show_and_raise()
-        self.commits.start(doc)
+        if self.has_document():
+            self.dock.show_and_raise()
+            self.commits.start(host.active_document())
 
     def preview(self) -> None:
         """Compare the active assembly with the server."""
-        doc = host.active_document()
-        if doc is not None:
-            self.previews.start(doc)
+        if self.has_document():
+            self.previews.start(host.active_document())
 
     def register(self) -> None:
         """Show the components of the active document that have no part number."""
-        doc = host.active_document()
-        if doc is not None:
-            self.registrations.start(doc)
+        if self.has_document():
+            self.registrations.start(host.active_document())
 
     def mass(self) -> None:
         """Show the masses of the active assembly."""
-        doc = host.active_document()
-        if doc is not None:
+        if self.has_document():
             from silo.workbench.mass.flow import MassFlow
 
-            MassFlow(self.preferences.flag("CountHardware")).start(doc)
+            MassFlow(self.preferences.flag("CountHardware")).start(host.active_document())
 
     def open_from_silo(self) -> None:
         """Find an item and open its file."""
@@ -460,25 +456,23 @@ class Buttons:
         from silo.workbench.commit.flow import Choice, of_held
         from silo.workbench.pane.activity import Do
 
-        session, entry_id = self._addon.session, int(action.target)
-        held = next((entry for entry in session.shown.waiting if entry.id == entry_id), None)
-        if held is None:
-            return
-        if action.do is Do.OPEN_THEIRS:
-            self._addon.revisions.choose(held.path, of_held(held), Choice.OPEN)
-        else:
-            self._addon.revisions.choose(
-                held.path, of_held(held), Choice.TAKE, taken=lambda: session.discard(entry_id, keep=True)
-            )
+        choose, discard = self._addon.revisions.choose, self._addon.session.discard
+        for held in self._held(action):
+            if action.do is Do.OPEN_THEIRS:
+                choose(held.path, of_held(held), Choice.OPEN)
+            else:
+                taken = partial(discard, held.id, keep=True)
+                choose(held.path, of_held(held), Choice.TAKE, taken=taken)
+
+    def _held(self, action: Action) -> list[Entry]:
+        """Return the entry of the outbox that an action means; none if it is gone."""
+        return [entry for entry in self._addon.session.shown.waiting if str(entry.id) == action.target]
 
     def _compare(self, action: Action) -> None:
         """Show the colleague's revision as a ghost beside the document whose commit is held."""
         from silo.workbench.commit.flow import of_held
 
-        held = next(
-            (entry for entry in self._addon.session.shown.waiting if str(entry.id) == action.target), None
-        )
-        if held is not None:
+        for held in self._held(action):
             self._addon.revisions.compare(
                 held.path,
                 held.part_number,

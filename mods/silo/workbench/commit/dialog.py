@@ -202,10 +202,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
             more.setObjectName(f"more{number}")
             self.files.setItemWidget(child, 1, more)
         item.setExpanded(True)
-        box = QtWidgets.QComboBox()
-        box.setObjectName(f"choice{number}")
-        for choice, text in choice_texts().items():
-            box.addItem(text, choice.value)
+        box = widgets.choice_box(None, choice_texts(), name=f"choice{number}")
         box.currentIndexChanged.connect(lambda _index: self._chose(number, box))
         self._choices[number] = box
         self.files.setItemWidget(item, _CHOICE, box)

@@ -56,7 +56,8 @@ from silo.workbench.commit.plan import (
     refusal,
     take_each,
 )
-from silo.workbench.pane.activity import Action, Do, EntryLine, PaneEntry, Tone, not_in_silo_key
+from silo.workbench.pane.activity import Action, Do, PaneEntry, Tone, not_in_silo_key
+from silo.workbench.pane.entries import own_box
 from silo.workbench.session.session import Session
 from silo.workbench.settings import ALLOW, Preferences
 from silo.workbench.words import counted, filled, plain, quantity, translate
@@ -125,13 +126,13 @@ class Choice(StrEnum):
     ON_TOP = "on top"  # commit mine on top of theirs
 
 
-def choice_texts() -> dict[Choice, str]:
-    """Return the choices in words; the harmless one comes first."""
+def choice_texts() -> dict[str, str]:
+    """Return the values of the choices in words; the harmless one comes first."""
     return {
-        Choice.LEAVE: translate("Silo", "leave out"),
-        Choice.OPEN: translate("Silo", "open theirs beside mine"),
-        Choice.TAKE: translate("Silo", "take theirs"),
-        Choice.ON_TOP: translate("Silo", "commit mine on top"),
+        Choice.LEAVE.value: translate("Silo", "leave out"),
+        Choice.OPEN.value: translate("Silo", "open theirs beside mine"),
+        Choice.TAKE.value: translate("Silo", "take theirs"),
+        Choice.ON_TOP.value: translate("Silo", "commit mine on top"),
     }
 
 
@@ -572,7 +573,7 @@ class CommitFlow:
         for row, theirs, choice in answer.choices:
             self.choose(row.path, theirs, choice)
         if answer.register:
-            self._turns.append((self._registering(planned.top.path), ""))
+            self._then(self._registering(planned.top.path))
 
     def commit_folder(self, root: str, paths: Iterable[str], comment: str) -> None:
         """Save the edited ones of these open files of a project, then send what Silo does not have of it."""
@@ -596,12 +597,16 @@ class CommitFlow:
         over
             files that are sent on top of a colleague's newer revision.
         """
-        self._turns.append((self._along(path, skip, comment, over), ""))
+        self._then(self._along(path, skip, comment, over))
+
+    def _then(self, steps: Iterator[CommittedDocument], comment: str = "") -> None:
+        """Take these steps, a turn each, after those of an earlier commit."""
+        self._turns.append((steps, comment))
         if len(self._turns) == 1:
             self._desk.later(self._turn)
 
     def _along(
-        self, path: str, skip: set[str], comment: str, over: Collection[str] = ()
+        self, path: str, skip: set[str], comment: str, over: Collection[str]
     ) -> Iterator[CommittedDocument]:
         """Commit, a turn after the documents are saved, the linked files that Silo does not have."""
         how: dict[str, Any] = {"comment": comment, "over_newer": over}
@@ -689,10 +694,7 @@ class CommitFlow:
 
     def run(self, rows: tuple[DocumentRow, ...], comment: str = "") -> None:
         """Commit these documents, in order, after those of an earlier commit."""
-        turns = take_each(rows, self._desk.documents, self.snapshot, self._session.outbox)
-        self._turns.append((turns, comment))
-        if len(self._turns) == 1:
-            self._desk.later(self._turn)
+        self._then(take_each(rows, self._desk.documents, self.snapshot, self._session.outbox), comment)
 
     def finish(self) -> None:
         """Do everything that is left at once, since FreeCAD is about to close the documents."""
@@ -762,23 +764,22 @@ class CommitFlow:
             self._keep_saved(taken, comment)
 
     def _keep_saved(self, taken: CommittedDocument, comment: str) -> None:
-        if taken.error is not None:
+        snapshot = taken.snapshot
+        if snapshot is None:
             self._tell_error(taken.row.label, str(taken.error))
-        elif taken.snapshot is not None and not taken.snapshot.identity:
-            if not taken.snapshot.several:
-                self._session.add(not_in_silo(taken.snapshot))
-            if comment:
-                self._comments[taken.snapshot.path] = comment
+        elif snapshot.identity:
+            self._keep(taken, snapshot, comment)
         else:
-            self._keep(taken, comment)
+            if not snapshot.several:
+                self._session.add(not_in_silo(snapshot))
+            if comment:
+                self._comments[snapshot.path] = comment
 
-    def _keep(self, taken: CommittedDocument, comment: str) -> None:
-        if taken.snapshot is None:
-            return
+    def _keep(self, taken: CommittedDocument, snapshot: Snapshot, comment: str) -> None:
         row, base = taken.row, taken.base
         if row.is_top:
             self._asked_for.add(taken.key)
-        commit = self._commit_of(taken.snapshot, taken.key, comment, taken.held or Path(row.path))
+        commit = self._commit_of(snapshot, taken.key, comment, taken.held or Path(row.path))
         if commit is None:
             return
         commit = replace(commit, stamp=taken.stamp)
@@ -801,17 +802,8 @@ class CommitFlow:
         )
 
     def _tell_error(self, label: str, text: str) -> None:
-        self._session.add(
-            PaneEntry(
-                key=f"commit-error:{label}:{time.time()}",
-                title=translate("Silo", "Not committed: {name}", name=label),
-                when=time.time(),
-                tone=Tone.ERROR,
-                lines=(EntryLine(text, Tone.ERROR),),
-                rank=1,
-                icon="silo-commit",
-            )
-        )
+        title = translate("Silo", "Not committed: {name}", name=label)
+        self._session.add(own_box(f"commit-error:{label}:{time.time()}", title, text, tone=Tone.ERROR))
 
     def _note(self, planned: CommitPlan) -> str:
         if not self._session.shown.server.configured:
@@ -853,13 +845,6 @@ def not_in_silo(taken: Snapshot) -> PaneEntry:
     text = taken.problem or translate("Silo", "It has no Silo part number yet, so it was not sent.")
     tone = Tone.PLAIN if taken.problem else Tone.WARNING
     register = Action(Do.REGISTER, translate("Silo", "Register Parts…"), document=taken.path)
-    return PaneEntry(
-        key=not_in_silo_key(taken.path),
-        title=translate("Silo", "Saved, but not in Silo: {name}", name=name),
-        when=time.time(),
-        tone=tone,
-        lines=(EntryLine(text, tone),),
-        actions=() if taken.problem else (register,),
-        rank=1,
-        icon="silo-commit",
-    )
+    title = translate("Silo", "Saved, but not in Silo: {name}", name=name)
+    box = own_box(not_in_silo_key(taken.path), title, text, tone=tone)
+    return box if taken.problem else replace(box, actions=(register,))

@@ -276,7 +276,7 @@ class CommitHook:
     def watch(self, name: str) -> None:
         """Notice from now on when this command ends."""
         if not self._names:
-            self._host.add_document_observer(_Observer(self._saved, self._activated))
+            self._host.add_document_observer(self)
         if name not in self._names:
             self._names.append(name)
 
@@ -294,15 +294,18 @@ class CommitHook:
         if doc is not None:
             self.note(doc)
 
-    def _saved(self, doc: Any, filename: str) -> None:
+    # FreeCAD calls these; an exception in them would only be printed.
+
+    def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
+        """Note that a document is completely on the disk."""
         # "Save a copy" names another file than the document's own.
         from silo.platform import one_path  # late: FreeCAD's start waits for this module
 
-        same = bool(doc.FileName) and one_path(filename) == one_path(doc.FileName)
-        if same:
+        if doc.FileName and one_path(filename) == one_path(doc.FileName):
             self.note(doc, committed=False)
 
-    def _activated(self) -> None:
+    def slotActivateDocument(self, _doc: Any) -> None:
+        """Look again when a person changes to another document."""
         # The document is not the active one yet while FreeCAD reports it.
         self._later(0, self._wrap_origin)
 
@@ -339,21 +342,6 @@ class CommitHook:
         for doc in self._host.documents():
             if doc.Name in noted and (noted[doc.Name] or self._has_identity(doc)):
                 self._ended(doc)
-
-
-class _Observer:
-    """FreeCAD's document observer; an exception in it would only be printed."""
-
-    def __init__(self, saved: Callable[[Any, str], None], activated: Callable[[], None]) -> None:
-        self._saved, self._activated = saved, activated
-
-    def slotActivateDocument(self, _doc: Any) -> None:
-        """Look again when a person changes to another document."""
-        self._activated()
-
-    def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
-        """Note that a document is completely on the disk."""
-        self._saved(doc, filename)
 
 
 # Attributes of an object that are no properties, and that a walk may ask for.

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -39,7 +38,8 @@ from silo.workbench.commit.plan import CommitPlan, Snapshot, leaves_first
 from silo.workbench.freecad import host, live, saving
 from silo.workbench.freecad.facts import SHOWN_NUMBER, SHOWN_STATE
 from silo.workbench.gui import qt
-from silo.workbench.pane.activity import EntryLine, PaneEntry, Tone
+from silo.workbench.pane.activity import PaneEntry, Tone
+from silo.workbench.pane.entries import own_box
 from silo.workbench.words import filled, plain, translate
 
 if TYPE_CHECKING:
@@ -84,22 +84,17 @@ class SiloGroup:
             for name in entry.instances
         }
         self._known[doc.Name] = str(doc.FileName), components
-        self._soon()
+        self.addSelection()
 
     # FreeCAD calls these once for each object; the selection is then looked at once.
 
     def addSelection(self, *_what: Any) -> None:
-        """Note that one more object is selected."""
-        self._soon()
-
-    def setSelection(self, *_what: Any) -> None:
-        """Note that other objects are selected."""
-        self._soon()
-
-    def _soon(self) -> None:
+        """Note that something else is selected."""
         if not self._is_due:
             self._is_due = True
             qt.later(0, self._show)
+
+    setSelection = addSelection
 
     def _show(self) -> None:
         self._is_due = False
@@ -209,11 +204,6 @@ def unedited() -> list[Any]:
     for doc in clean.values():
         ordered.update((below.Name, below) for below in leaves_first(doc) if below.Name in clean)
     return list(ordered.values())
-
-
-def save_marked(doc: Any) -> None:
-    """Save a document that was unedited, and that FreeCAD marked because something below it was saved."""
-    saving.save_marked(doc)
 
 
 def relink(finding: Finding) -> list[str]:
@@ -328,19 +318,8 @@ class LossGuard:
         qt.later(0, lambda: saving.mark_modified(name))  # FreeCAD takes the mark away after this
 
     def _tell(self, doc: Any, *lines: str) -> None:
-        self._add(
-            PaneEntry(
-                key=f"newer-freecad:{doc.FileName}",
-                title=translate(
-                    "Silo", "Made by a newer FreeCAD: {name}", name=os.path.basename(doc.FileName)
-                ),
-                when=time.time(),
-                tone=Tone.WARNING,
-                lines=tuple(EntryLine(text, Tone.WARNING) for text in lines),
-                rank=1,
-                icon="silo-commit",
-            )
-        )
+        title = translate("Silo", "Made by a newer FreeCAD: {name}", name=os.path.basename(doc.FileName))
+        self._add(own_box(f"newer-freecad:{doc.FileName}", title, *lines, tone=Tone.WARNING))
 
 
 def _words(text: str, doc: Any, lost: list[str]) -> str:
@@ -411,7 +390,8 @@ class LiveDesk:
     remove_identity = staticmethod(remove_identity)
     restore_identity = staticmethod(restore_identity)
     unedited = staticmethod(unedited)
-    save_marked = staticmethod(save_marked)
+    save_marked = staticmethod(saving.save_marked)
+    relink = staticmethod(relink)
 
     def accounts(self, extraction: Extraction) -> list[SolidCount]:
         """Compare the solids that FreeCAD shows with those that the BOM explains."""
@@ -421,11 +401,6 @@ class LiveDesk:
     def why(self, doc: Any, assembly: str, parts: Collection[Key]) -> list[str]:
         """Say why an assembly has this quantity of a part: the number, then each chain to it."""
         return live.why_object(doc, assembly, parts, hardware=self._count_hardware())
-
-    def relink(self, finding: Finding) -> list[str]:
-        """Set live links to the file that was meant; their labels."""
-
-        return relink(finding)
 
     def save_as(self, _doc: Any) -> None:
         """Show FreeCAD's own dialog to save the active document."""

@@ -8,7 +8,6 @@ in full.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -31,7 +30,6 @@ __all__ = [
     "Relay",
     "ask_where_to_save",
     "copy",
-    "in_gui_thread",
     "later",
     "open_url",
     "run_dialog",
@@ -67,11 +65,6 @@ class Relay(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
 
         # Long work reports its progress through here, so garbage does not pile up meanwhile.
         collect_due()
-
-
-def in_gui_thread() -> bool:
-    """Return True in the thread that may touch widgets and documents."""
-    return threading.current_thread() is threading.main_thread()
 
 
 def later(milliseconds: int, call: Callable[[], None]) -> None:

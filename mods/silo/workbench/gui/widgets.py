@@ -127,6 +127,15 @@ def button(text: str, name: str, call: Callable[[], object], tip: str = "", *, d
     return made
 
 
+def field(name: str, hint: str = "", *, clear: bool = False) -> Any:
+    """Make a field for a line of text; ``clear``: with a button that empties it."""
+    made = QtWidgets.QLineEdit()
+    made.setObjectName(name)
+    made.setPlaceholderText(hint)
+    made.setClearButtonEnabled(clear)
+    return made
+
+
 def line(*parts: Any) -> Any:
     """Make a layout of widgets in one line; those after None are at the right."""
     layout = QtWidgets.QHBoxLayout()

@@ -71,7 +71,13 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> PaneEntry:
     )
 
 
-def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> PaneEntry | None:
+def own_box(key: str, title: str, *lines: str, tone: Tone, icon: str = "silo-commit") -> PaneEntry:
+    """Make a box of something that happens here and now; its lines have its tone."""
+    made = tuple(EntryLine(text, tone) for text in lines)
+    return PaneEntry(key, title, time.time(), tone, lines=made, rank=1, icon=icon)
+
+
+def of_team(wanted: str, here: tuple[int, int]) -> PaneEntry | None:
     """Make the box that says that the team works with another FreeCAD; None if it does not, or if the server
     does not say.
 
@@ -96,10 +102,7 @@ def of_team(wanted: str, here: tuple[int, int], now: float | None = None) -> Pan
     shown = translate(
         "Silo", "Your team works with FreeCAD {team}; this is {here}", team=wanted, here="{}.{}".format(*here)
     )
-    when = time.time() if now is None else now
-    return PaneEntry(
-        "team-freecad", shown, when, Tone.WARNING, lines=(EntryLine(text, Tone.WARNING),), icon="silo-commit"
-    )
+    return own_box("team-freecad", shown, text, tone=Tone.WARNING)
 
 
 def _batch_of(sent: Sent, tone: Tone) -> EntryBatch | None:

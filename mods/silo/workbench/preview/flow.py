@@ -240,8 +240,9 @@ def _assembly_rows(
         if (own := lines.get(entry.key)) is not None and entry.is_assembly and entry.part_number:
             note = "; ".join(filter(None, (note, _own_words(own))))
         if entry.missing:
-            base = os.path.dirname(compared.resolved.assembly.doc_path)
-            kind, note = RowKind.MISSING, _missing_words(relative(entry.doc_path, base), entry.object_name)
+            file = relative(entry.doc_path, os.path.dirname(compared.resolved.assembly.doc_path))
+            file += f"#{entry.object_name}" if entry.object_name else ""
+            kind, note = RowKind.MISSING, translate("Silo", "missing: {file}", file=file)
         yield PreviewRow(
             kind,
             number=entry.part_number or "",
@@ -319,10 +320,6 @@ def _own_words(compared: Compared) -> str:
     if compared.is_new:
         return translate("Silo", "its own BOM is not in Silo yet")
     return translate("Silo", "its own BOM differs from Silo") if compared.to_send else ""
-
-
-def _missing_words(file: str, name: str) -> str:
-    return translate("Silo", "missing: {file}", file=f"{file}#{name}" if name else file)
 
 
 def _unregistered_row(entry: BomEntry, preview: Preview, children: tuple[PreviewRow, ...]) -> PreviewRow:

@@ -134,14 +134,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         return table
 
     def _make_filters(self) -> Any:
-        self.words = QtWidgets.QLineEdit()
-        self.words.setObjectName("words")
-        self.words.setPlaceholderText(translate("Silo", "Filter"))
-        self.words.setClearButtonEnabled(True)
+        self.words = widgets.field("words", translate("Silo", "Filter"), clear=True)
         self.words.textChanged.connect(lambda _text: self._filter())
-        self.only = widgets.choice_box(
-            None, {filter_kind.value: text for filter_kind, text in filter_words().items()}
-        )
+        self.only = widgets.choice_box(None, filter_words())
         self.only.activated.connect(lambda _number: self._filter())
         texts = {
             "all": translate("Silo", "Check All"),
@@ -178,9 +173,8 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             box.setMinimumWidth(160 if box.isEditable() else 0)
             self._reset(box)
         for column in ("supplier", "name"):
-            line = self.bulk[column] = QtWidgets.QLineEdit()
+            line = self.bulk[column] = widgets.field("", hints[column])
             line.setMinimumWidth(170)
-            line.setPlaceholderText(hints[column])
             line.returnPressed.connect(partial(self._chosen_for_all, column))
         self.fill_button = widgets.button(
             translate("Silo", "Fill Down"),

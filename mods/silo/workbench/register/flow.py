@@ -80,13 +80,13 @@ class Filter(StrEnum):
     DUPLICATES = "duplicates"  # Silo, or another row, has them probably
 
 
-def filter_words() -> dict[Filter, str]:
-    """Return the names of the filters, for people."""
+def filter_words() -> dict[str, str]:
+    """Return the names of the filters by their values, for people."""
     return {
-        Filter.ALL: translate("Silo", "all rows"),
-        Filter.UNSURE: translate("Silo", "unsure"),
-        Filter.NEW: translate("Silo", "new"),
-        Filter.DUPLICATES: translate("Silo", "probable duplicates"),
+        Filter.ALL.value: translate("Silo", "all rows"),
+        Filter.UNSURE.value: translate("Silo", "unsure"),
+        Filter.NEW.value: translate("Silo", "new"),
+        Filter.DUPLICATES.value: translate("Silo", "probable duplicates"),
     }
 
 

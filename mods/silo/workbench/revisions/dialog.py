@@ -152,10 +152,7 @@ class OpenDialog(_Window):
 
     def __init__(self, flow: RevisionFlow, parent: Any, folder: str) -> None:
         super().__init__(flow, parent, "SiloOpen", translate("Silo", "Open from Silo"), (820, 520))
-        self.words = QtWidgets.QLineEdit()
-        self.words.setObjectName("words")
-        self.words.setPlaceholderText(translate("Silo", "Part number, name or description"))
-        self.words.setClearButtonEnabled(True)
+        self.words = widgets.field("words", translate("Silo", "Part number, name or description"), clear=True)
         self._layout.addWidget(self.words)
         self._layout.addLayout(self._make_middle(), 1)
         self._layout.addLayout(self._make_folder(folder))
@@ -194,8 +191,8 @@ class OpenDialog(_Window):
         return layout
 
     def _make_folder(self, folder: str) -> Any:
-        self.folder = QtWidgets.QLineEdit(folder)
-        self.folder.setObjectName("folder")
+        self.folder = widgets.field("folder")
+        self.folder.setText(folder)
         text = widgets.label(translate("Silo", "Project folder:"), wrap=False)
         return widgets.line(text, self.folder, widgets.button("…", "choose", self._choose_folder))
 
@@ -248,12 +245,6 @@ class OpenDialog(_Window):
         row = self.items.currentItem()
         return str(row.data(0, _DATA)) if row is not None else ""
 
-    def _offer_newest(self, folder: str, here: str) -> None:
-        """Offer to fetch what is newer, with all linked files."""
-        number = self._number()
-        self.newest.setVisible(True)
-        self._newest = lambda: self.fetch(number, None, Path(folder).expanduser())
-
     def _show(self, history: ItemHistory) -> None:
         self._item = history.item.id
         self.newest.hide()
@@ -267,8 +258,8 @@ class OpenDialog(_Window):
         self.open_button.setEnabled(bool(history.revisions))
 
     def _open(self) -> None:
-        row, folder = self.revisions.currentItem(), self.folder.text().strip()
-        if row is None or not self._number():
+        row, folder, number = self.revisions.currentItem(), self.folder.text().strip(), self._number()
+        if row is None or not number:
             return
         if not folder:
             self.say(translate("Silo", "Choose the project folder first."), Tone.WARNING)
@@ -277,9 +268,10 @@ class OpenDialog(_Window):
         if here:
             self._flow.open(here)
             self.say(translate("Silo", "It is in the project already, and is open: {path}", path=here))
-            self._offer_newest(folder, here)
+            self._newest = lambda: self.fetch(number, None, Path(folder).expanduser())
+            self.newest.setVisible(True)
             return
-        self.fetch(self._number(), row.data(0, _DATA) or None, Path(folder).expanduser())
+        self.fetch(number, row.data(0, _DATA) or None, Path(folder).expanduser())
 
 
 class HistoryDialog(_Window):
@@ -344,9 +336,8 @@ class HistoryDialog(_Window):
 
     def _compare(self) -> None:
         if self._known is not None:
-            failed = self._alive(lambda error: self.say(str(error), Tone.ERROR))
-            number = self._known.item.part_number
-            self._flow.compare(self._path, number, self._number(), self._alive(self.say), failed)
+            alive, number = self._alive, self._known.item.part_number
+            self._flow.compare(self._path, number, self._number(), alive(self.say), alive(self.fail))
 
     def _get(self) -> None:
         if self._known is None:
@@ -372,9 +363,7 @@ def ask_choices(parent: Any, files: Sequence[Theirs]) -> list[tuple[Theirs, Choi
         item = QtWidgets.QTreeWidgetItem([plain(os.path.basename(theirs.path), 80), theirs.headline])
         item.setToolTip(0, tip(theirs.path))
         tree.addTopLevelItem(item)
-        boxes.append(
-            widgets.choice_box(None, {choice.value: text for choice, text in choice_texts().items()})
-        )
+        boxes.append(widgets.choice_box(None, choice_texts()))
         tree.setItemWidget(item, 2, boxes[-1])
     for column in range(2):
         tree.resizeColumnToContents(column)
@@ -404,10 +393,7 @@ class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no typ
         line = widgets.line(self.root, browse, refresh)
         line.setStretch(0, 1)
         layout.addLayout(line)
-        self.words = QtWidgets.QLineEdit()
-        self.words.setObjectName("words")
-        self.words.setPlaceholderText(translate("Silo", "Search"))
-        self.words.setClearButtonEnabled(True)
+        self.words = widgets.field("words", translate("Silo", "Search"), clear=True)
         self.words.textChanged.connect(lambda _text: self._draw())
         self.only_left = QtWidgets.QCheckBox(translate("Silo", "Different from Silo"))
         self.only_left.toggled.connect(lambda _on: self._draw())
@@ -418,9 +404,7 @@ class ProjectPane(QtWidgets.QWidget):  # type: ignore[misc]  # PySide has no typ
         self.files.itemDoubleClicked.connect(lambda _item, _column: self._open())
         self.files.currentItemChanged.connect(lambda _now, _before: self._enable())
         layout.addWidget(self.files, 1)
-        self.comment = QtWidgets.QLineEdit()
-        self.comment.setObjectName("comment")
-        self.comment.setPlaceholderText(translate("Silo", "Comment"))
+        self.comment = widgets.field("comment", translate("Silo", "Comment"))
         self.decide_button = widgets.button(translate("Silo", "Decide…"), "decide", self._decide)
         self.commit = widgets.button(translate("Silo", "Commit All"), "commit", self._commit)
         layout.addWidget(self.comment)

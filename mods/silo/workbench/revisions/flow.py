@@ -27,7 +27,8 @@ from silo.platform import cache_folder, one_path
 from silo.workbench.commit.flow import Choice, CommitFlow, Desk, Theirs, theirs_of
 from silo.workbench.commit.opened import Base
 from silo.workbench.commit.plan import MOST_S
-from silo.workbench.pane.activity import EntryLine, PaneEntry, Tone
+from silo.workbench.pane.activity import Tone
+from silo.workbench.pane.entries import own_box
 from silo.workbench.session.session import Session
 from silo.workbench.words import filled, plain, translate
 
@@ -276,16 +277,8 @@ class RevisionFlow:
         )
 
     def _box(self, path: str, title: str, text: str, tone: Tone = Tone.PLAIN) -> None:
-        entry = PaneEntry(
-            key=f"fetched:{path}:{time.time()}",
-            title=title,
-            when=time.time(),
-            tone=tone,
-            lines=(EntryLine(text, tone),) if text else (),
-            rank=1,
-            icon="silo-open",
-        )
-        self._session.add(entry)
+        key, lines = f"fetched:{path}:{time.time()}", filter(None, [text])
+        self._session.add(own_box(key, title, *lines, tone=tone, icon="silo-open"))
 
     # -- items ------------------------------------------------------------------------------------------
 

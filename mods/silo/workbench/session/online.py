@@ -12,7 +12,7 @@ from typing import Any
 
 from silo.api.client import SiloClient
 from silo.api.config import Pause, resolve_server
-from silo.api.events import RESET, Connection, ConnectionState, EventListener, Pauses, ServerEvent
+from silo.api.events import RESET, Connection, EventListener, Pauses, ServerEvent
 from silo.bom.errors import ConfigError, InputError
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.send import Report, Sent, send_all
@@ -140,7 +140,7 @@ class Online:
         self._listener = EventListener(
             self._client,
             on_event=lambda event: self._heard(event, url),
-            on_state=self._heard_state,
+            on_state=lambda state: self._state(state.kind.value, state.message),
             last_event_id=self._last_ids.get(url),
             around=collection_off,
             pauses=_SharedPauses(self._outbox, url),
@@ -167,9 +167,6 @@ class Online:
         entry = entries.of_event(event, self.client.web_url)
         if entry is not None:
             self._entry(entry)
-
-    def _heard_state(self, state: ConnectionState) -> None:
-        self._state(state.kind.value, state.message)
 
     def _tell(self, sent: Sent) -> None:
         if sent.result is not None:
@@ -220,7 +217,7 @@ class LastIds:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._known = self._read()
+        self._known = {url: str(event_id) for url, event_id in read_memory(path).items()}
         self._saved = dict(self._known)
         self._due = 0.0
 
@@ -244,6 +241,3 @@ class LastIds:
         written = dict(self._known)
         if write_memory(self._path, written) is None:
             self._saved = written
-
-    def _read(self) -> dict[str, str]:
-        return {url: str(event_id) for url, event_id in read_memory(self._path).items()}

@@ -79,24 +79,19 @@ class PreferencePage:
         layout = QtWidgets.QVBoxLayout(box)
         form = QtWidgets.QFormLayout()
         layout.addLayout(form)
-        self.url = QtWidgets.QLineEdit()
-        self.url.setObjectName("url")
-        self.url.setPlaceholderText("https://silo.example.com")
+        self.url = widgets.field("url", "https://silo.example.com")
         form.addRow(translate("Silo", "Address"), self.url)
-        self.token = QtWidgets.QLineEdit()
-        self.token.setObjectName("token")
+        self.token = widgets.field("token")
         self.token.setEchoMode(QtWidgets.QLineEdit.EchoMode.Password)
         log_in = widgets.button(translate("Silo", "Log in…"), "log_in", self.log_in)
         form.addRow(translate("Silo", "API token"), widgets.line(self.token, log_in))
-        self.place = QtWidgets.QComboBox()
-        self.place.setObjectName("place")
-        self.place.addItem(translate("Silo", "FreeCAD's preferences (a plain file)"), PREFERENCE)
+        places = {PREFERENCE: translate("Silo", "FreeCAD's preferences (a plain file)")}
+        self.place = widgets.choice_box(None, places, name="place")
         form.addRow(translate("Silo", "Keep the token in"), self.place)
         self.verify = QtWidgets.QCheckBox(translate("Silo", "Check the server's certificate"))
         self.verify.setObjectName("verify")
         form.addRow("", self.verify)
-        self.certificate = QtWidgets.QLineEdit()
-        self.certificate.setPlaceholderText(translate("Silo", "the system's own, unless a file is given"))
+        self.certificate = widgets.field("", translate("Silo", "the system's own, unless a file is given"))
         browse = widgets.button("…", "browse", self._browse)
         browse.setMaximumWidth(36)
         form.addRow(translate("Silo", "Certificate authorities"), widgets.line(self.certificate, browse))
@@ -129,13 +124,13 @@ class PreferencePage:
             ("CountHardware", translate("Silo", "Count standard parts (screws, nuts, washers) in the BOM")),
         ):
             self._flag(form, name, text)
-        self.missing = QtWidgets.QComboBox()
-        self.missing.setObjectName("missing")
-        self.missing.addItem(translate("Silo", "hold the BOM back until they are mended"), HOLD)
-        self.missing.addItem(translate("Silo", "sync without them (they become unreferenced)"), ALLOW)
+        ways = {
+            HOLD: translate("Silo", "hold the BOM back until they are mended"),
+            ALLOW: translate("Silo", "sync without them (they become unreferenced)"),
+        }
+        self.missing = widgets.choice_box(None, ways, name="missing")
         form.addRow(translate("Silo", "Where links are broken"), self.missing)
-        self.schema = QtWidgets.QLineEdit()
-        self.schema.setObjectName("schema")
+        self.schema = widgets.field("schema")
         form.addRow(translate("Silo", "Part number schema"), self.schema)
         return box
 

@@ -256,29 +256,20 @@ def in_use(server: ServerChoice, env: Mapping[str, str]) -> str:
     """Say which server and token are in use, and where they come from."""
     if not server.configured:
         return translate("Silo", "No server is set up. To try it out, run: silo-mod serve")
-    where = translate("Silo", "In use: {url} ({from}).", url=plain(server.url, 100))
-    text = where.replace("{from}", _url_words()[server.url_from])
-    text += " " + _token_words()[server.token_from]
-    if env.get("SILO_SSL_VERIFY", "").strip():
-        text += " " + translate("Silo", "SILO_SSL_VERIFY decides about the certificate.")
-    return text
-
-
-def _url_words() -> dict[SettingSource, str]:
-    return {
+    addresses = {
         SettingSource.ENVIRONMENT: translate("Silo", "from the environment variable SILO_API_URL"),
         SettingSource.PREFERENCES: translate("Silo", "from this page"),
         SettingSource.FILE: translate("Silo", "from the configuration file of silo-mod"),
-        SettingSource.NONE: "",
-        SettingSource.KEYRING: "",
     }
-
-
-def _token_words() -> dict[SettingSource, str]:
-    return {
+    tokens = {
         SettingSource.ENVIRONMENT: translate("Silo", "Token: from the environment variable SILO_API_TOKEN."),
         SettingSource.KEYRING: translate("Silo", "Token: from the system's keyring."),
         SettingSource.PREFERENCES: translate("Silo", "Token: from FreeCAD's preferences, a plain file."),
         SettingSource.FILE: translate("Silo", "Token: from the configuration file of silo-mod."),
         SettingSource.NONE: translate("Silo", "Token: none."),
     }
+    where = translate("Silo", "In use: {url} ({from}).", url=plain(server.url, 100))
+    text = f"{where.replace('{from}', addresses[server.url_from])} {tokens[server.token_from]}"
+    if env.get("SILO_SSL_VERIFY", "").strip():
+        text += " " + translate("Silo", "SILO_SSL_VERIFY decides about the certificate.")
+    return text

@@ -1072,6 +1072,11 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/flow.py" />
+            <source>missing: {file}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
             <source>… more rows than can be shown here</source>
             <translation type="unfinished" />
         </message>
@@ -1113,11 +1118,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../preview/flow.py" />
             <source>its own BOM differs from Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>missing: {file}</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -2320,16 +2320,6 @@ They are installed in {folder}.</source>
         </message>
         <message>
             <location filename="../../settings/server.py" />
-            <source>In use: {url} ({from}).</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>SILO_SSL_VERIFY decides about the certificate.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
             <source>from the environment variable SILO_API_URL</source>
             <translation type="unfinished" />
         </message>
@@ -2366,6 +2356,16 @@ They are installed in {folder}.</source>
         <message>
             <location filename="../../settings/server.py" />
             <source>Token: none.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>In use: {url} ({from}).</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>SILO_SSL_VERIFY decides about the certificate.</source>
             <translation type="unfinished" />
         </message>
         <message>

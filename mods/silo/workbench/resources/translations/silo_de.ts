@@ -1073,6 +1073,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
         </message>
         <message>
             <location filename="../../preview/flow.py" />
+            <source>missing: {file}</source>
+            <translation>fehlt: {file}</translation>
+        </message>
+        <message>
+            <location filename="../../preview/flow.py" />
             <source>… more rows than can be shown here</source>
             <translation>… mehr Zeilen, als hier gezeigt werden können</translation>
         </message>
@@ -1115,11 +1120,6 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <location filename="../../preview/flow.py" />
             <source>its own BOM differs from Silo</source>
             <translation>ihre eigene Stückliste weicht von Silo ab</translation>
-        </message>
-        <message>
-            <location filename="../../preview/flow.py" />
-            <source>missing: {file}</source>
-            <translation>fehlt: {file}</translation>
         </message>
         <message>
             <location filename="../../preview/flow.py" />
@@ -2322,16 +2322,6 @@ Sie werden in {folder} installiert.</translation>
         </message>
         <message>
             <location filename="../../settings/server.py" />
-            <source>In use: {url} ({from}).</source>
-            <translation>In Gebrauch: {url} ({from}).</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
-            <source>SILO_SSL_VERIFY decides about the certificate.</source>
-            <translation>SILO_SSL_VERIFY entscheidet über das Zertifikat.</translation>
-        </message>
-        <message>
-            <location filename="../../settings/server.py" />
             <source>from the environment variable SILO_API_URL</source>
             <translation>aus der Umgebungsvariablen SILO_API_URL</translation>
         </message>
@@ -2369,6 +2359,16 @@ Sie werden in {folder} installiert.</translation>
             <location filename="../../settings/server.py" />
             <source>Token: none.</source>
             <translation>Token: keines.</translation>
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>In use: {url} ({from}).</source>
+            <translation>In Gebrauch: {url} ({from}).</translation>
+        </message>
+        <message>
+            <location filename="../../settings/server.py" />
+            <source>SILO_SSL_VERIFY decides about the certificate.</source>
+            <translation>SILO_SSL_VERIFY entscheidet über das Zertifikat.</translation>
         </message>
         <message>
             <location filename="../../start.py" />
