@@ -409,7 +409,7 @@ class Format(StrEnum):
     @property
     def is_mesh(self) -> bool:
         """Return True if the format has triangles and needs no geometry kernel."""
-        return self in (Format.STL, Format.OBJ, Format.PLY, Format.GLB, Format.THREEMF)
+        return self not in (Format.STEP, Format.BREP, Format.FREECAD)
 
 
 _SUFFIXES = {f".{kind}": kind for kind in Format} | {
@@ -432,7 +432,6 @@ _OTHERS = {
 """What is refused with a word of its own, by its first bytes."""
 
 _HEAD_BYTES = 1024
-READABLE = "STEP, FCStd, BREP, STL, OBJ, 3MF, GLB, PLY"
 
 
 def detect(path: Path) -> Format:
@@ -456,7 +455,8 @@ def detect(path: Path) -> Format:
         raise DocumentError(
             str(path), f"is named like a {by_suffix.value} file, but its content is not; export it again"
         )
-    raise DocumentError(str(path), f"has no geometry format that is read here ({READABLE})")
+    readable = ", ".join(f".{kind}" for kind in Format)
+    raise DocumentError(str(path), f"has no geometry format that is read here ({readable})")
 
 
 def _head(path: Path) -> bytes:
