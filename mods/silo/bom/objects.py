@@ -53,20 +53,18 @@ _NO_FOLDERS = (
     "Assembly::SnapshotGroup",
     "Assembly::SimulationGroup",
 )
-# Draft arrays without links have no count before FreeCAD 1.0, those along paths and points have no type.
-_ARRAY_MARKS = ("Count", "ArrayType", "PathObject", "PointObject")
 _ASSEMBLY3 = ("BuildShape", "Freeze", "Group")
-_ASKED_FOR = (
-    *_ARRAY_MARKS,
-    *_ASSEMBLY3,
-    "Base",
-    "sourceFile",
-    "a2p_Version",
-    "timeLastImport",
-    "Objects",
-    "Fuse",
-    "Scale",
+# What a Python object is, by properties that no other kind has together; the first that fits.
+_MARKS = (
+    # Draft arrays without links have no count before FreeCAD 1.0, those along paths and points have no type.
+    *((Kind.DRAFT_ARRAY, ("Base", mark)) for mark in ("Count", "ArrayType", "PathObject", "PointObject")),
+    (Kind.FOREIGN, ("sourceFile", "a2p_Version")),
+    (Kind.FOREIGN, ("sourceFile", "timeLastImport")),
+    (Kind.CONTAINER, _ASSEMBLY3),
+    (Kind.COPY, ("Objects", "Fuse")),  # a Draft clone
+    (Kind.COPY, ("Objects", "Scale")),
 )
+_ASKED_FOR = {name for _, names in _MARKS for name in names}
 _NO_GEOMETRY = (
     *("Part::Part2DObject", "Part::Datum", "PartDesign::SubShapeBinder", "PartDesign::ShapeBinder"),
     *("App::DatumElement", "Part::Vertex", "Part::Line", "Part::Plane", "Part::Circle", "Part::Ellipse"),
@@ -159,15 +157,7 @@ def _python_kind(obj: object) -> Kind:
 def _kind_by_names(names: frozenset[str] | tuple[str, ...]) -> Kind | None:
     """Return the kind of a Python object with these properties; None if they do not identify it."""
     has = frozenset(names).issuperset
-    if has(("Base",)) and not frozenset(names).isdisjoint(_ARRAY_MARKS):
-        return Kind.DRAFT_ARRAY
-    if has(("sourceFile", "a2p_Version")) or has(("sourceFile", "timeLastImport")):
-        return Kind.FOREIGN
-    if has(_ASSEMBLY3):
-        return Kind.CONTAINER
-    if has(("Objects", "Fuse")) or has(("Objects", "Scale")):
-        return Kind.COPY  # a Draft clone
-    return None
+    return next((kind for kind, marks in _MARKS if has(marks)), None)
 
 
 def _standard_kind(obj: object) -> Kind | None:
