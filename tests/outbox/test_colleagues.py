@@ -77,8 +77,16 @@ def lose() -> None:
     raise UnreachableError("no answer")
 
 
-def refuse() -> None:
-    raise RejectedError("Bolt is archived")
+def refused(vault: Vault, content: bytes, made_from: bytes | None = None) -> Entry:
+    """A commit whose file arrives, and whose BOM waits for a person."""
+
+    def refuse() -> None:
+        raise RejectedError("Bolt is archived")
+
+    entry = mine(vault, content, made_from)
+    once(vault, "merge_bom", refuse)
+    vault.send()
+    return entry
 
 
 def held(vault: Vault) -> Entry:
@@ -145,16 +153,6 @@ def test_a_race_between_the_look_and_the_upload_is_caught_by_the_server(vault: V
     assert vault.files() == [b"one", b"one less"]
 
 
-def test_own_commits_follow_each_other_offline(vault: Vault) -> None:
-    """Each is made from the one before, which has no number yet."""
-    mine(vault, b"one")
-    mine(vault, b"two", b"one")
-    mine(vault, b"three", b"two")
-    vault.send()
-    assert vault.files() == [b"one", b"two", b"three"]
-    assert [r.base_revision for r in reversed(vault.silo.revisions(vault.number))] == [0, 1, 2]
-
-
 def test_what_follows_a_held_one_is_held_too_and_goes_after_it(vault: Vault) -> None:
     """It has the first one's changes; sent alone it would undo the colleague's as well."""
     sent(vault, b"one", bom=True)
@@ -176,17 +174,6 @@ def test_a_file_of_unknown_origin_is_asked_about(vault: Vault) -> None:
     mine(vault, b"from somewhere")
     vault.send()
     assert "made from a file that is no revision in Silo" in held(vault).reason
-
-
-def test_a_lost_answer_is_no_colleague(vault: Vault) -> None:
-    """Our own revision arrived; the run after it finds that."""
-    sent(vault, b"one", bom=True)
-    mine(vault, b"two", b"one")
-
-    once(vault, "upload_file", lose, after=True)
-    vault.send()
-    vault.send(force=True)
-    assert (vault.waiting(), vault.files()) == ((), [b"one", b"two"])
 
 
 def test_the_bom_of_a_file_that_a_colleague_went_on_from_is_not_sent(vault: Vault) -> None:
@@ -224,29 +211,15 @@ def test_a_server_without_checksums_is_known_by_what_was_sent_to_it(vault: Vault
     assert [entry.newer["revision_number"] for entry in vault.waiting()] == [3]
 
 
-def test_saved_files_are_known_by_what_they_were_made_from(vault: Vault) -> None:
-    """By content, so a copied folder knows it as well."""
-    outbox = vault.outbox
-    assert outbox.origin_of("aa") == "aa"
-    outbox.derived("aa", "one")
-    outbox.derived("bb", "one")
-    outbox.derived("cc", "cc")
-    assert [outbox.origin_of(x) for x in ("aa", "bb", "cc")] == ["one", "one", "cc"]
+@pytest.mark.parametrize("there_before", [False, True])
+def test_a_bom_that_was_held_does_not_undo_a_colleagues(vault: Vault, there_before: bool) -> None:
+    """Retry says "the part is there now", not "send it over what a colleague committed meanwhile".
 
-
-@pytest.mark.parametrize("origin", ["", UNKNOWN])
-def test_the_first_file_of_an_item_passes(vault: Vault, origin: str) -> None:
-    """There is nothing to undo."""
-    vault.commit(vault.snapshot(), content=b"one", origin=origin)
-    vault.send()
-    assert (vault.waiting(), vault.files()) == ((), [b"one"])
-
-
-def test_a_bom_that_was_held_does_not_undo_a_colleagues(vault: Vault) -> None:
-    """Retry says "the part is there now", not "send it over what a colleague committed meanwhile"."""
-    entry = mine(vault, b"one")
-    once(vault, "merge_bom", refuse)
-    vault.send()
+    So also if the file was in Silo already, and the BOM is that of its revision.
+    """
+    if there_before:
+        sent(vault, b"one")
+    entry = refused(vault, b"one", b"one" if there_before else None)
     assert [one.file_left for one in vault.waiting()] == [False]
     theirs(vault, b"one less", 1)
     vault.outbox.retry(entry.id)
@@ -257,9 +230,7 @@ def test_a_bom_that_was_held_does_not_undo_a_colleagues(vault: Vault) -> None:
 
 def test_a_held_bom_may_go_after_files_that_come_from_here(vault: Vault) -> None:
     """Own files that were made from its file are no colleague's; with one between them they are."""
-    entry = mine(vault, b"one")
-    once(vault, "merge_bom", refuse)
-    vault.send()
+    entry = refused(vault, b"one")
     sent(vault, b"two", b"three", made_from=b"one")
     vault.outbox.retry(entry.id)
     vault.send()
@@ -408,9 +379,12 @@ def test_a_copy_under_another_name_sends_neither_file_nor_bom_unasked(vault: Vau
     """ "Save As" copies the identity along: the copy's BOM is not that of the item."""
     sent(vault, b"one", bom=True)
     mine(vault, b"variant", b"one", path=vault.folder / "Variant.FCStd")
-    vault.send()
-    assert (vault.files(), vault.lines()) == ([b"one"], {"F01-0001": 3})
+    mine(vault, b"the original continues", b"one", bom=False)
+    vault.send(force=True)
+    assert (vault.files(), vault.lines()) == ([b"one", b"the original continues"], {"F01-0001": 3})
     assert (held(vault).file_left, held(vault).bom_left) == (True, True)
+    for word in ("Variant.FCStd", vault.number, "whose file in Silo is Top.FCStd", "Same part", "Discard"):
+        assert word in held(vault).reason
 
 
 def test_on_top_of_what_a_person_saw_and_of_nothing_else(vault: Vault) -> None:
@@ -436,40 +410,24 @@ def test_a_revision_without_a_file_is_no_colleagues_work(vault: Vault) -> None:
     assert (vault.waiting(), vault.files()) == ((), [b"one", b"two"])
 
 
-def test_a_name_in_another_case_is_no_other_name(vault: Vault) -> None:
-    """Windows and macOS show one file by both."""
-    sent(vault, b"one")
-    known = vault.silo.revisions(vault.number)
-    assert other_name("/elsewhere/TOP.fcstd", known) == ""
-    assert other_name("/elsewhere/Top 2.FCStd", known) == "Top.FCStd"
-
-
-@pytest.mark.parametrize("stored", ["_Aux.FCStd", "aux.FCStd"])
-def test_the_name_that_a_server_gives_a_device_of_windows_is_no_other_name(stored: str) -> None:
-    """On Linux a file may be called so; else each of its commits would be asked about."""
-    known = [Revision(revision_number=1, file_name=stored)]
-    assert other_name("/v/Aux.FCStd", known) == ""
-    assert other_name("/v/Part.FCStd", known) == stored
-
-
-def test_what_was_there_already_keeps_its_revision_over_a_hold(vault: Vault) -> None:
-    """The BOM of a file that Silo had is refused; before its retry a colleague commits."""
-    sent(vault, b"one")
-    entry = mine(vault, b"one", b"one")
-    once(vault, "merge_bom", refuse)
-    vault.send()
-    theirs(vault, b"one less", 1)
-    vault.outbox.retry(entry.id)
-    vault.send()
-    assert (vault.waiting(), vault.lines()) == ((), {})
-    assert "alice has committed revision 2 since" in vault.told[-1].entry.remark
+@pytest.mark.parametrize(
+    ("stored", "path", "other"),
+    [
+        ("Top.FCStd", "/elsewhere/TOP.fcstd", ""),  # Windows and macOS show one file by both
+        ("Top.FCStd", "/elsewhere/Top 2.FCStd", "Top.FCStd"),
+        ("_Aux.FCStd", "/v/Aux.FCStd", ""),  # a server gives a device of Windows this name
+        ("aux.FCStd", "/v/Aux.FCStd", ""),
+        ("aux.FCStd", "/v/Part.FCStd", "aux.FCStd"),
+    ],
+)
+def test_a_name_that_is_spelt_otherwise_is_no_other_name(stored: str, path: str, other: str) -> None:
+    """Else each commit of such a file would be asked about."""
+    assert other_name(path, [Revision(revision_number=1, file_name=stored)]) == other
 
 
 def test_a_bom_that_was_not_sent_makes_none_out_of_date(vault: Vault) -> None:
     """What the pane says of an older held one stays true: no newer commit of it has arrived."""
-    mine(vault, b"one")
-    once(vault, "merge_bom", refuse)
-    vault.send()
+    refused(vault, b"one")
     mine(vault, b"longer", b"one")
 
     once(vault, "merge_bom", lambda: theirs(vault, b"went further", 2))
@@ -479,9 +437,7 @@ def test_a_bom_that_was_not_sent_makes_none_out_of_date(vault: Vault) -> None:
 
 def test_a_held_bom_does_not_go_after_a_file_with_a_colleagues_between(vault: Vault) -> None:
     """Sent on top of theirs at a person's word: the older BOM knows neither."""
-    entry = mine(vault, b"one")
-    once(vault, "merge_bom", refuse)
-    vault.send()
+    entry = refused(vault, b"one")
     theirs(vault, b"one less", 1)
     on_top = mine(vault, b"mine", b"one", bom=False)
     vault.send()
@@ -510,9 +466,7 @@ def test_a_lost_answer_is_found_behind_a_colleagues_commit(vault: Vault) -> None
 def test_a_bom_does_not_go_without_its_file(vault: Vault, since: str) -> None:
     """The server was restored between the two. Its number may be free, or another revision's by now."""
     sent(vault, b"one")
-    entry = mine(vault, b"longer", b"one")
-    once(vault, "merge_bom", refuse)
-    vault.send()
+    entry = refused(vault, b"longer", b"one")
     restored(vault, 1)
     if since == "a change of properties":
         vault.silo.update_item(vault.number, properties={"mass_kg": 2})
@@ -545,9 +499,7 @@ def test_a_file_that_went_once_more_is_found_below_a_colleagues(vault: Vault, cu
     """The server was restored to before all of its files, the answer to our upload lost, and somebody went on
     from it: the numbers of before say nothing."""
     sent(vault, b"one")
-    entry = mine(vault, b"two", b"one")
-    once(vault, "merge_bom", refuse)
-    vault.send()
+    entry = refused(vault, b"two", b"one")
     restored(vault, 0)
     vault.outbox.retry(entry.id)
     if cut:
@@ -568,11 +520,9 @@ def test_a_server_without_revisions_gets_the_file_once(vault: Vault) -> None:
         def revisions(self, *_arguments: object, **_more: object) -> list[Revision]:
             raise RouteMissingError("no such route")
 
-    entry = mine(vault, b"one")
     silo, known = vault.silo, vault.silo.revisions
     silo.__class__ = Bare
-    once(vault, "merge_bom", refuse)
-    vault.send()
+    entry = refused(vault, b"one")
     silo.answers.clear()  # nor does it know a repeat
     vault.outbox.retry(entry.id)
     vault.send()

@@ -4,16 +4,12 @@
 from __future__ import annotations
 
 import hashlib
-import threading
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from silo.bom.errors import (
-    AuthError,
     ConflictError,
-    ForbiddenError,
-    ReadOnlyError,
     RejectedError,
     SiloError,
     UnreachableError,
@@ -57,80 +53,44 @@ def test_a_commit_brings_file_and_bom(vault: Vault) -> None:
     assert (vault.waiting(), report.stopped_by) == ((), None)
 
 
-def test_an_unchanged_bom_posts_nothing(vault: Vault) -> None:
-    """The file goes, the BOM is compared and left alone."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 4)), content=b"one")
-    vault.send()
-    events = len(vault.silo.log)
-    vault.commit(vault.snapshot(vault.part("Bolt", 4)), content=b"two")
-    vault.send()
-    assert vault.told[1].status is Status.UNCHANGED
-    assert [event.type for event in vault.silo.log[events:]] == ["revision.created"]
+def test_a_second_commit_brings_what_has_changed(vault: Vault) -> None:
+    """An equal BOM is left alone, and the server's newest file is not uploaded again."""
+    for content in (b"one", b"one", b"two"):
+        vault.commit(vault.snapshot(vault.part("Bolt", 4)), content=content)
+        vault.send()
+    assert [(sent.status, sent.revision) for sent in vault.told] == [
+        (Status.MERGED, 1),
+        (Status.UNCHANGED, None),
+        (Status.UNCHANGED, 2),
+    ]
     assert vault.files() == [b"one", b"two"]
+    assert [event.type for event in vault.silo.log].count("bom_merge") == 1
 
 
-def test_an_unchanged_file_is_not_uploaded_again(vault: Vault) -> None:
-    """The server's newest revision is this very file."""
-    for _ in range(2):
-        vault.commit(vault.snapshot(vault.part("Bolt", 4)))
-        vault.send()
-    assert vault.files() == [b"top file"]
-    assert vault.told[1].revision is None
-    assert vault.told[1].status is Status.UNCHANGED
-
-
-def test_going_back_to_an_older_file_is_a_new_revision(vault: Vault) -> None:
-    """Only the newest revision says "there already"."""
-    for content in (b"one", b"two", b"one"):
-        vault.commit(vault.snapshot(), content=content)
-        vault.send()
-    assert vault.files() == [b"one", b"two", b"one"]
-
-
-def test_a_part_brings_its_file_only(vault: Vault) -> None:
-    """And has no BOM status."""
-    from silo.workbench.commit.plan import Snapshot
-
-    vault.commit(Snapshot(str(vault.top), "Top", vault.ids["Top"]))
+@pytest.mark.parametrize(
+    ("how", "lines", "files"),
+    [({"sync_bom": False}, {}, [b"top file"]), ({"content": None}, {"F01-0001": 4}, [])],
+    ids=["the sync is switched off", "somebody else committed the file"],
+)
+def test_one_half_may_go_alone(vault: Vault, how: Any, lines: Any, files: list[bytes]) -> None:
+    """The file of an assembly, or its BOM."""
+    vault.commit(vault.snapshot(vault.part("Bolt", 4)), **how)
     vault.send()
-    assert vault.told[0].status is None
-    assert vault.files() == [b"top file"]
+    assert (vault.lines(), vault.files()) == (lines, files)
+    assert vault.told[0].status is (Status.MERGED if lines else None)
 
 
-def test_with_the_sync_switched_off_only_the_file_goes(vault: Vault) -> None:
-    """A preference of the user."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 4)), sync_bom=False)
-    vault.send()
-    assert (vault.lines(), vault.files()) == ({}, [b"top file"])
-
-
-def test_without_a_file_only_the_bom_goes(vault: Vault) -> None:
-    """Somebody else committed the file."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 4)), content=None)
-    vault.send()
-    assert (vault.lines(), vault.files()) == ({"F01-0001": 4}, [])
-
-
-def test_a_broken_link_holds_the_bom_back_and_the_file_goes(vault: Vault) -> None:
-    """A missing file must never read as "removed"."""
+@pytest.mark.parametrize("consent", [False, True])
+def test_a_broken_link_holds_the_bom_back_unless_a_person_consents(vault: Vault, consent: bool) -> None:
+    """A missing file must never read as "removed"; with consent, what it stood for is unreferenced."""
     vault.commit(vault.snapshot(vault.part("Bolt", 4), vault.part("Plate")))
     vault.send()
-    vault.commit(vault.snapshot(vault.part("Bolt", 4), broken=True), content=b"two")
+    vault.commit(vault.snapshot(vault.part("Bolt", 4), broken=True), content=b"two", allow_missing=consent)
     vault.send()
-    assert vault.told[1].status is Status.BLOCKED
+    assert vault.told[1].status is (Status.MERGED if consent else Status.BLOCKED)
     assert vault.files() == [b"top file", b"two"]
-    assert all(line.unreferenced_since is None for line in vault.silo.get_bom(vault.number))
-
-
-def test_a_broken_link_with_consent_is_synced(vault: Vault) -> None:
-    """Then what it stood for is unreferenced, never removed."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 4), vault.part("Plate")))
-    vault.send()
-    vault.commit(vault.snapshot(vault.part("Bolt", 4), broken=True), content=b"two", allow_missing=True)
-    vault.send()
-    assert vault.told[1].status is Status.MERGED
     flagged = {ln.child_part_number: bool(ln.unreferenced_since) for ln in vault.silo.get_bom(vault.number)}
-    assert flagged == {"F01-0001": False, "M01-0001": True}
+    assert flagged == {"F01-0001": False, "M01-0001": consent}
 
 
 def test_components_without_a_number_are_left_out_and_reported(vault: Vault) -> None:
@@ -146,86 +106,21 @@ def test_components_without_a_number_are_left_out_and_reported(vault: Vault) -> 
 # --- offline ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("call", ["get_items_by_uuid", "upload_file", "merge_bom"])
-@pytest.mark.parametrize("after", [False, True], ids=["before it acted", "after it acted"])
-def test_the_server_goes_away_and_freecad_too(vault: Vault, call: str, after: bool) -> None:
-    """Whenever it happens: after a restart everything arrives, once."""
-    if call == "get_items_by_uuid":
-        # The look-up changes nothing, so the fake has no hook for it.
-        original = vault.silo.get_items_by_uuid
+def test_a_look_up_without_an_answer_keeps_the_commit(vault: Vault) -> None:
+    """Nothing of it is sent before the server says which items it has."""
+    look_up = vault.silo.get_items_by_uuid
 
-        def fail(*_arguments: Any, **_more: Any) -> Any:
-            raise DOWN
+    def fail(*_arguments: Any, **_more: Any) -> Any:
+        raise DOWN
 
-        vault.silo.get_items_by_uuid = fail  # type: ignore[method-assign]
-    else:
-        on(vault.silo, call, DOWN, after=after)
+    vault.silo.get_items_by_uuid = fail  # type: ignore[method-assign]
     vault.commit(vault.snapshot(vault.part("Bolt", 12)))
     vault.send()
-    assert vault.waiting()
-    if call == "get_items_by_uuid":
-        vault.silo.get_items_by_uuid = original  # type: ignore[method-assign]
-    well(vault.silo)
+    vault.silo.get_items_by_uuid = look_up  # type: ignore[method-assign]
+    assert (vault.lines(), vault.files()) == ({}, [])
     vault.again()
     vault.send(force=True)
-    assert (vault.lines(), vault.files()) == ({"F01-0001": 12}, [b"top file"])
-    assert vault.waiting() == ()
-    assert len([event for event in vault.silo.log if event.type == "bom_merge"]) == 1
-
-
-def test_several_commits_arrive_in_order(vault: Vault) -> None:
-    """None is lost, the last one's BOM is the one that stands."""
-    on(vault.silo, "upload_file", DOWN)
-    for count in (1, 2, 3):
-        vault.commit(vault.snapshot(vault.part("Bolt", count)), content=f"file {count}".encode())
-        vault.send()
-    well(vault.silo)
-    vault.send(force=True)
-    assert vault.files() == [b"file 1", b"file 2", b"file 3"]
-    assert vault.lines() == {"F01-0001": 3}
-
-
-@pytest.mark.parametrize("error", [ReadOnlyError("read-only"), AuthError("token")])
-def test_what_a_later_try_may_mend_waits(vault: Vault, error: SiloError) -> None:
-    """A read-only server, a wrong token: nothing is rejected, all is kept."""
-    on(vault.silo, "upload_file", error)
-    vault.commit(vault.snapshot(vault.part("Bolt", 12)))
-    report = vault.send()
-    assert report.stopped_by is error
-    assert not any(waiting.state is State.HELD for waiting in vault.waiting())
-
-
-def test_what_the_server_does_not_want_stays_visible_and_holds_up_nobody(
-    vault: Vault,
-) -> None:
-    """With its reason; a later commit goes its way."""
-    on(vault.silo, "merge_bom", RejectedError("entries[0]: unknown part"))
-    vault.commit(vault.snapshot(vault.part("Bolt", 1)), content=b"one")
-    vault.send()
-    (waiting,) = vault.waiting()
-    assert waiting.state is State.HELD
-    assert waiting.reason == "entries[0]: unknown part\nIts file is in Silo; only the BOM is not"
-    assert (waiting.file_left, waiting.bom_left) == (False, True)
-    well(vault.silo)
-    vault.commit(vault.snapshot(vault.part("Bolt", 2)), content=b"two")
-    vault.send()
-    assert vault.lines() == {"F01-0001": 2}
-    assert [(w.id, w.superseded) for w in vault.waiting()] == [(waiting.id, True)]
-    vault.outbox.discard(waiting.id)
-    assert vault.waiting() == ()
-
-
-def test_a_rejected_thing_can_be_tried_again(vault: Vault) -> None:
-    """After somebody mended what was wrong."""
-    on(vault.silo, "merge_bom", ForbiddenError("viewers may not"))
-    vault.commit(vault.snapshot(vault.part("Bolt", 1)))
-    vault.send()
-    well(vault.silo)
-    vault.send(force=True)
-    assert vault.lines() == {}
-    vault.outbox.retry(vault.waiting()[0].id)
-    vault.send()
-    assert vault.lines() == {"F01-0001": 1}
+    assert (vault.lines(), vault.files(), vault.waiting()) == ({"F01-0001": 12}, [b"top file"], ())
 
 
 def test_an_item_that_this_server_does_not_know(vault: Vault) -> None:
@@ -245,48 +140,12 @@ def test_an_item_that_this_server_does_not_know(vault: Vault) -> None:
     assert vault.top.exists()
 
 
-def test_two_freecads_do_not_send_the_same(vault: Vault) -> None:
-    """The second one leaves it to the first."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 1)))
-    with vault.outbox.send_lock():
-        vault.again()
-        report = vault.send()
-    assert report.busy
-    assert vault.files() == []
-
-
-def test_stop_keeps_what_is_not_sent(vault: Vault) -> None:
-    """A person's stop is no failure."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 1)))
-    stop = threading.Event()
-    stop.set()
-    report = vault.send(stop=stop)
-    assert report.stopped_by is not None
-    assert report.stopped_by.code == "cancelled"
-    (waiting,) = vault.waiting()
-    assert waiting.state is State.WAITING
-
-
 def renamed(vault: Vault, content: bytes) -> None:
     """Commit the assembly from a file of another name, as after FreeCAD's Save As."""
     path = vault.folder / "TopLong.FCStd"
     path.write_bytes(content)
     vault.clock += 1
     vault.outbox.add(Commit(str(path), vault.clock, "TopLong", vault.ids["Top"], file=path))
-
-
-def test_a_file_of_another_name_is_not_sent_unasked(vault: Vault) -> None:
-    """Save As copies the identity along: the copy must not become a revision of the part it was made from."""
-    vault.commit(vault.snapshot())
-    vault.send()
-    renamed(vault, b"a longer one")
-    vault.commit(vault.snapshot(), content=b"the original continues")
-    vault.send(force=True)
-    assert vault.files() == [b"top file", b"the original continues"]
-    (waiting,) = vault.waiting()
-    assert waiting.state is State.HELD
-    for word in ("TopLong.FCStd", vault.number, "whose file in Silo is Top.FCStd", "Same part", "Discard"):
-        assert word in waiting.reason
 
 
 def test_retry_says_that_it_is_the_same_part(vault: Vault) -> None:
@@ -324,21 +183,6 @@ def test_a_retry_for_another_reason_answers_no_question(vault: Vault) -> None:
     vault.send()
     assert vault.files() == [b"top file"]
     assert vault.waiting()[0].renamed == ASKED
-
-
-def test_a_refused_file_does_not_keep_the_bom(vault: Vault) -> None:
-    """Too large for the server; the BOM is as it should be, and the file waits for a person."""
-    on(vault.silo, "upload_file", RejectedError("413: too large"))
-    vault.commit(vault.snapshot(vault.part("Bolt", 3)))
-    vault.send()
-    (waiting,) = vault.waiting()
-    assert (waiting.file_left, waiting.bom_left) == (True, False)
-    assert waiting.reason == "413: too large\nIts BOM is in Silo; only the file is not"
-    assert vault.lines() == {"F01-0001": 3}
-    well(vault.silo)
-    vault.outbox.retry(waiting.id)
-    vault.send()
-    assert (vault.files(), vault.waiting()) == ([b"top file"], ())
 
 
 def test_a_part_that_is_registered_after_the_refusal_is_in_the_bom_of_the_retry(vault: Vault) -> None:

@@ -10,6 +10,7 @@ import os
 import shutil
 import sqlite3
 import stat
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -62,9 +63,15 @@ def commit(document: Path, key: str = "", file: Path | None = None) -> Commit:
     )
 
 
-def test_what_is_added_waits_with_its_own_copy(store: Store, document: Path) -> None:
-    """The document may be edited further, also in place; what was committed is what will be sent."""
-    entry = store.add(commit(document))
+def with_item() -> tuple[FakeSilo, str]:
+    """A server with one assembly, and its identity."""
+    silo = FakeSilo()
+    return silo, silo.create_item("kindred-rd", "A01", "Top").id
+
+
+def test_what_is_added_waits_as_it_was(store: Store, document: Path) -> None:
+    """File and BOM of one moment, also for the next process; the document may be edited further in place."""
+    entry = store.add(commit(document), "http://silo")
     with document.open("r+b") as file:
         file.write(b"other")
     (waiting,) = Store(store.path).entries()
@@ -72,6 +79,24 @@ def test_what_is_added_waits_with_its_own_copy(store: Store, document: Path) -> 
     assert (store.copies / waiting.copy).read_bytes() == b"first"
     assert waiting.sha256 == hashlib.sha256(b"first").hexdigest()
     assert (waiting.comment, waiting.taken_at, waiting.label) == ("why", 1.0, "Top")
+    assert (waiting.server, waiting.file_name, waiting.size) == ("http://silo:80/api", "Top.FCStd", 5)
+    assert (waiting.file_left, waiting.bom_left) == (True, True)
+
+
+def test_a_commit_that_cannot_be_kept_is_reported_and_leaves_nothing(store: Store, document: Path) -> None:
+    """At once, not when it is sent: a file that cannot be read, or neither file nor BOM."""
+    with pytest.raises(DocumentError, match=r"gone\.FCStd.*nothing was kept"):
+        store.add(commit(document.with_name("gone.FCStd")))
+    with pytest.raises(InputError, match="neither a file nor a BOM"):
+        store.add(Commit(str(document), 1.0))
+    assert (store.entries(), list(store.copies.iterdir())) == ((), [])
+
+
+def test_the_default_place_is_the_users_data_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where data that must not be lost belongs."""
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    if sys.platform == "linux":
+        assert Store().path == tmp_path / "silo-mod" / "outbox.sqlite3"
 
 
 def test_a_held_file_keeps_its_content_when_freecad_saves_again(store: Store, document: Path) -> None:
@@ -97,11 +122,6 @@ def test_a_disk_where_each_name_of_a_file_is_another_file(tmp_path: Path) -> Non
         held = store.hold(str(document), key)
         entry = store.add(replace(commit(document, key, held), stamp=stamp))
         assert (store.copies / entry.copy).read_bytes() == b"first"
-
-
-def test_what_cannot_be_held_is_copied(store: Store, tmp_path: Path) -> None:
-    """Another disk, or no file at all."""
-    assert store.hold(str(tmp_path / "none.FCStd"), new_key()) is None
 
 
 def test_killed_before_the_copy_was_made(store: Store, document: Path) -> None:
@@ -162,6 +182,11 @@ def database(store: Store) -> list[Path]:
     return [file for file in store.path.parent.glob(f"{store.path.name}*") if file.is_file()]
 
 
+def lose(store: Store) -> None:
+    for file in database(store):
+        file.unlink()
+
+
 def rewritten(store: Store, write: Callable[[Path], object]) -> None:
     """The database as a whole file with another content."""
     with closing(sqlite3.connect(store.path)) as db:
@@ -207,7 +232,7 @@ def of_format(version: int, *, described: bool) -> Callable[[Store], None]:
 
 
 DAMAGES: dict[str, Callable[[Store], object]] = {
-    "deleted": lambda store: [file.unlink() for file in database(store)],
+    "deleted": lose,
     "emptied": lambda store: [file.write_bytes(b"") for file in database(store)],
     "moved away": lambda store: [file.rename(f"{file}.bad") for file in database(store)],
     "a text": lambda store: rewritten(store, lambda path: path.write_text("not a database at all" * 999)),
@@ -219,18 +244,21 @@ DAMAGES: dict[str, Callable[[Store], object]] = {
     "format 7": of_format(7, described=True),
     "a newer format": of_format(VERSION + 1, described=True),
 }
-REMEDIES: dict[str, Callable[[Store], object]] = {
-    "nothing": lambda _store: None,
-    "moved away": lambda store: [file.rename(f"{file}.bad") for file in database(store)],
-    "deleted": lambda store: [file.unlink() for file in database(store)],
-}
 
 
-@pytest.mark.parametrize("running", [False, True], ids=["restarted", "while it runs"])
-@pytest.mark.parametrize("remedy", REMEDIES)
-@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize(
+    ("damage", "remedy", "running"),
+    [
+        *((damage, "nothing", running) for damage in DAMAGES for running in (False, True)),
+        *(
+            (damage, remedy, False)
+            for damage in ("format 6", "damaged pages", "a newer format")
+            for remedy in ("moved away", "deleted")
+        ),
+    ],
+)
 def test_a_lost_database_costs_no_commit(
-    store: Store, document: Path, damage: str, remedy: str, *, running: bool
+    store: Store, document: Path, damage: str, remedy: str, running: bool
 ) -> None:
     """Whatever was promised is in Silo once or in view, whatever a person does to the file."""
     silo = FakeSilo()
@@ -260,7 +288,8 @@ def test_a_lost_database_costs_no_commit(
     died(store)
     before = {entry.key: entry for entry in store.entries()}
     DAMAGES[damage](store)
-    REMEDIES[remedy](store)
+    if remedy != "nothing":
+        DAMAGES[remedy](store)
     after = store if running else Store(store.path)
     if running and damage in ("another program's", "cut off", "damaged pages"):
         with suppress(OutboxError):  # said once; the next call makes it again
@@ -287,8 +316,7 @@ def test_a_lost_database_costs_no_commit(
     after.sweep()
     assert [*after.copies.iterdir()] == []
     # What was there is kept, and nothing comes back with it.
-    for file in database(after):
-        file.unlink()
+    lose(after)
     assert Store(store.path).entries() == ()
 
 
@@ -296,8 +324,7 @@ def test_a_description_that_is_lost_with_the_database_is_in_view(store: Store, d
     """Two things are damaged at once: its copy is what can be saved, and a person is asked."""
     for number, damage in enumerate((Path.unlink, lambda path: path.write_bytes(b"{half"))):
         entry = store.add(commit(document))
-        for file in database(store):
-            file.unlink()
+        lose(store)
         damage(store.copies / f"{entry.key}.json")
         (found,) = [one for one in Store(store.path).entries() if one.key == entry.key]
         assert (found.state, "Save a copy" in found.reason, found.file_left) == (State.HELD, True, True)
@@ -329,7 +356,7 @@ def test_a_database_that_is_lost_twice_costs_no_commit(store: Store, document: P
     store.add(commit(document))
     of_format(6, described=False)(store)
     before = Store(store.path).entries()
-    DAMAGES["deleted"](store)
+    lose(store)
     assert Store(store.path).entries() == before
     assert [entry.state for entry in before] == [State.WAITING]
 
@@ -340,7 +367,7 @@ def test_commits_of_one_number_are_both_kept_in_their_order(store: Store, docume
         store.add(commit(document, key))
     described = store._described("b")
     described.write_text(json.dumps(json.loads(described.read_text()) | {"id": 1}))
-    DAMAGES["deleted"](store)
+    lose(store)
     assert [entry.key for entry in Store(store.path).entries()] == ["a", "b", "c"]
 
 
@@ -358,8 +385,7 @@ def test_a_commit_that_ends_while_the_database_is_made_is_no_lost_one(
 ) -> None:
     """Another program still has the old file open, and its answer has just arrived."""
     entry = store.add(commit(document))
-    for file in database(store):
-        file.unlink()
+    lose(store)
 
     def read(path: Path) -> dict[str, Any]:
         path.rename(path.with_suffix(".gone"))
@@ -438,13 +464,12 @@ class Moody(Store):
 @pytest.mark.parametrize("number", [errno.EIO, errno.ENOSPC, errno.EACCES, errno.ESTALE])
 def test_a_disk_that_does_not_answer_is_no_damage(tmp_path: Path, document: Path, number: int) -> None:
     """While the copy is made, and while it is sent: the entry stays, says why, and goes later by itself."""
-    silo = FakeSilo()
-    item = silo.create_item("kindred-rd", "A01", "Top")
+    silo, item = with_item()
     store = Moody(tmp_path / "outbox.sqlite3")
     store.error = OSError(number, os.strerror(number))
     key = new_key()
     held = store.hold(str(document), key)
-    store.add(Commit(str(document), 1.0, identity=item.id, key=key, file=held))
+    store.add(Commit(str(document), 1.0, identity=item, key=key, file=held))
     send_all(store, silo, force=True)
     (entry,) = store.entries()
     assert (entry.state, os.strerror(number) in entry.reason) == (State.KEEPING, True)
@@ -497,9 +522,8 @@ def test_what_is_lost_is_reported_as_lost_also_where_its_row_cannot_go(
 @pytest.mark.parametrize("content", [b"", b"fir", b"first and more"])
 def test_a_damaged_copy_is_not_sent(store: Store, document: Path, content: bytes) -> None:
     """Cut short by a power cut or a full disk; a person sees it and can save what there is."""
-    silo = FakeSilo()
-    item = silo.create_item("kindred-rd", "A01", "Top")
-    entry = store.add(Commit(str(document), 1.0, identity=item.id, file=document))
+    silo, item = with_item()
+    entry = store.add(Commit(str(document), 1.0, identity=item, file=document))
     (store.copies / entry.copy).write_bytes(content)
     send_all(store, silo)
     (after,) = store.entries()
@@ -512,27 +536,12 @@ def test_a_damaged_copy_is_not_sent(store: Store, document: Path, content: bytes
 
 def test_a_bom_that_cannot_be_parsed_is_held(store: Store, document: Path) -> None:
     """The file goes anyway."""
-    silo = FakeSilo()
-    item = silo.create_item("kindred-rd", "A01", "Top")
-    entry = store.add(Commit(str(document), 1.0, identity=item.id, request='{"entries": 5}'))
+    silo, item = with_item()
+    entry = store.add(Commit(str(document), 1.0, identity=item, request='{"entries": 5}'))
     store.update(entry.id, request="{half")
     send_all(store, silo)
     (after,) = store.entries()
     assert (after.state, "cannot be read any more" in after.reason) == (State.HELD, True)
-
-
-def test_a_commit_without_anything_is_refused(store: Store, document: Path) -> None:
-    """Neither file nor BOM."""
-    with pytest.raises(InputError, match="neither a file nor a BOM"):
-        store.add(Commit(str(document), 1.0))
-
-
-def test_discarded_is_gone(store: Store, document: Path) -> None:
-    """Its copy too; the document itself stays."""
-    store.discard(store.add(commit(document)).id)
-    assert store.entries() == ()
-    assert list(store.copies.iterdir()) == []
-    assert document.exists()
 
 
 def test_a_second_name_for_which_no_commit_came_is_swept_up_later(store: Store, document: Path) -> None:
@@ -567,9 +576,8 @@ def test_a_folder_that_does_not_take_it_is_reported(tmp_path: Path, document: Pa
 
 def test_a_full_disk_under_the_database_loses_nothing(store: Store, document: Path) -> None:
     """The error is not the entry's: it is neither held nor forgotten."""
-    silo = FakeSilo()
-    item = silo.create_item("kindred-rd", "A01", "Top")
-    store.add(Commit(str(document), 1.0, identity=item.id, file=document))
+    silo, item = with_item()
+    store.add(Commit(str(document), 1.0, identity=item, file=document))
 
     class Full(Store):
         def update(self, entry_id: int, **values: Any) -> None:
@@ -584,10 +592,15 @@ def test_a_full_disk_under_the_database_loses_nothing(store: Store, document: Pa
 
 @pytest.mark.usefixtures("needs_modes")
 def test_commits_are_private(store: Store, document: Path) -> None:
-    """They hold other people's documents."""
-    entry = store.add(commit(document))
-    for path in (store.path, store.copies, store.copies / entry.copy):
-        assert stat.S_IMODE(path.stat().st_mode) & 0o077 == 0
+    """Database, its companions, copies, folder: they hold other people's documents."""
+    store.entries()
+    with closing(sqlite3.connect(store.path)) as reader:
+        reader.execute("SELECT * FROM entry").fetchall()
+        store.add(commit(document))
+        found = [path for path in store.path.parent.glob("outbox*") if path.is_file()]
+        assert {path.name for path in found} >= {"outbox.sqlite3", "outbox.sqlite3-wal", "outbox.lock"}
+        for path in (*found, store.copies, *store.copies.iterdir()):
+            assert stat.S_IMODE(path.stat().st_mode) & 0o077 == 0, path
 
 
 def test_copies_of_replaced_files_are_kept_for_ninety_days(tmp_path: Path) -> None:
@@ -750,6 +763,8 @@ def test_a_disk_error_of_one_entry_stops_no_other(tmp_path: Path, document: Path
 def test_a_file_that_was_saved_and_then_committed_is_its_own_origin(store: Store, document: Path) -> None:
     """Also while it waits; what was saved and not committed is made from what came before it."""
     saved = hashlib.sha256(b"first").hexdigest()
+    store.derived("same", "same")
+    assert [store.origin_of(content) for content in ("unknown", "same")] == ["unknown", "same"]
     store.derived(saved, "before")
     assert store.origin_of(saved) == "before"
     entry = store.add(commit(document))
@@ -802,8 +817,7 @@ def test_a_file_that_is_called_like_a_description_is_a_file(store: Store, docume
     path = document.with_name(name)
     path.write_bytes(b"{}")
     entry = store.add(commit(path))
-    for file in database(store):
-        file.unlink()
+    lose(store)
     again = Store(store.path)
     again.sweep()
     (found,) = again.entries()

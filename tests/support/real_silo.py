@@ -642,6 +642,7 @@ FAULTS = (
 REFUSALS: dict[str, tuple[int, str, str]] = {
     "401": (401, "unauthorized", ""),
     "403": (403, "forbidden", ""),
+    "404": (404, "not_found", "no such item"),
     "409": (409, "conflict", "the item is checked out"),
     "413": (413, "too_large", ""),
     "422": (422, "unprocessable", "no such kind of file"),
