@@ -406,78 +406,64 @@ def with_files(silo: Silo, folder: Path) -> str:
     return number
 
 
-OLDER, GONE = NewerRevisionError, MissingRevisionError
-
-
-@pytest.mark.parametrize(
-    ("base", "content", "refusal"),
-    [
-        (None, "mine", None),
-        (5, "mine", None),
-        (6, "mine", None),
-        (4, "mine", OLDER),
-        (3, "one", OLDER),
-        (0, "two", OLDER),
-        (0, "three", None),
-    ],
-)
-def test_a_file_that_would_undo_the_newest_is_refused(
-    silo: Silo, tmp_path: Path, base: int | None, content: str, refusal: type[ConflictError] | None
-) -> None:
+def test_a_file_that_would_undo_the_newest_is_refused(silo: Silo, tmp_path: Path) -> None:
     """By the revision that it was made from; the newest file itself undoes nothing."""
     number, file = with_files(silo, tmp_path), tmp_path / "Top.FCStd"
-    file.write_text(content)
-    origin = Origin(base_revision=base)
-    if refusal is None:
-        assert silo.upload_file(number, file, origin=origin).revision_number == 6
-        return
-    with pytest.raises(refusal) as caught:
-        silo.upload_file(number, file, origin=origin)
-    assert isinstance(caught.value, NewerRevisionError)
-    newer = caught.value.revision
-    assert (newer["revision_number"], newer["file_checksum"], newer["comment"]) == (5, sha("three"), "three")
+    for base, content in ((4, "mine"), (3, "one"), (0, "two")):
+        file.write_text(content)
+        with pytest.raises(NewerRevisionError) as caught:
+            silo.upload_file(number, file, origin=Origin(base_revision=base))
+        newer = caught.value.revision
+        assert (newer["revision_number"], newer["file_checksum"]) == (5, sha("three"))
+        assert newer["comment"] == "three"
     assert len(silo.revisions(number)) == 5
+    for made, (base, content) in enumerate(
+        ((0, "three"), (6, "mine"), (8, "more"), (None, "other")), start=6
+    ):
+        file.write_text(content)
+        assert silo.upload_file(number, file, origin=Origin(base_revision=base)).revision_number == made
 
 
-@pytest.mark.parametrize("dry_run", [False, True])
-@pytest.mark.parametrize(
-    ("revision", "content", "refusal"),
-    [
-        (None, None, None),
-        (None, "three", None),
-        (None, "edited", None),
-        (None, "one", OLDER),
-        (None, "two", OLDER),
-        (5, "three", None),
-        (1, "three", None),
-        (5, "one", None),
-        (3, "one", OLDER),
-        (2, "two", OLDER),
-        (2, None, OLDER),
-        (5, None, None),
-        (5, "gone", GONE),
-        (2, "gone", GONE),
-        (6, "gone", GONE),
-    ],
-)
-def test_the_bom_of_a_file_that_would_undo_the_newest_is_refused(
-    silo: Silo,
-    tmp_path: Path,
-    revision: int | None,
-    content: str | None,
-    refusal: type[ConflictError] | None,
-    dry_run: bool,
-) -> None:
+# Revision and content that a BOM was read from → whether it may be merged.
+OLDER, GONE = NewerRevisionError, MissingRevisionError
+READ_FROM: list[tuple[int | None, str | None, type[ConflictError] | None]] = [
+    (None, None, None),
+    (None, "three", None),
+    (None, "edited", None),
+    (None, "one", OLDER),
+    (None, "two", OLDER),
+    (5, "three", None),
+    (1, "three", None),
+    (5, "one", None),
+    (3, "one", OLDER),
+    (2, "two", OLDER),
+    (2, None, OLDER),
+    (5, None, None),
+    (5, "gone", GONE),
+    (2, "gone", GONE),
+    (6, "gone", GONE),
+]
+
+
+def test_the_bom_of_a_file_that_would_undo_the_newest_is_refused(silo: Silo, tmp_path: Path) -> None:
     """By the revision, by the content, or by both; a file that the server does not have goes first."""
-    number, bolt = with_files(silo, tmp_path), make(silo, "Bolt", "F01")
-    document = SourceDocument(file="Top.FCStd", revision=revision, sha256=sha(content) if content else None)
-    wanted = request(None, dry_run=dry_run, **{key(bolt): 4}).model_copy(update={"document": document})
-    if refusal is None:
-        assert [line.part_number for line in silo.merge_bom(number, wanted).diff.added] == [bolt]
-        return
-    with pytest.raises(refusal):
-        silo.merge_bom(number, wanted)
-    assert silo.get_bom(number) == []
+    number, part = with_files(silo, tmp_path), make(silo, "Bolt", "F01")
+    for count, (revision, content, refusal) in enumerate(READ_FROM, start=1):
+        for dry_run in (True, False):
+            document = SourceDocument(
+                file="Top.FCStd", revision=revision, sha256=sha(content) if content else None
+            )
+            wanted = request(dry_run=dry_run, **{key(part): count}).model_copy(update={"document": document})
+            before = silo.get_bom(number)
+            if refusal is None:
+                diff = silo.merge_bom(number, wanted).diff
+                changed = [*diff.added, *diff.quantity_changed]
+                assert [line.part_number for line in changed] == [part], (revision, content)
+            else:
+                with pytest.raises(refusal):
+                    silo.merge_bom(number, wanted)
+            if refusal is not None or dry_run:
+                assert silo.get_bom(number) == before, (revision, content)
 
 
 def test_a_file_of_several_items_has_revisions_of_its_own(silo: Silo, tmp_path: Path) -> None:

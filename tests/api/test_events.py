@@ -166,27 +166,38 @@ def test_a_mark_that_the_server_refuses_is_given_up(
     assert server.seen[1].headers["Last-Event-ID"] is None
 
 
-@pytest.mark.parametrize(("status", "again"), [(401, None), (403, SELDOM)])
-def test_a_token_that_is_refused_waits_for_a_person(
-    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any, status: int, again: float
+@pytest.mark.parametrize(
+    ("given", "kind", "again", "word"),
+    [
+        ((401, {"error": "x"}), Connection.REFUSED, None, "token"),
+        ((403, {"error": "x"}), Connection.REFUSED, SELDOM, "token"),
+        ((302, "", {"Location": "/login"}), Connection.REFUSED, None, "login"),  # a proxy with single sign-on
+        (
+            (404, "404 page not found"),
+            Connection.UNSUPPORTED,
+            SELDOM,
+            "",
+        ),  # may be updated
+        ((404, "<html>", {"Content-Type": "text/html"}), Connection.OFFLINE, 1.0, ""),  # the server restarts
+        ((503, {}, {"Retry-After": "77"}), Connection.OFFLINE, 77.0, "in 77 s"),
+    ],
+)
+def test_each_refusal_has_its_state_and_its_pause(
+    server: Any,
+    client: SiloClient,
+    stream: Callable[..., Any],
+    answer: Any,
+    given: Any,
+    kind: Connection,
+    again: float | None,
+    word: str,
 ) -> None:
     """The thread lives on and wakes where a person acts: a new token, or *Retry all*."""
-    server.on(EVENTS, answer(status, {"error": "x"}), stream(frame(1), stay=True))
-    with Watch(client, wait=lambda wake, seconds: wake.wait(60)) as watch:
-        state = watch.state(Connection.REFUSED)
-        assert ("token" in state.message, state.retry_in) == (True, again)
+    server.on(EVENTS, answer(*given), stream(frame(1), stay=True))
+    with Watch(client, wait=lambda wake, _seconds: wake.wait(60)) as watch:
+        state = watch.state(kind)
+        assert (state.retry_in, word in state.message) == (again, True)
         assert len(server.seen) == 1
-        watch.listener.retry_now()
-        assert watch.event().id == "1"
-
-
-def test_a_login_page_waits_for_a_person_too(
-    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
-) -> None:
-    """A proxy with single sign-on redirects what has no session."""
-    server.on(EVENTS, answer(302, "", {"Location": "/login"}), stream(frame(1), stay=True))
-    with Watch(client, wait=lambda wake, seconds: wake.wait(60)) as watch:
-        assert "login" in watch.state(Connection.REFUSED).message
         watch.listener.retry_now()
         assert watch.event().id == "1"
 
@@ -250,39 +261,6 @@ def test_events_do_not_end_the_pause_of_a_server_that_takes_no_changes(
         assert pauses.pause is not None
 
 
-def test_a_server_without_events_is_asked_again_but_rarely(
-    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
-) -> None:
-    """An older server; it may be updated while FreeCAD runs."""
-    server.on(EVENTS, answer(404, "404 page not found"), stream(frame(1), stay=True))
-    with Watch(client) as watch:
-        assert watch.state(Connection.UNSUPPORTED).retry_in == SELDOM
-        assert watch.event().id == "1"
-
-
-def test_a_web_page_of_a_proxy_is_a_passing_loss(
-    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
-) -> None:
-    """A proxy answers 404 with its own page while the server behind it restarts."""
-    page = answer(404, "<html><title>404 Not Found</title></html>", {"Content-Type": "text/html"})
-    server.on(EVENTS, page, page, stream(frame(1), stay=True))
-    with Watch(client) as watch:
-        assert watch.state(Connection.OFFLINE).retry_in == 1.0
-        assert watch.event().id == "1"
-    assert watch.pauses[:2] == [1.0, 2.0]
-
-
-def test_the_pause_that_the_server_named_is_kept(
-    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
-) -> None:
-    """And named to the person."""
-    server.on(EVENTS, answer(503, {}, {"Retry-After": "77"}), stream(frame(1), stay=True))
-    with Watch(client) as watch:
-        said = watch.state(Connection.OFFLINE)
-        assert (said.retry_in, "in 77 s" in said.message) == (77.0, True)
-        assert watch.event().id == "1"
-
-
 def test_a_stream_that_falls_silent_is_dead(server: Any, stream: Callable[..., Any]) -> None:
     """No byte for the time of three heartbeats: the line is cut somewhere without anybody having said so."""
     server.on(EVENTS, stream(frame(1), stay=True))
@@ -328,24 +306,15 @@ def test_stop_wakes_a_waiting_stream_and_nothing_comes_after_it(
         assert watch.said.empty()
 
 
-def test_stop_ends_a_pause(client: SiloClient, server: Any, answer: Any) -> None:
-    """A pause of a minute is not waited for."""
+def test_a_person_and_stop_end_a_pause(client: SiloClient, server: Any, answer: Any) -> None:
+    """A pause of ten minutes is not waited for."""
     server.on(EVENTS, answer(502))
-    with Watch(client, backoff=Backoff(first=600, longest=600), wait=threading.Event.wait) as watch:
-        assert watch.state(Connection.OFFLINE).retry_in == 600
-        watch.listener.stop(timeout=60)
-        assert not watch.listener._thread.is_alive()  # type: ignore[union-attr]
-
-
-def test_a_person_can_end_a_pause(
-    client: SiloClient, server: Any, answer: Any, stream: Callable[..., Any]
-) -> None:
-    """The "try now" button."""
-    server.on(EVENTS, answer(502), stream(frame(1), stay=True))
     with Watch(client, backoff=Backoff(first=600, longest=600), wait=threading.Event.wait) as watch:
         watch.state(Connection.OFFLINE)
         watch.listener.retry_now()
-        assert watch.event().id == "1"
+        assert watch.state(Connection.OFFLINE).retry_in is not None
+        watch.listener.stop(timeout=60)
+        assert not watch.listener._thread.is_alive()  # type: ignore[union-attr]
 
 
 def test_stop_from_within_a_callback_does_not_lock_up() -> None:
@@ -393,13 +362,6 @@ def test_starting_twice_is_one_connection(
         watch.event()
         watch.listener.start()
     assert server.paths().count("GET /api/events") == 1
-
-
-def test_pauses_grow_to_their_limit_and_are_spread_by_chance() -> None:
-    """A thousand clients do not come back in one moment."""
-    backoff = Backoff(first=1, factor=2, longest=60)
-    assert [backoff.pause(n, 0.0) for n in (1, 2, 3, 7, 100_000)] == [1, 2, 4, 60, 60]
-    assert backoff.pause(100, 0.999) == pytest.approx(30, rel=0.01)
 
 
 def test_a_state_reads_as_a_sentence() -> None:

@@ -10,7 +10,7 @@ import pytest
 from silo.api.boms import NOT_ATOMIC
 from silo.api.client import SiloClient
 from silo.api.wire import MergeEntry, MergeRequest
-from silo.bom.errors import ConflictError, RejectedError, RouteMissingError, UnreachableError
+from silo.bom.errors import ConflictError, RejectedError, RouteMissingError
 
 ITEM, BOM = "GET /api/items/A01-0001", "/api/items/A01-0001/bom"
 MERGE, ADD = f"POST {BOM}/merge", f"POST {BOM}"
@@ -67,20 +67,6 @@ def test_one_refused_line_does_not_hold_up_the_others(old: Any, client: SiloClie
     with pytest.raises(RejectedError, match=r"1 lines were written.*1 were refused.*no such child"):
         client.merge_bom("A01-0001", WANTED)
     assert f"PUT {BOM}/F01-0002" in old.paths()
-
-
-def test_what_breaks_off_is_an_error_and_continues_later(old: Any, client: SiloClient, answer: Any) -> None:
-    """The next run plans from the lines as they are then."""
-    old.scripts[f"PUT {BOM}/F01-0002"].clear()
-    old.on(f"PUT {BOM}/F01-0002", answer(drop=True))
-    with pytest.raises(UnreachableError):
-        client.merge_bom("A01-0001", WANTED)
-    old.scripts[f"GET {BOM}"].clear()
-    old.on(f"GET {BOM}", [*LINES, line("M01-0002", 1)])
-    old.scripts[f"PUT {BOM}/F01-0002"].clear()
-    old.on(f"PUT {BOM}/F01-0002", line("F01-0002", 6))
-    client.merge_bom("A01-0001", WANTED)
-    assert old.paths("POST").count(f"POST {BOM}") == 1
 
 
 def test_a_dry_run_and_a_version_stay_what_they_are(old: Any, client: SiloClient) -> None:

@@ -17,7 +17,6 @@ from silo.api.policy import (
     LONGEST_TOLD,
     Backoff,
     ErrorScope,
-    Retries,
     Then,
     Verdict,
     WebPageError,
@@ -132,12 +131,8 @@ def test_pauses_are_bounded_and_never_shorter_than_asked(
     pause = Backoff(1.0, 2.0, 60.0).pause(attempt, chance, told)
     assert pause >= (told or 0.0)
     assert 0.5 <= pause <= max(60.0, told or 0.0)
-
-
-def test_giving_up_after_the_last_try() -> None:
-    """Three tries have two pauses."""
-    retries = Retries(tries=3, first=1.0, chance=lambda: 0.0)
-    assert [retries.pause(n, UnreachableError("x"), harmless=True) for n in (1, 2, 3)] == [1.0, 2.0, None]
+    if told is None:  # many clients do not come back in one moment
+        assert pause == pytest.approx(min(60.0, 2.0 ** (min(attempt, 60) - 1)) * (1 - chance / 2))
 
 
 @pytest.mark.parametrize(("status", "headers"), [(429, {}), (503, {"Retry-After": "7"})])
@@ -149,27 +144,6 @@ def test_a_change_that_was_put_off_is_sent_again(
     server.on("POST /api/items", answer(status, {"error": "slow down"}, headers), answer(201, made_item))
     assert client.create_item("kindred-rd", "F01", "Bolt").part_number == "F01-0001"
     assert pauses == ([7.0] if headers else [0.5])
-
-
-def test_a_change_whose_answer_was_lost_is_not_sent_again(
-    server: Any, client: SiloClient, answer: Any, pauses: list[float]
-) -> None:
-    """It may have arrived."""
-    for lost in (answer(drop=True), answer(502, "<html></html>"), answer(504)):
-        server.scripts.clear()
-        server.on("POST /api/items", lost)
-        with pytest.raises(UnreachableError):
-            client.create_item("kindred-rd", "F01", "Bolt")
-    assert (len(server.seen), pauses) == (3, [])
-
-
-def test_a_long_pause_is_reported_with_its_time(server: Any, client: SiloClient, answer: Any) -> None:
-    """The person reads when; the queue keeps it."""
-    server.on("POST /api/items", answer(429, {}, {"Retry-After": "40"}))
-    with pytest.raises(BusyError, match="in 40 s") as caught:
-        client.create_item("kindred-rd", "F01", "Bolt")
-    assert caught.value.retry_after == 40.0
-    assert len(server.seen) == 1
 
 
 @pytest.mark.parametrize(

@@ -15,33 +15,32 @@ BARE = {"id": "11111111-1111-4111-8111-111111111111", "part_number": "F01-0001",
 PAINTED = {"finish": "painted"}
 
 
-def test_the_items_own_properties(server: Any, client: SiloClient) -> None:
-    """One request where they are there."""
-    server.on(ITEM, {**BARE, "properties": PAINTED})
-    assert client.get_properties("F01-0001") == PAINTED
-    assert len(server.seen) == 1
+NEWEST = [{"revision_number": 1, "properties": {"old": 1}}, {"revision_number": 2, "properties": PAINTED}]
 
 
-@pytest.mark.parametrize("own", [{}, {"properties": None}, {"properties": {}}], ids=repr)
-def test_those_of_the_newest_revision(server: Any, client: SiloClient, own: dict[str, Any]) -> None:
-    """Where the item's answer has none, which proves nothing."""
-    server.on(ITEM, {**BARE, **own})
-    server.on(
-        REVISIONS,
-        [{"revision_number": 1, "properties": {"old": 1}}, {"revision_number": 2, "properties": PAINTED}],
-    )
-    assert client.get_properties("F01-0001") == PAINTED
-
-
-@pytest.mark.parametrize(("said", "read"), [(PAINTED, PAINTED), (None, {}), ({}, {})], ids=repr)
-def test_a_list_without_content_leads_to_the_revision_itself(
-    server: Any, client: SiloClient, said: Any, read: Any
+@pytest.mark.parametrize(
+    ("own", "listed", "single", "read"),
+    [
+        ({"properties": PAINTED}, None, None, PAINTED),
+        # The item's answer has none, which proves nothing: those of the newest revision.
+        ({}, NEWEST, None, PAINTED),
+        ({"properties": None}, NEWEST, None, PAINTED),
+        ({"properties": {}}, NEWEST, None, PAINTED),
+        # Lists are often short: the revision itself.
+        ({}, [{"revision_number": 2}], PAINTED, PAINTED),
+        ({}, [{"revision_number": 2}], {}, {}),
+        ({"current_revision": 0}, [], None, {}),
+    ],
+)
+def test_the_properties_of_an_item(
+    server: Any, client: SiloClient, own: dict[str, Any], listed: Any, single: Any, read: dict[str, Any]
 ) -> None:
-    """Lists are often short."""
-    server.on(ITEM, BARE)
-    server.on(REVISIONS, [{"revision_number": 2}])
-    server.on(f"{REVISIONS}/2", {"revision_number": 2, "properties": said})
+    """Wherever the server shows them, with no more requests than that takes."""
+    server.on(ITEM, {**BARE, **own})
+    server.on(REVISIONS, listed)
+    server.on(f"{REVISIONS}/2", {"revision_number": 2, "properties": single})
     assert client.get_properties("F01-0001") == read
+    assert len(server.seen) == 1 + (listed is not None) + (single is not None)
 
 
 def test_properties_that_nobody_shows_are_not_none(server: Any, client: SiloClient) -> None:
@@ -51,13 +50,6 @@ def test_properties_that_nobody_shows_are_not_none(server: Any, client: SiloClie
     server.on(f"{REVISIONS}/2", {"revision_number": 2})
     with pytest.raises(ServerFaultError, match="nothing was written"):
         client.get_properties("F01-0001")
-
-
-def test_no_revision_has_no_properties(server: Any, client: SiloClient) -> None:
-    """A new item."""
-    server.on(ITEM, {**BARE, "current_revision": 0})
-    server.on(REVISIONS, [])
-    assert client.get_properties("F01-0001") == {}
 
 
 def test_failures_pass(server: Any, client: SiloClient, answer: Any) -> None:

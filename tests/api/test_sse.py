@@ -123,14 +123,6 @@ def test_an_event_without_end_is_refused() -> None:
         parser.feed(b"data: " + b"x" * 1900)
 
 
-def test_a_long_event_in_small_pieces_is_read_in_good_time() -> None:
-    """The search for its end does not begin again with each piece: 300 000 single bytes."""
-    raw = block("big", "x" * 300_000)
-    parser = SseParser()
-    events = [event for index in range(len(raw)) for event in parser.feed(raw[index : index + 1])]
-    assert len(events) == 1
-
-
 names = st.sampled_from(["bom_merge", "bom.merged", "item.created", "heartbeat", None])
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=30)
 events = st.lists(

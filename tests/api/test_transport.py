@@ -343,7 +343,7 @@ def test_an_upload_may_stall_for_longer_than_a_connection_takes(tmp_path: Path) 
                 head = b""
                 while b"\r\n\r\n" not in head:
                     head += conversation.recv(4096)
-                stalled.wait(1.0)  # a line that stalls: twice the time for connecting
+                stalled.wait(0.5)  # a line that stalls: twice the time for connecting
                 length = re.search(rb"Content-Length: (\d+)", head)
                 left[0] = int(length[1]) - len(head.partition(b"\r\n\r\n")[2]) if length else -1
                 while left[0] > 0:
@@ -354,7 +354,7 @@ def test_an_upload_may_stall_for_longer_than_a_connection_takes(tmp_path: Path) 
         thread = threading.Thread(target=serve, daemon=True)
         thread.start()
         port = listening.getsockname()[1]
-        with SiloClient(f"http://127.0.0.1:{port}", timeout=(0.5, 60)) as client:
+        with SiloClient(f"http://127.0.0.1:{port}", timeout=(0.25, 60)) as client:
             assert client.upload_file("F01-0001", path).revision_number == 1
         thread.join(60)
     assert left == [0]
