@@ -32,14 +32,14 @@ def git(folder: Path, *words: str) -> str:
     return done.stdout.strip()
 
 
-@pytest.fixture
-def repository(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def _repository(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two commits on main, and a branch that began at the first."""
-    folder = tmp_path / "repo"
+    folder = tmp_path_factory.mktemp("git") / "repo"
     (folder / "cad" / "große Teile").mkdir(parents=True)
     git(folder, "init", "-q", "-b", "main")
     (folder / "cad" / "a.FCStd").write_bytes(b"one")
-    (folder / "cad" / "große Teile" / "b b.fcstd").write_bytes(os.urandom(3_000_000))
+    (folder / "cad" / "große Teile" / "b b.fcstd").write_bytes(os.urandom(1_500_000))
     (folder / "notes.txt").write_text("no model")
     (folder / "cad" / "link.FCStd").symlink_to("a.FCStd")
     git(folder, "add", "-A")
@@ -52,6 +52,12 @@ def repository(tmp_path: Path) -> Path:
     git(folder, "add", "-A")
     git(folder, "commit", "-qm", "third")
     return folder
+
+
+@pytest.fixture
+def repository(_repository: Path, tmp_path: Path) -> Path:
+    """A copy of it for each test."""
+    return Path(shutil.copytree(_repository, tmp_path / "repo", symlinks=True))
 
 
 def files(folder: Path) -> dict[str, bytes]:

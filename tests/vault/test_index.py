@@ -444,7 +444,7 @@ def test_an_index_that_cannot_be_written_costs_time_only(vault: Path, tmp_path: 
 def _processes(folder: Path, index: Path, count: int) -> Iterator[subprocess.Popen[bytes]]:
     code = (
         "import sys; from pathlib import Path; sys.path[:0] = sys.argv[3:]; import test_index as t\n"
-        "for _ in range(25): t.indexed(Path(sys.argv[1]), Path(sys.argv[2]))"
+        "for _ in range(8): t.indexed(Path(sys.argv[1]), Path(sys.argv[2]))"
     )
     here = Path(__file__).parent
     paths = [str(here), str(here.parent / "support"), str(here.parents[1] / "mods")]
@@ -461,7 +461,7 @@ def test_two_processes_at_once_and_somebody_who_works(vault: Path, tmp_path: Pat
         number += 1
         part("a", uuid=f"u{number}").save(vault / "a.FCStd")
         assembly("c", {"a.FCStd": number % 7 + 1, "b.FCStd": 1}).save(vault / "c.FCStd")
-        if number == 20:
+        if number == 5:
             index.unlink(missing_ok=True)
     assert [process.wait() for process in running] == [0, 0]
     assert indexed(vault, index)[0] == truth(vault)
