@@ -55,6 +55,8 @@ MOST_MODELLED = 200
 _IN_ONE = 500
 # Of a folder, what people chose last.
 MOST_LEARNT = 200
+# What reading an entry of a file raises, if the file is no archive, is damaged, or does not have the entry.
+_NOT_IN_ZIP = (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError)
 _SAVED_AT = re.compile(rb'name="LastModifiedDate"[^>]*>\s*<String value="([^"]{0,40})"')
 
 
@@ -326,7 +328,8 @@ def offer(
         for entry in walk_entries(tree)
         if entry.silo_uuid and entry.silo_uuid.lower() in numbers
     }
-    numbers_next = _next_numbers(looked, api, schema)
+    proposed = sorted({candidate.proposal.category for candidate in looked} - {""})
+    numbers_next = {category: next_number(api, schema, category) for category in proposed}
     contents = CandidateFiles()
     for candidate in looked:
         contents.add(candidate)
@@ -444,7 +447,7 @@ def _look_into(path: str) -> tuple[bytes, list[tuple[str, int]]]:
                 if member.filename != "Document.xml"
             ]
             return xml.read(1 << 18), sorted(beside)
-    except (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError):
+    except _NOT_IN_ZIP:
         return b"", []
 
 
@@ -453,7 +456,7 @@ def picture_in(path: str) -> bytes:
     try:
         with zipfile.ZipFile(path) as file, file.open("thumbnails/Thumbnail.png") as picture:
             return picture.read(1 << 20)
-    except (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError):
+    except _NOT_IN_ZIP:
         return b""
 
 
@@ -511,13 +514,6 @@ def _with_look_alikes(
 
 def _searched(candidate: Candidate) -> tuple[str, str]:
     return candidate.proposal.name, candidate.sha256
-
-
-def _next_numbers(candidates: Iterable[Candidate], api: Any, schema: str) -> dict[str, str]:
-    numbers = {}
-    for category in sorted({c.proposal.category for c in candidates if c.proposal.category}):
-        numbers[category] = next_number(api, schema, category)
-    return numbers
 
 
 def next_number(api: Any, schema: str, category: str) -> str:

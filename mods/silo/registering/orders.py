@@ -685,7 +685,7 @@ def _order(
         )
     if not candidate.state.usable or candidate.state is ComponentState.ELSEWHERE:
         order_remarks.append(f"{cells['file']}: {_FILES.get(candidate.state, 'the file cannot be written')}")
-    elif _changed(cells["fingerprint"], candidate):
+    elif cells["fingerprint"] not in ("", _fingerprint(candidate)):
         order_remarks.append(
             f"{cells['file']} has changed since the table was written; look at it, write a new one"
         )
@@ -711,10 +711,6 @@ def _joined_before(order: Order, earlier: list[Order]) -> list[str]:
         "register one of them with it"
         for other in others[:1]
     ]
-
-
-def _changed(before: str, candidate: Candidate) -> bool:
-    return bool(before) and before != _fingerprint(candidate)
 
 
 def wrong_name(name: str, candidate: Candidate) -> str:

@@ -265,7 +265,8 @@ def _git(repository: str, *words: str) -> bytes:
     )
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip() or _no_answer(repository, words)
-        raise InputError(f"git {words[0]} {_last(words)} failed in {repository}: {said}")
+        what = f"{words[0]} {words[-1].removesuffix('^{commit}')}"
+        raise InputError(f"git {what} failed in {repository}: {said}")
     return done.stdout
 
 
@@ -275,7 +276,3 @@ def _no_answer(repository: str, words: Sequence[str]) -> str:
     if _git(repository, "rev-parse", "--is-shallow-repository").strip() == b"true":
         reason += "; the clone is shallow, so fetch more of it (git fetch --unshallow)"
     return reason
-
-
-def _last(words: Sequence[str]) -> str:
-    return words[-1].removesuffix("^{commit}")

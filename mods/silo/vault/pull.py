@@ -225,11 +225,10 @@ class _Fetch:
             raise InputError(f"{item.part_number} has {which} in Silo")
         top = wanted[0]
         self._at = top.created_at
-        above, name = posixpath.split((top.file_path or top.file_name or "").replace("\\", "/"))
-        name = _safe_name(name or f"{item.part_number}.FCStd")
         # The top lies where it lay in its project: a link that steps out of its folder and back leads to one
         # place.
-        left = [(posixpath.join(above, name) if _is_place(above) else name, holder, top)]
+        place = _place_in_project(top.file_path or top.file_name or f"{item.part_number}.FCStd")
+        left = [(place, holder, top)]
         while left:
             position, other_revision, revision = left.pop(0)
             left += self.fetch(position, other_revision, revision)
@@ -256,8 +255,7 @@ class _Fetch:
                 self._sought.add(file.document)
                 holder = Holder(DocumentId(file.document), file.document)
                 revision = self.frozen(holder)
-                above, name = posixpath.split((file.file_path or file.file_name).replace("\\", "/"))
-                place = posixpath.join(above, _safe_name(name)) if _is_place(above) else _safe_name(name)
+                place = _place_in_project(file.file_path or file.file_name)
                 if revision is not None and place not in self.files:
                     return [(place, holder, revision)]
                 self.lost.append(
@@ -411,9 +409,11 @@ class _Children:
         return by_path, by_name
 
 
-def _is_place(folder: str) -> bool:
-    """Return True if a folder is inside a project, such as ``parts/bought``."""
-    return not any(":" in part or part in ("", ".", "..") or refusal(part) for part in folder.split("/"))
+def _place_in_project(path: str) -> str:
+    """Return the path with a safe name; without its folder if that is not inside a project."""
+    folder, name = posixpath.split(path.replace("\\", "/"))
+    outside = any(":" in part or part in ("", ".", "..") or refusal(part) for part in folder.split("/"))
+    return _safe_name(name) if outside else posixpath.join(folder, _safe_name(name))
 
 
 def _refused(path: str) -> str:
