@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import hashlib
 import multiprocessing
-import os
 import random
 import re
 import shutil
@@ -24,6 +23,7 @@ from typing import Any
 
 import pytest
 from fcstd_writer import Doc, Raw, locals_
+from hunting import LONG
 from real_silo import (
     FAULTS,
     HOMES,
@@ -56,7 +56,6 @@ from silo.vault.project import compare as compare_project
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "gearbox"
 NAMES = 9
 """Components of the example, its two assemblies included."""
-LONG = bool(os.environ.get("SILO_LONG"))
 
 
 @pytest.fixture(autouse=True)

@@ -11,6 +11,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from hunting import LONG
 from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
@@ -21,16 +22,16 @@ pytestmark = pytest.mark.usefixtures("needs_signals")
 ITEMS = {"Assembly1": "A01", "Assembly2": "A01", "Bolt": "F01", "Plate": "M01", "Shaft": "M01"}
 
 
-LONG = pytest.mark.skipif(not os.environ.get("SILO_LONG"), reason="two minutes; SILO_LONG=1 runs it")
+MINUTES = (pytest.mark.slow, pytest.mark.skipif(not LONG, reason="two minutes; SILO_LONG=1 runs it"))
 
 
 @pytest.mark.parametrize(
     ("rounds", "seed", "more"),
     [
-        (16, 1, ()),
-        (16, 3, ("damage",)),
-        pytest.param(200, 2, (), marks=(pytest.mark.slow, LONG)),
-        pytest.param(200, 4, ("damage",), marks=(pytest.mark.slow, LONG)),
+        (10, 1, ()),
+        (10, 3, ("damage",)),
+        pytest.param(200, 2, (), marks=MINUTES),
+        pytest.param(200, 4, ("damage",), marks=MINUTES),
     ],
     ids=["sample", "sample, with damage", "200 kills", "200 kills, with damage to the database between"],
 )

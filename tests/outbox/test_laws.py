@@ -127,7 +127,7 @@ commits = st.tuples(st.integers(1, 3), st.booleans(), st.booleans(), st.booleans
 actions = st.lists(st.one_of(commits, st.just("send")), min_size=1, max_size=12)
 
 
-@settings(max_examples=examples(40))
+@settings(max_examples=examples(30))
 @given(actions, fates)
 def test_each_commit_arrives_once_and_in_order(actions: list[Any], drawn: list[str | None]) -> None:
     """Kills at every step of keeping and sending, losses before and after the server acted, refusals."""
