@@ -325,9 +325,7 @@ reference designators|find number|child revision|override|cad quantity|unreferen
 Field required|Input should be a valid integer, unable to parse string as an integer
 Input should be greater than or equal to {n}|Input should be less than or equal to {n}
 String should have at most {n} characters|String should have at least {n} characters
-[Silo BOM] {who} has {what}. Consider using a link array (ElementCount) for cleaner assembly management.
-{files} files carry the same Silo identity, that of {number}: {files2}. Is it the same part, or is one of them a new part that needs its own number?
-"""  # noqa: E501
+"""
 # What no person reads as it stands, and what has a catalogue of its own.
 _WITHOUT = re.compile(
     r"silo/(workbench/(gui|pane|preview|register|smoke|headless|settings/__init__)|drawing/page|"

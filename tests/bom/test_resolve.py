@@ -11,7 +11,7 @@ import pytest
 
 from silo.bom import FindingCode, Severity, resolve_part_numbers
 from silo.bom.findings import Finding
-from silo.bom.model import BomEntry
+from silo.bom.model import BomEntry, identity_findings
 from silo.bom.resolve import (
     consolidation_findings,
     consolidation_message,
@@ -235,15 +235,18 @@ def test_unregistered_components_are_reported() -> None:
 
 def test_an_identity_is_reported_by_the_number_that_people_know() -> None:
     """A UUID says nothing to anybody who has to decide between two files."""
-    finding = Finding(
-        FindingCode.COPIED_IDENTITY,
-        Severity.WARNING,
-        "2 files carry the same Silo identity u-1: a, b. Which?",
+    two = [entry(name, uuid="U-1") for name in "ab"]
+    shared = [BomEntry("/v/c.FCStd", "u-2", object_name=name, label=name) for name in "cd"]
+    other = Finding(FindingCode.MIRRORED, Severity.WARNING, "identity (u-1): not this one")
+    items = {"U-1": {"part_number": "M01-0001"}, "u-2": {"part_number": "M01-0002"}, "u-3": None}
+    copied, same, unchanged = numbered_findings((*identity_findings([*two, *shared]), other), items)
+    assert copied.message.startswith(
+        "2 files carry the same Silo identity (M01-0001): /v/a.FCStd, /v/b.FCStd. Is it"
     )
-    other = Finding(FindingCode.MIRRORED, Severity.WARNING, "Silo identity u-1: not this one")
-    told = numbered_findings((finding, other), {"U-1": {"part_number": "M01-0001"}, "u-2": None})
-    assert told[0].message == "2 files carry the same Silo identity, that of M01-0001: a, b. Which?"
-    assert told[1] == other
+    assert same.message.startswith(
+        "2 components of /v/c.FCStd share the Silo identity (M01-0002): c, d. They will"
+    )
+    assert unchanged == other
 
 
 def test_missing_components_stay_in_place_without_a_number() -> None:

@@ -151,19 +151,9 @@ def test_english_reads_no_catalogue(run: Any) -> None:
 
 
 def test_sentences_of_several_parts_are_german_as_a_whole(german: None) -> None:
-    """What is made of a list, of a count, or has a number put into it."""
+    """What is made of a list, and of a count."""
     assert spoken("BOM updated: 1 added, 2 unreferenced, 1 in conflict") == (
         "Stückliste erneuert: 1 hinzugekommen, 2 nicht verwendet, 1 im Konflikt"
-    )
-    hint = "[Silo BOM] F01-0001 has 8 individual links. Consider using a link array (ElementCount)"
-    assert spoken(f"{hint} for cleaner assembly management.").startswith(
-        "[Silo-Stückliste] F01-0001 hat 8 einzelne Verknüpfungen. Eine Anordnung"
-    )
-    copies = (
-        "2 files carry the same Silo identity, that of S01-0001: a.FCStd, b.FCStd. Is it the same part, or"
-    )
-    assert spoken(f"{copies} is one of them a new part that needs its own number?").startswith(
-        "2 Dateien tragen dieselbe Silo-Identität, die von S01-0001: a.FCStd, b.FCStd. Ist es"
     )
 
 

@@ -35,7 +35,8 @@ class FindingCode(StrEnum):
     remedy
         what a person does about it, for the reference; in Markdown.
     sentence, tail
-        what the walk says of an object, and of the objects (``users``) that it says this of together.
+        what is said of an object, and how it ends: with the objects (``users``) that this is said of
+        together, or with advice.
     """
 
     severity: Severity
@@ -315,6 +316,8 @@ class FindingCode(StrEnum):
         _W,
         "many single links to one part; an array would be clearer",
         "nothing; the count is right. An array is easier to change",
+        "[Silo BOM] {who} has {what}",
+        "Consider using a link array (ElementCount) for cleaner assembly management.",
     )
     # identity
     COPIED_IDENTITY = (
@@ -322,12 +325,16 @@ class FindingCode(StrEnum):
         _W,
         "several files carry one Silo identity",
         "say in the register dialog whether it is the same part or a new part",
+        "{count} files carry the same Silo identity ({identity}): {names}. Is it the same part, or is one of"
+        " them a new part that needs its own number?",
     )
     SHARED_IDENTITY = (
         "shared_identity",
         _W,
         "several components of a file carry one Silo identity",
         "remove the identity of the copy, then register it",
+        "{count} components of {file} share the Silo identity ({identity}): {names}. They will count as one"
+        " item; register them apart if they are different parts.",
     )
     UNREGISTERED = (
         "unregistered",

@@ -382,23 +382,23 @@ def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
     for uuid, components in users.items():
         if len(components) < 2:
             continue
-        where = tuple(Place(path, obj) for path, obj in components)
-        files = list(dict.fromkeys(path for path, _ in components))
-        if len(files) > 1:
-            code = FindingCode.COPIED_IDENTITY
-            message = (
-                f"{len(files)} files carry the same Silo identity {uuid}: {', '.join(files)}. "
-                "Is it the same part, or is one of them a new part that needs its own number?"
-            )
-        else:
-            code = FindingCode.SHARED_IDENTITY
-            names = ", ".join(entry.label for entry in components.values())
-            message = (
-                f"{len(components)} components of {files[0]} share the Silo identity {uuid}: {names}. "
-                "They will count as one item; register them apart if they are different parts."
-            )
-        findings.append(Finding(code, Severity.WARNING, message, where))
+        where = tuple(Place(*key) for key in components)
+        if len({place.doc_path for place in where}) > 1:
+            findings.append(copied_identity(uuid, where))
+            continue
+        code, names = FindingCode.SHARED_IDENTITY, [entry.label for entry in components.values()]
+        message = code.sentence.format(
+            count=len(names), file=where[0].doc_path, identity=uuid, names=", ".join(names)
+        )
+        findings.append(Finding(code, code.severity, message, where))
     return tuple(findings)
+
+
+def copied_identity(uuid: str, where: tuple[Place, ...]) -> Finding:
+    """Make the finding that several files carry one identity."""
+    code, files = FindingCode.COPIED_IDENTITY, list(dict.fromkeys(place.doc_path for place in where))
+    message = code.sentence.format(count=len(files), identity=uuid, names=", ".join(files))
+    return Finding(code, code.severity, message, where)
 
 
 _Slot = tuple[FindingCode, str]

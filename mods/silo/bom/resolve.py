@@ -541,21 +541,18 @@ def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEnt
 def numbered_findings(findings: Iterable[Finding], items: Known) -> tuple[Finding, ...]:
     """Put part numbers into the findings about identities, since people know an item by its number."""
     numbers = {
-        uuid: str(item["part_number"]) for uuid, item in items.items() if item and item.get("part_number")
+        f"({uuid.lower()})": f"({item['part_number']})"
+        for uuid, item in items.items()
+        if item and item.get("part_number")
     }
-    return tuple(
-        replace(finding, message=_numbered(finding.message, numbers))
-        if finding.code in (FindingCode.COPIED_IDENTITY, FindingCode.SHARED_IDENTITY)
-        else finding
-        for finding in findings
-    )
 
+    def numbered(finding: Finding) -> Finding:
+        if finding.code in (FindingCode.COPIED_IDENTITY, FindingCode.SHARED_IDENTITY):
+            for identity, number in numbers.items():
+                finding = replace(finding, message=finding.message.replace(identity, number))
+        return finding
 
-def _numbered(message: str, numbers: Mapping[str, str]) -> str:
-    for uuid, number in numbers.items():
-        for spelt in (uuid, uuid.lower()):
-            message = message.replace(f"Silo identity {spelt}:", f"Silo identity, that of {number}:")
-    return message
+    return tuple(map(numbered, findings))
 
 
 def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
@@ -593,11 +590,11 @@ def consolidation_message(entry: BomEntry) -> str:
         what += " beside a link array" if count == 1 else ""
     else:
         what = f"{entry.link_objects} link arrays" if entry.link_objects > 1 else "several links"
-    return f"{_HINT}{who} has {what}{_ADVICE}"
+    return f"{FindingCode.CONSOLIDATION.sentence.format(who=who, what=what)}{_ADVICE}"
 
 
-_HINT = "[Silo BOM] "
-_ADVICE = ". Consider using a link array (ElementCount) for cleaner assembly management."
+_HINT = FindingCode.CONSOLIDATION.sentence.partition("{who}")[0]
+_ADVICE = f". {FindingCode.CONSOLIDATION.tail}"
 
 
 def one_hint_each(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -611,7 +608,7 @@ def one_hint_each(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _several_hints(hints: Sequence[Finding]) -> Finding:
-    text = listed([finding.message.removeprefix(_HINT).removesuffix(_ADVICE) for finding in hints])
+    text = listed([hint.message.removeprefix(_HINT).removesuffix(_ADVICE) for hint in hints])
     return replace(hints[0], message=f"{_HINT}{text}{_ADVICE}")
 
 

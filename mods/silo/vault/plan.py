@@ -34,7 +34,7 @@ from silo.bom.document import relative
 from silo.bom.errors import CancelledError, DocumentError, InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.links import MAX_LEVELS, Rings, extract
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.model import BomEntry, Extraction, copied_identity
 from silo.bom.report import shorten, whole_row
 from silo.bom.resolve import Known
 from silo.bom.roots import choose_assembly, find_assemblies
@@ -470,16 +470,7 @@ def _find_copies(plan: Plan) -> None:
         paths.setdefault(uuid, set()).add(path)
     for uuid, several in paths.items():
         if len(several) > 1 and uuid not in users:
-            files = ", ".join(sorted(several))
-            message = (
-                f"{len(several)} files carry the same Silo identity {uuid}: {files}. "
-                "Is it the same part, or is one of them a new part that needs its own number?"
-            )
-            plan.shared.append(
-                Finding(
-                    FindingCode.COPIED_IDENTITY, Severity.WARNING, message, tuple(map(Place, sorted(several)))
-                )
-            )
+            plan.shared.append(copied_identity(uuid, tuple(map(Place, sorted(several)))))
 
 
 def _tell(plan: Plan, key: Key, code: FindingCode, message: str, where: Iterable[Key]) -> None:
