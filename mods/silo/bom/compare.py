@@ -143,11 +143,11 @@ def diff_bom(
         components whose file or object is missing now, as the last sync named them.
     """
     remote_entries = list(remote_entries)
-    local_entries = list(local_entries)
-    gone = lines_of_missing(remote_entries, missing, local_quantities(local_entries))
+    local = local_quantities(local_entries)
+    gone = lines_of_missing(remote_entries, missing, local)
     kept = [line for line in remote_entries if line["child_part_number"] in gone]
     remote_entries = [line for line in remote_entries if line["child_part_number"] not in gone]
-    local = {pn: q for pn, q in local_quantities(local_entries).items() if pn not in gone}
+    local = {number: quantity for number, quantity in local.items() if number not in gone}
     assembly_lines: list[_Line] = []
     manual_lines: list[_Line] = []
     manual_components: list[_Line] = []

@@ -152,22 +152,17 @@ def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
     """Count the instances of each component in the whole assembly, sub-assemblies included."""
     below: dict[int, dict[tuple[str, str], int]] = {}
 
-    def subtree(entry: BomEntry) -> dict[tuple[str, str], int]:
-        # Nested assemblies share their values; each distinct one is counted once.
-        if (known := below.get(id(entry))) is not None:
-            return known
-        total = {entry.key: 1}
-        for child in entry.children:
-            for key, count in subtree(child).items():
-                total[key] = total.get(key, 0) + count * child.quantity
-        below[id(entry)] = total
-        return total
+    def total(group: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
+        counts: dict[tuple[str, str], int] = {}
+        for entry in group:
+            # Nested assemblies share their values; each distinct one is counted once.
+            if id(entry) not in below:
+                below[id(entry)] = {entry.key: 1, **total(entry.children)}
+            for key, count in below[id(entry)].items():
+                counts[key] = counts.get(key, 0) + count * entry.quantity
+        return counts
 
-    everything: dict[tuple[str, str], int] = {}
-    for entry in entries:
-        for key, count in subtree(entry).items():
-            everything[key] = everything.get(key, 0) + count * entry.quantity
-    return everything
+    return total(entries)
 
 
 def flat_lines(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, int]]:
@@ -292,8 +287,7 @@ class _Table:
         if entry.own:
             row["own"] = [self.add(bom_entry) for bom_entry in entry.own]
         self.rows.append(row)
-        self._known[id(entry)] = len(self.rows) - 1
-        return len(self.rows) - 1
+        return self._known.setdefault(id(entry), len(self.rows) - 1)
 
 
 def _entry(row: Mapping[str, Any], before: list[BomEntry]) -> BomEntry:

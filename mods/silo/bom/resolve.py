@@ -360,30 +360,40 @@ def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str])
         code → description, in the schema's order; :class:`Categories` also has the rules.
     """
     assemblies = assembly_categories(categories)
-    fitting = [code for code in categories if (code in assemblies) == entry.is_assembly]
+    fitting = {code: text for code, text in categories.items() if (code in assemblies) == entry.is_assembly}
     if not fitting:
         return Guess(next(iter(categories), ""), 0.0)
+    first = next(iter(fitting))
     if len(fitting) == 1:
-        return Guess(fitting[0], 1.0)
+        return Guess(first, 1.0)
     if entry.standard:
-        return _standard_category(entry.standard, {code: categories[code] for code in fitting}, categories)
+        return _standard_category(entry.standard, fitting, categories)
     words = stems(name)
-    for rule in getattr(categories, "rules", ()):
-        if rule.category in fitting and rule.fits(frozenset(words)):
-            return Guess(rule.category, 1.0)
+    if guess := _by_rule(words, fitting, categories):
+        return guess
     if entry.is_assembly:
         # The name of an assembly says what it is for, not which kind it is.
-        return Guess(fitting[0], SURE)
-    scores = {code: _score(words, stems(categories[code])) for code in fitting}
+        return Guess(first, SURE)
+    scores = {code: _score(words, stems(text)) for code, text in fitting.items()}
     best = max(scores.values())
     if best:
         codes = [code for code in fitting if scores[code] == best]
         return Guess(codes[0], best / len(codes))
-    for wanted in _PART_WORDS:
-        for code in fitting:
-            if wanted in categories[code].casefold():
-                return Guess(code, 0.1)
-    return Guess(fitting[0], 0.0)
+    code = _first_with(_PART_WORDS, fitting)
+    return Guess(code, 0.1) if code else Guess(first, 0.0)
+
+
+def _by_rule(words: Iterable[str], fitting: Mapping[str, str], categories: Mapping[str, str]) -> Guess | None:
+    """Guess by the first rule of the site that applies; None if none does."""
+    for rule in getattr(categories, "rules", ()):
+        if rule.category in fitting and rule.fits(frozenset(words)):
+            return Guess(rule.category, 1.0)
+    return None
+
+
+def _first_with(words: Iterable[str], fitting: Mapping[str, str]) -> str:
+    """Return the first category with the first of the words that any text has; "" if none has one."""
+    return next((code for word in words for code, text in fitting.items() if word in text.casefold()), "")
 
 
 def standard_kind(designation: str) -> str:
@@ -406,20 +416,14 @@ def _standard_category(designation: str, fitting: Mapping[str, str], categories:
     """
     kind = standard_kind(designation)
     for named in filter(None, (kind, _ALSO.get(kind))):
-        words = frozenset(stems(f"{designation} {named}"))
-        for rule in getattr(categories, "rules", ()):
-            if rule.category in fitting and rule.fits(words):
-                return Guess(rule.category, 1.0)
+        if guess := _by_rule(stems(f"{designation} {named}"), fitting, categories):
+            return guess
         codes = [code for code, text in fitting.items() if set(stems(named)) <= set(stems(text))]
         if codes:
             return Guess(codes[0], 1.0 if len(codes) == 1 else SURE / 2)
-    for wanted in _STANDARD_WORDS:
-        for code, text in fitting.items():
-            if wanted in text.casefold():
-                return Guess(code, 1.0)
-    return Guess(
-        next((code for code, text in fitting.items() if "screw" in text.casefold()), next(iter(fitting))), 0
-    )
+    if code := _first_with(_STANDARD_WORDS, fitting):
+        return Guess(code, 1.0)
+    return Guess(_first_with(["screw"], fitting) or next(iter(fitting)), 0)
 
 
 def assembly_categories(categories: Mapping[str, str]) -> frozenset[str]:
@@ -511,8 +515,7 @@ def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEnt
         if (before := done.get(id(entry))) is not None:
             return before
         if entry.missing:
-            done[id(entry)] = (entry, True)
-            return done[id(entry)]
+            return done.setdefault(id(entry), (entry, True))
         item = items.get(entry.silo_uuid) if entry.silo_uuid else None
         number = item.get("part_number") if item is not None else None
         name = (item.get("name") or item.get("description") or number) if item is not None else None
@@ -527,8 +530,7 @@ def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEnt
                 child for child, children_resolved in map(one, entry.children) if not children_resolved
             ),
         )
-        done[id(entry)] = (bom_entry, bool(number))
-        return done[id(entry)]
+        return done.setdefault(id(entry), (bom_entry, bool(number)))
 
     def merged(group: Iterable[BomEntry]) -> list[BomEntry]:
         return merge_lines(entry for entry, group_resolved in map(one, group) if group_resolved)
@@ -540,19 +542,16 @@ def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEnt
 
 def numbered_findings(findings: Iterable[Finding], items: Known) -> tuple[Finding, ...]:
     """Put part numbers into the findings about identities, since people know an item by its number."""
-    numbers = {
-        f"({uuid.lower()})": f"({item['part_number']})"
-        for uuid, item in items.items()
-        if item and item.get("part_number")
-    }
+    numbers = {uuid.lower(): str(item.get("part_number") or uuid) for uuid, item in items.items() if item}
+    codes = (FindingCode.COPIED_IDENTITY, FindingCode.SHARED_IDENTITY)
 
-    def numbered(finding: Finding) -> Finding:
-        if finding.code in (FindingCode.COPIED_IDENTITY, FindingCode.SHARED_IDENTITY):
-            for identity, number in numbers.items():
-                finding = replace(finding, message=finding.message.replace(identity, number))
-        return finding
+    def numbered(message: str) -> str:
+        return re.sub(r"(?<=\()[^()]+(?=\): )", lambda uuid: numbers.get(uuid[0], uuid[0]), message)
 
-    return tuple(map(numbered, findings))
+    return tuple(
+        replace(finding, message=numbered(finding.message)) if finding.code in codes else finding
+        for finding in findings
+    )
 
 
 def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
@@ -618,19 +617,18 @@ def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
     ``where`` names the component and, below the top, the assembly that links it several times.
     """
     direct = tuple(entries)
-    findings = [_consolidation(entry) for entry in direct if entry.consolidation_warning]
-    findings += [
-        _consolidation(entry, assembly)
-        for assembly in walk_entries(direct)
-        for entry in assembly.children
+    levels = [((), direct), *(((assembly,), assembly.children) for assembly in walk_entries(direct))]
+    return tuple(
+        Finding(
+            FindingCode.CONSOLIDATION,
+            Severity.WARNING,
+            consolidation_message(entry),
+            tuple(Place(part.doc_path, part.object_name) for part in (entry, *above)),
+        )
+        for above, group in levels
+        for entry in group
         if entry.consolidation_warning
-    ]
-    return tuple(findings)
-
-
-def _consolidation(entry: BomEntry, assembly: BomEntry | None = None) -> Finding:
-    places = [Place(part.doc_path, part.object_name) for part in (entry, assembly) if part is not None]
-    return Finding(FindingCode.CONSOLIDATION, Severity.WARNING, consolidation_message(entry), tuple(places))
+    )
 
 
 def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]:
