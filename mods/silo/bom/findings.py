@@ -35,8 +35,8 @@ class FindingCode(StrEnum):
     remedy
         what a person does about it, for the reference; in Markdown.
     sentence, tail
-        what is said of an object, and how it ends: with the objects (``users``) that this is said of
-        together, or with advice.
+        the message about an object, and how it ends: with all objects (``users``) that it is about, or with
+        advice.
     """
 
     severity: Severity
