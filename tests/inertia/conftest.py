@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from bodies import placement
 
 from silo.inertia.bom import BomTable
 from silo.inertia.bom.parser import BOMParser
-from silo.inertia.calculator import Task, calculate
+from silo.inertia.calculator import Task, calculate, read_geometry
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Assembly, Instance, Prototype
 from silo.inertia.report import InertiaReport
@@ -40,9 +41,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip(reason=NO_KERNEL))
 
 
+@pytest.fixture(name="geometry_cache", scope="session")
+def _geometry_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What one test has read is kept for the others, also for those in other processes."""
+    folder = tmp_path_factory.getbasetemp()
+    return (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "geometry-cache"
+
+
 @pytest.fixture(autouse=True)
-def _children_are_warm(warm: None) -> None:
-    """What reads in a child does not load the kernel anew; with ``cold`` it does."""
+def _children_are_warm(warm: None, geometry_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What reads in a child does not load the kernel anew, with ``cold`` it does; nothing is read twice."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(geometry_cache))
 
 
 @pytest.fixture(name="cold")
@@ -60,6 +69,12 @@ def _step_files() -> Path:
     if not STEP_FILES.is_dir():
         pytest.skip(f"the STEP test data is not at {STEP_FILES}")
     return STEP_FILES.resolve()
+
+
+@pytest.fixture(name="real", scope="session")
+def _real(step_files: Path) -> Callable[[str], Assembly]:
+    """``real(name)``: a public STEP file, read once."""
+    return cache(lambda name: read_geometry(step_files / name))
 
 
 @pytest.fixture(name="materials", scope="session")

@@ -15,22 +15,19 @@ from silo.inertia import (
     InertiaReport,
     compute_link_inertials,
 )
-from silo.inertia.geometry import ReadOptions
 from silo.inertia.model import combine
 
 ARM = Path(__file__).parents[2] / "examples" / "arm"
-
-
-@pytest.fixture(autouse=True)
-def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing of the user's cache is read or written."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
 
 def test_compute_from_step_is_the_whole_at_one_density() -> None:
     """Twice the density, twice the mass and tensor, the same centre."""
     one = InertiaCalculator().compute_from_step(ARM / "arm.step")
     two = InertiaCalculator(default_density=2000.0).compute_from_step(str(ARM / "arm.step"))
+    light = compute_link_inertials(ARM / "arm.step", density=500.0)
+    assert light.total is not None
+    assert light.total.mass == pytest.approx(one.mass / 2)
+    assert {str(w.code) for w in light.warnings} == {"no_bom"}
     assert one.mass > 1
     assert two.mass == pytest.approx(2 * one.mass)
     assert two.ixx == pytest.approx(2 * one.ixx)
@@ -55,7 +52,10 @@ def test_a_plain_dict_will_do() -> None:
         "Palm": BOMEntry("Palm", None, None),
     }
     report = InertiaReport()
-    InertiaCalculator().compute_from_step_with_bom(ARM / "arm.step", entries, "robot", report)
+    for name in ("robot", "another"):  # nothing of an earlier link is lost
+        InertiaCalculator().compute_from_step_with_bom(ARM / "arm.step", entries, name, report)
+    assert list(report.link_properties) == ["robot", "another"]
+    assert {w.link_name for w in report.warnings} == {"robot", "another"}
     parts = {part.name: part for part in report.links["robot"].parts}
     assert parts["Base plate"].mass == 1.0
     assert parts["Column"].mass == pytest.approx(np.pi * (0.045**2 - 0.035**2) * 0.08 * 7850)
@@ -63,16 +63,6 @@ def test_a_plain_dict_will_do() -> None:
     told = {(w.part_name, str(w.code)) for w in report.warnings}
     assert ("Palm", "no_mass_no_material") in told
     assert ("Finger", "not_in_bom") in told
-
-
-def test_several_links_go_into_one_report() -> None:
-    """The exporter calls it link by link; nothing of an earlier link is lost."""
-    report = InertiaReport()
-    calculator = InertiaCalculator()
-    for name in ("left", "right"):
-        calculator.compute_from_step_with_bom(ARM / "arm.step", {}, name, report)
-    assert list(report.link_properties) == ["left", "right"]
-    assert {w.link_name for w in report.warnings} == {"left", "right"}
 
 
 def test_compute_link_inertials_sums_up_to_the_whole() -> None:
@@ -86,21 +76,14 @@ def test_compute_link_inertials_sums_up_to_the_whole() -> None:
     assert whole.inertia == pytest.approx(report.total.inertia, rel=1e-12, abs=1e-15)
 
 
-def test_compute_link_inertials_without_a_bom() -> None:
-    """Default density throughout, which is reported; the density can be given."""
-    light = compute_link_inertials(ARM / "arm.step", density=500.0)
-    heavy = compute_link_inertials(ARM / "arm.step", read_options=ReadOptions(cache=False))
-    assert light.total is not None
-    assert heavy.total is not None
-    assert heavy.total.mass == pytest.approx(2 * light.total.mass)
-    assert {str(w.code) for w in light.warnings} == {"no_bom"}
-
-
 def test_compute_link_inertials_by_a_map(tmp_path: Path) -> None:
     """The map's file is enough; frames as asked for."""
     path = tmp_path / "map.yaml"
     path.write_text("links:\n  hand: {parts: [gripper], frame: gripper}\n", "utf-8")
     own = compute_link_inertials(ARM / "arm.step", ARM / "bom.csv", links=path)
     plain = compute_link_inertials(ARM / "arm.step", ARM / "bom.csv", frame="own")
+    whole = compute_link_inertials(ARM / "arm.step", ARM / "bom.csv", links={"all": ["*"]}, frame="assembly")
+    assert whole.total is not None
+    assert whole.bodies["all"].mass == pytest.approx(whole.total.mass)
     assert own.link_properties["hand"].com == pytest.approx(plain.link_properties["gripper"].com)
     assert len(own.unclaimed) > 0

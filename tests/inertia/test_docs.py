@@ -47,7 +47,6 @@ def test_the_python_example_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     """What the page shows is what the library does."""
     arm = DOCS.parent / "examples" / "arm"
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "arm.step").write_bytes((arm / "arm.step").read_bytes())
     (tmp_path / "link.step").write_bytes((arm / "arm.step").read_bytes())
     (tmp_path / "bom.csv").write_bytes((arm / "bom.csv").read_bytes())

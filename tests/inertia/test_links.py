@@ -43,6 +43,7 @@ def instance(path: str, products: str = "") -> Instance:
         ({"a": {"parts": ["x"], "frame": {"xyz": [0, 0, 0]}}}, "a: frame: wanted the name of a part"),
         ({"a": {"parts": ["x"], "origin": 5}}, "a: origin: wanted {xyz"),
         ({"a": {"parts": ["x"], "origin": {"xyz": "ab"}}}, "a: origin: wanted {xyz"),
+        ({"a": []}, "wanted a list of patterns"),
         (["x"], "got list"),
         (7, "got int"),
     ],
@@ -51,7 +52,16 @@ def test_plain_values_that_are_no_links_are_refused_with_a_sentence(links: Any, 
     """Links given in Python, not from YAML, may hold any type."""
     with pytest.raises(ConfigError, match=re.escape(words)):
         as_link_map(links)
-    assert as_link_map({"a": ("x", "y")}) is not None
+
+
+def test_links_as_plain_values() -> None:
+    """A dict of patterns, with or without "links" around it; a map that was made stays as it is."""
+    for links in ({"base": ["a*"], "arm": "b"}, {"links": {"base": ("a*",), "arm": {"parts": "b"}}}):
+        found = as_link_map(links)
+        assert found is not None
+        assert [(link.name, link.patterns) for link in found.links] == [("base", ("a*",)), ("arm", ("b",))]
+        assert as_link_map(found) is found
+    assert as_link_map(None) is None
 
 
 @pytest.mark.parametrize(
@@ -333,6 +343,41 @@ def robot(parent: str, child: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> Ur
     return Urdf(
         f'<robot><link name="{parent}"/><link name="{child}"/><joint>{joint}</joint></robot>'.encode()
     )
+
+
+NAMES = ("base_link", "upper_arm", "forearm", "gripper")
+LOOSE = {"forearm": "link_loose", "gripper": "link_loose"}
+ABSENT = {"gripper": "link_not_in_urdf"}
+URDFS = {
+    "as it should be": (NAMES, "base_link>upper_arm upper_arm>forearm forearm>gripper", {}),
+    "another case": (
+        ("base_link", "Upper_Arm", "forearm link", "GRIPPER"),
+        "base_link>Upper_Arm Upper_Arm>forearm_link forearm_link>GRIPPER", {},
+    ),
+    "a joint is missing": (NAMES, "base_link>upper_arm forearm>gripper", LOOSE),
+    "a parent that is no link": (NAMES, "base_link>upper_arm ghost>forearm forearm>gripper", LOOSE),
+    "a link is missing": (NAMES[:3], "base_link>upper_arm upper_arm>forearm", ABSENT),
+    "another name": ((*NAMES[:3], "hand"), "base_link>upper_arm upper_arm>forearm forearm>hand", ABSENT),
+    "two of one word": (
+        (*NAMES[:3], "Gripper", "GRIPPER"),
+        "base_link>upper_arm upper_arm>forearm forearm>Gripper forearm>GRIPPER", ABSENT,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", URDFS)
+def test_links_that_the_urdf_does_not_hold_together(case: str, assemble: Fixture, compute: Fixture) -> None:
+    """Mutations of a URDF: each link whose mass or frame is lost has a warning; the others are filled."""
+    names, joints, wanted = URDFS[case]
+    text = "".join(f'<link name="{name}"/>' for name in names)
+    for joint in joints.split():
+        parent, child = joint.replace("forearm_link", "forearm link").split(">")
+        text += f'<joint name="{child}"><parent link="{parent}"/><child link="{child}"/></joint>'
+    urdf = Urdf(f'<robot name="r">{text}</robot>'.encode())
+    report = compute(assemble(*((f"{name}/p", PART) for name in NAMES)), None, urdf=urdf)
+    assert {w.link_name: w.code for w in report.warnings if w.code != "no_bom"} == wanted
+    filled = urdf.filled({name: link.props for name, link in report.links.items()})
+    assert len(filled.written) == len(NAMES) - (wanted is ABSENT)
 
 
 def far_frames(report: Any) -> list[str]:

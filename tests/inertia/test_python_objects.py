@@ -16,9 +16,8 @@ import trimesh
 from bodies import box, placement
 
 import silo.inertia as inertia
-from silo.bom.errors import ConfigError, InputError
+from silo.bom.errors import InputError
 from silo.inertia import MATERIAL_DENSITIES, EnhancedInertiaCalculator, InertiaCalculator, MassProps
-from silo.inertia.links import as_link_map, link_map
 
 Fixture = Callable[..., Any]
 ARM = Path(__file__).parents[2] / "examples" / "arm"
@@ -93,32 +92,6 @@ def test_the_names_of_the_spec() -> None:
     assert MATERIAL_DENSITIES["default"] == 1000
     assert all(1 <= value < 25_000 for value in MATERIAL_DENSITIES.values())
     assert set(inertia.__all__) == set(inertia._HOME)
-    for name in inertia.__all__:
-        assert getattr(inertia, name) is not None
-
-
-def test_links_as_plain_values() -> None:
-    """A dict of patterns, with or without "links" around it; what is none is refused with a sentence."""
-    for given in ({"base": ["a*"], "arm": "b"}, {"links": {"base": ["a*"], "arm": {"parts": "b"}}}):
-        found = as_link_map(given)
-        assert found is not None
-        assert [(link.name, link.patterns) for link in found.links] == [("base", ("a*",)), ("arm", ("b",))]
-    made = link_map({"links": {"links": ["a"]}})
-    assert as_link_map(made) is made
-    assert as_link_map(None) is None
-    for bad in ({}, {"base": 3}, {"base": []}, [("base", "a")], 5):
-        with pytest.raises(ConfigError, match="wanted"):
-            as_link_map(bad)  # type: ignore[arg-type]
-
-
-def test_a_dict_is_taken_by_the_one_call_too() -> None:
-    """compute_link_inertials(links={…})."""
-    report = inertia.compute_link_inertials(
-        ARM / "arm.step", ARM / "bom.csv", links={"all": ["*"]}, frame="assembly"
-    )
-    assert list(report.bodies) == ["all"]
-    assert report.total is not None
-    assert report.bodies["all"].mass == pytest.approx(report.total.mass)
 
 
 def test_copies_are_equal_and_read_only(report: Any) -> None:

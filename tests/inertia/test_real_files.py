@@ -6,18 +6,17 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from silo.inertia.calculator import read_geometry
-from silo.inertia.geometry import ReadOptions
+from silo.inertia.masses import Options
 from silo.inertia.model import Assembly, GeometryCode, leaf_products
 from silo.inertia.output import snippets, writable
 from silo.inertia.report import Source
 
 Fixture = Callable[..., Any]
+Real = Callable[[str], Assembly]
 FILES = (
     "as1-oc-214.stp",
     "asm4_bearing.stp",
@@ -30,13 +29,6 @@ FILES = (
     "so101_wrist_roll_pitch.step",
     "trimesh_featuretype.step",
 )
-
-
-@pytest.fixture(scope="module")
-def read(step_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Assembly]:
-    """Each file read once."""
-    cache = tmp_path_factory.mktemp("geometry")
-    return lambda name: read_geometry(step_files / name, ReadOptions(cache_dir=cache))
 
 
 def bom_of(assembly: Assembly, mass: Callable[[int], float]) -> tuple[str, float]:
@@ -55,11 +47,9 @@ def bom_of(assembly: Assembly, mass: Callable[[int], float]) -> tuple[str, float
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_complete_bom_gives_exactly_its_sum(
-    read: Callable[[str], Assembly], compute: Fixture, name: str
-) -> None:
+def test_a_complete_bom_gives_exactly_its_sum(real: Real, compute: Fixture, name: str) -> None:
     """Every product finds its row by its exact name; the masses add up, and every link is a real body."""
-    assembly = read(name)
+    assembly = real(name)
     text, total = bom_of(assembly, lambda number: 0.1 + 0.01 * number)
     report = compute(assembly, text)
     assert report.total.mass == pytest.approx(total, rel=1e-12)
@@ -71,28 +61,18 @@ def test_a_complete_bom_gives_exactly_its_sum(
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_by_material_the_volume_counts(read: Callable[[str], Assembly], compute: Fixture, name: str) -> None:
-    """All steel: the mass is 7850 times the volume; what has no solid is reported."""
-    assembly = read(name)
+def test_case_42_all_of_steel(real: Real, compute: Fixture, name: str) -> None:
+    """The mass is 7850 times the volume; what has no solid is reported; MuJoCo takes each link as it is."""
+    assembly = real(name)
     text, _ = bom_of(assembly, lambda number: 0.0)
     report = compute(assembly, text.replace("- None -,0.000000 kg", "Steel,No value"))
     volume = sum(assembly.prototypes[i.prototype].volume_m3 for i in assembly.instances)
     assert report.total.mass == pytest.approx(7850 * volume, rel=1e-9)
     empty = {p.name for p in assembly.prototypes.values() if not p.volume_m3}
     assert {w.part_name for w in report.warnings if w.code == "no_volume"} == empty
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_case_42_mujoco_loads_every_link(
-    read: Callable[[str], Assembly], compute: Fixture, name: str
-) -> None:
-    """Each link of each file, all of steel, on a joint of its own, with the mass that the report says."""
-    mujoco = pytest.importorskip("mujoco")
-    assembly = read(name)
-    text, _ = bom_of(assembly, lambda number: 0.0)
-    report = compute(assembly, text.replace("- None -,0.000000 kg", "Steel,No value"))
     links = writable(report.links.values())
     assert set(links) == {link.name for link in report.links.values() if link.props.mass > 0}
+    mujoco = pytest.importorskip("mujoco")
     bodies = snippets(links, "mjcf").replace("<inertial", "<freejoint/><inertial")
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
     masses = {model.body(i).name: model.body_mass[i] for i in range(1, model.nbody)}
@@ -100,19 +80,17 @@ def test_case_42_mujoco_loads_every_link(
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_an_empty_bom_warns_of_every_part(
-    read: Callable[[str], Assembly], compute: Fixture, name: str
-) -> None:
+def test_an_empty_bom_warns_of_every_part(real: Real, compute: Fixture, name: str) -> None:
     """No part has a mass that nobody gave it without a word."""
-    assembly = read(name)
+    assembly = real(name)
     report = compute(assembly, "Name,Material,Mass\n")
     warned = {(w.link_name, w.part_name) for w in report.warnings if w.code == "not_in_bom"}
     assert warned == {(link, part.name) for link, part in report.parts()}
 
 
-def test_case_11_fourteen_balls_share_one_row(read: Callable[[str], Assembly], compute: Fixture) -> None:
+def test_case_11_fourteen_balls_share_one_row(real: Real, compute: Fixture) -> None:
     """asm4_bearing: sixteen products, fourteen of them "Ball": one row of 14 pieces is right for all."""
-    assembly = read("asm4_bearing.stp")
+    assembly = real("asm4_bearing.stp")
     assert len(assembly.prototypes) == 16
     report = compute(
         assembly, "Name,Quantity,Material,Mass\nBall,14,Steel,\nOuter_Ring,1,Steel,\nInner_Ring,1,Steel,\n"
@@ -124,9 +102,9 @@ def test_case_11_fourteen_balls_share_one_row(read: Callable[[str], Assembly], c
     assert "count_differs" in {str(w.code) for w in wrong.warnings}
 
 
-def test_case_13_geometry_that_is_elsewhere(read: Callable[[str], Assembly], compute: Fixture) -> None:
+def test_case_13_geometry_that_is_elsewhere(real: Real, compute: Fixture) -> None:
     """so101_wrist: a product whose geometry the file lacks. Its BOM mass is a point, flagged."""
-    assembly = read("so101_wrist_roll_pitch.step")
+    assembly = real("so101_wrist_roll_pitch.step")
     report = compute(
         assembly,
         "Name,Quantity,Material,Mass\nWiring_holder v1,1,,0.002000 kg\nWrist_Roll_Pitch_SO101 v2,1,ABS,\n",
@@ -139,12 +117,10 @@ def test_case_13_geometry_that_is_elsewhere(read: Callable[[str], Assembly], com
     )
 
 
-def test_densities_of_the_file_are_used_when_asked(read: Callable[[str], Assembly], compute: Fixture) -> None:
+def test_densities_of_the_file_are_used_when_asked(real: Real, compute: Fixture) -> None:
     """dm1 states densities in lb/in³; so101_base names ABS with 1060 kg/m³."""
-    from silo.inertia.masses import Options
-
     for name in ("dm1-id-214.stp", "so101_base.step"):
-        assembly = read(name)
+        assembly = real(name)
         report = compute(assembly, None, options=Options(1000.0, step_density=True))
         expected = sum(
             (assembly.prototypes[i.prototype].step_density or 0) * assembly.prototypes[i.prototype].volume_m3

@@ -134,14 +134,13 @@ def test_every_instance_stands_once(found: list[tuple[str, ...]], clusters: int 
     assert [(k.name, k.patterns) for k in again.links] == [(k.name, k.patterns) for k in mapped.links]
 
 
-def test_real_files_are_given_to_links_whole(step_files: Path, tmp_path: Path) -> None:
-    """Each public STEP file: the map as read gives what was meant."""
+@pytest.mark.parametrize("name", ["as1-oc-214.stp", "asm4_bearing.stp", "so101_wrist_roll_pitch.step"])
+def test_real_files_are_given_to_links_whole(
+    name: str, real: Callable[[str], Assembly], tmp_path: Path
+) -> None:
+    """Public STEP files: the map as read gives what was meant."""
     pytest.importorskip("OCP.BRep", exc_type=ImportError)
-    from silo.inertia.geometry import ReadOptions, read
-
-    for name in ("as1-oc-214.stp", "asm4_bearing.stp", "so101_wrist_roll_pitch.step"):
-        assembly = read(step_files / name, options=ReadOptions(isolate=False, cache=False))
-        read_back(assembly, tmp_path)
+    read_back(real(name), tmp_path)
 
 
 ODD = st.text(

@@ -35,12 +35,6 @@ def cylinder(name: str, radius: float, height: float, **more: Any) -> Prototype:
     return body(name, math.pi * radius**2 * height, (across, across, radius**2 / 2), **more)
 
 
-def sphere(name: str, radius: float, **more: Any) -> Prototype:
-    """A solid sphere [m]."""
-    moment = 0.4 * radius**2
-    return body(name, 4 / 3 * math.pi * radius**3, (moment, moment, moment), **more)
-
-
 def shape_only(name: str, **more: Any) -> Prototype:
     """A product without a solid: surfaces, wires, or a file that was not found."""
     more.setdefault("key", name)

@@ -16,7 +16,7 @@ from step_writer import trsf_of
 from silo.inertia.model import GeometryCode, combine_arrays
 
 Fixture = Callable[..., Any]
-PARTS, MODULES, EACH = 20, 100, 100
+PARTS, KINDS, MODULES, EACH = 20, 4, 100, 100
 TURN = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
 
 
@@ -24,7 +24,7 @@ TURN = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
 def test_case_20_ten_thousand_instances_of_twenty_parts(
     step: Fixture, tmp_path: Path, pipeline: Fixture, codes: Fixture
 ) -> None:
-    """Mass, centre and tensor of 10 000 placed boxes in 100 sub-assemblies, against closed forms in numpy.
+    """Mass, centre and tensor of 10 000 placed boxes in 100 sub-assemblies of 4 kinds, against closed forms.
 
     Half of the parts have a mass in the BOM, half a material; each row's quantity is 500. Speed is measured
     in benchmarks/.
@@ -33,17 +33,21 @@ def test_case_20_ten_thousand_instances_of_twenty_parts(
     top = document.assembly("rig")
     sizes = np.array([[1 + k, 2 + k, 3 + k] for k in range(PARTS)], float)
     parts = [document.part(BRepPrimAPI_MakeBox(*sizes[k]).Shape(), f"part {k:02}") for k in range(PARTS)]
-    which, centres, turned = [], [], []
-    for m in range(MODULES):
-        module = document.assembly(f"module {m}")
-        turn = TURN if m % 2 else np.eye(3)
+    which, centres, turned, modules = [], [], [], []
+    for kind in range(KINDS):
+        modules.append(document.assembly(f"module {kind}"))
         for n in range(EACH):
-            k, at = n % PARTS, np.array([40.0 * n, 7 * m, (n * m) % 13])
-            document.place(module, parts[k], trsf_of(at, turn), f"p{n}")
-            which.append(k)
-            centres.append(turn @ (sizes[k] / 2) + at + [0, 0, 50 * m])
+            at = np.array([40.0 * n, 7 * kind, (n * kind) % 13])
+            document.place(modules[kind], parts[n % PARTS], trsf_of(at, TURN if kind % 2 else None), f"p{n}")
+    for m in range(MODULES):
+        kind, outer = m % KINDS, TURN.T if m % 3 else np.eye(3)
+        document.place(top, modules[kind], trsf_of((0, 0, 50 * m), outer), f"module {m}")
+        turn = outer @ (TURN if kind % 2 else np.eye(3))
+        for n in range(EACH):
+            at = outer @ [40.0 * n, 7 * kind, (n * kind) % 13] + [0, 0, 50 * m]
+            which.append(n % PARTS)
+            centres.append(turn @ (sizes[n % PARTS] / 2) + at)
             turned.append(turn)
-        document.place(top, module, trsf_of((0, 0, 50 * m)), f"module {m}")
     volumes = sizes.prod(axis=1) * 1e-9
     rows = [f"500,,{8e6 * volumes[k]:.6f} g,part {k:02}" for k in range(PARTS // 2)]
     rows += [f"500,aluminum,,part {k:02}" for k in range(PARTS // 2, PARTS)]

@@ -29,21 +29,14 @@ class Ran:
         return json.loads(self.out)
 
 
-@pytest.fixture(scope="session")
-def geometry_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One cache of read geometry for all tests of the commands: the arm is read once."""
-    return tmp_path_factory.mktemp("cache")
-
-
 @pytest.fixture(autouse=True)
-def home(tmp_path: Path, geometry_cache: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Nothing of the user's own configuration, cache or FreeCAD is read or written."""
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Nothing of the user's own configuration or FreeCAD is read or written."""
     for name in ("SILO_API_URL", "SILO_API_TOKEN", "FREECAD_MATERIALS"):
         monkeypatch.delenv(name, raising=False)
     folder = tmp_path / "home"
     for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME"):
         monkeypatch.setenv(name, str(folder / name.lower()))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(geometry_cache))
     return folder
 
 

@@ -29,131 +29,118 @@ SPEC = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", SPEC)
-def test_the_specs_materials(materials: MaterialTable, name: str) -> None:
-    """Every material of the spec has the spec's density, under its own name."""
-    hit = materials.find(name)
-    assert isinstance(hit, MaterialHit)
-    assert hit.material.density == SPEC[name]
-    assert not hit.doubt
-    assert hit.material.source
+KNOWN = {
+    20: "EPS",
+    33: "Styrofoam",
+    200: "cork",
+    720: "Wood (Oak)",
+    905: "Polypropylene",
+    945: "PE",
+    970: "HDPE; PE-HD; Polyethylene (HDPE)",
+    1050: "ABS Plastic; ＡＢＳ; plastic ABS",
+    1100: "Silicon rubber; Silicone, Shore A 40",
+    1130: "PC/ABS",
+    1150: "EPDM",
+    1180: "Plexiglass",
+    1200: "PC; pa12-cf",
+    1250: "PLA+; NBR; NBR 70 Shore; Soft PVC",
+    1350: "Pertinax",
+    1410: "POM-C, black; Plastic, Acetal, Black",
+    1510: "Ultem 2300",
+    1600: "Carbon fiber black",
+    1740: "Magnesium",
+    1850: "FR4; PCB; PCB FR4; PCB 1.6 mm; FR4 1.6mm",
+    1900: "Viton",
+    2500: "Glass, Soda-Lime",
+    2670: "AlMg3",
+    2700: (
+        "Aluminum - 6061; Aluminium 6082-T6; anodized aluminum; Powder-coated aluminum; "
+        "Aluminum 6061-T6, black anodized; Al; EN-AW 6082-T6"
+    ),
+    2710: "ADC12",
+    2780: "Duralumin",
+    2810: "EN AW-7075 T651",
+    3100: "silicon carbide, black",
+    4430: "Ti-6Al-4V; Titanium - Grade 5; Titanium Grade 5 black anodized",
+    5220: "TiN",
+    7200: "Iron, Cast; GG-25",
+    7290: "TIN",
+    7650: "silicon steel",
+    7700: "SUS440C",
+    7800: "A2 tool steel",
+    7810: "100Cr6",
+    7850: (
+        "Steel - AISI 1020; Zinc plated steel; Steel, zinc plated; Steel wire; "
+        "Steel with black oxide finish; verzinkter Stahl; Zinc plated steel grade 8.8; "
+        "AISI 1020 Steel, Cold Rolled; Steel, Carbon; Steel - Plain Carbon; "
+        "Cold rolled steel sheet 2 mm; Steel S235 JR; Steel plated with zinc; "
+        "Steel coated in nickel, painted; Metal: Steel; C 45; 4140; 8.8; carbon steel, plate; "
+        "zn plated steel"
+    ),
+    8000: "AISI 304; Stainless Steel 316L; Edelstahl 1.4301; 不锈钢; 304; Steel 304; A2; A2-70; AISI316L",
+    8500: "Messing; brass, nickel plated; Brass nickel plated",
+    8730: "Nickel silver; German silver; nickel silver wire",
+    8960: "Cu; Copper, silver plated; copper natural",
+    11340: "Lead",
+    19300: "Tungsten",
+}  # fmt: skip
+UNKNOWN = (
+    "A; Environment coating; Scfoam; Aluminum foam; lead free solder; Nylon glass filled; PA6-GF30; "
+    "PETG-CF; LW-PLA; Brass/Steel; Silver nickel; Silver paint; Sintered bronze; PLA, 20% infill; "
+    "Steel wire rope; Copper cable; Titanium dioxide; Zinc plated; Nickel-plated; Titanium coated; "
+    "Galvanized; Black oxide; Hard anodized; Iron-on vinyl; Tungsten polymer; Steel 50 % fill; "
+    "20 % PLA; PLA 20%; PA 6 %; PLA, 20 percent; Bronzefill PLA; Copperfill; PP-T20; PA6 30GF; "
+    "Copper clad aluminum; Alu-Dibond; PLA wood; Lead crystal; Glass ceramic; Steel core; "
+    "Unobtainium; Default; ---; Steel coated with rubber; Rubber coated steel; PVC coated steel; "
+    "Steel TiN coated; Aluminium, gold anodized; PEEK 450CA30; PA12 30GL; coated with steel; "
+    "plated in gold"
+)
+DOUBTED = (
+    "Gold anodized; silver painted; Titanium white; Carbon black; Nickel grey; gold colour; "
+    "metal PLA; PLA - metal; Steel with plastic; plastic coated steel; Gold 18k; Tungsten alloy; "
+    "Steel?; ~Steel; Steel (?); ≈ brass; Stahl geh?rtet"
+)
+MIXED = "Al foam; PE foam; NBR/steel; cork-rubber; Al/PE; PLA with 20 % cork"
+
+
+def texts(listed: str) -> Any:
+    """A parameter for each text of a list."""
+    return pytest.mark.parametrize("text", listed.split("; "))
 
 
 @pytest.mark.parametrize(
     ("text", "density"),
-    [
-        ("Aluminum - 6061", 2700),
-        ("Aluminium 6082-T6", 2700),
-        ("EN AW-7075 T651", 2810),
-        ("AISI 304", 8000),
-        ("Stainless Steel 316L", 8000),
-        ("Edelstahl 1.4301", 8000),
-        ("Steel - AISI 1020", 7850),
-        ("Zinc plated steel", 7850),
-        ("Steel, zinc plated", 7850),
-        ("anodized aluminum", 2700),
-        ("FR4", 1850),
-        ("PCB", 1850),
-        ("PCB FR4", 1850),
-        ("PLA+", 1250),
-        ("PC", 1200),
-        ("PC/ABS", 1130),
-        ("ABS Plastic", 1050),
-        ("Polypropylene", 905),
-        ("Magnesium", 1740),
-        ("Tungsten", 19300),
-        ("Lead", 11340),
-        ("Plexiglass", 1180),
-        ("POM-C, black", 1410),
-        ("Messing", 8500),
-        ("Nickel silver", 8730),
-        ("German silver", 8730),
-        ("Steel wire", 7850),
-        ("不锈钢", 8000),
-        ("ＡＢＳ", 1050),
-        ("Ti-6Al-4V", 4430),
-        ("pa12-cf", 1200),
-        ("Powder-coated aluminum", 2700),
-        ("brass, nickel plated", 8500),
-        ("Steel with black oxide finish", 7850),
-        ("verzinkter Stahl", 7850),
-        ("Zinc plated steel grade 8.8", 7850),
-        ("Aluminum 6061-T6, black anodized", 2700),
-        ("AISI 1020 Steel, Cold Rolled", 7850),
-        ("Steel, Carbon", 7850),
-        ("Steel - Plain Carbon", 7850),
-        ("Iron, Cast", 7200),
-        ("Silicon rubber", 1100),
-        ("Wood (Oak)", 720),
-        ("Glass, Soda-Lime", 2500),
-        ("Plastic, Acetal, Black", 1410),
-        ("Titanium - Grade 5", 4430),
-        ("Cold rolled steel sheet 2 mm", 7850),
-        ("Silicone, Shore A 40", 1100),
-        ("Steel S235 JR", 7850),
-    ],
+    [*SPEC.items(), *((text, density) for density, listed in KNOWN.items() for text in listed.split("; "))],
 )
 def test_texts_that_name_a_material(materials: MaterialTable, text: str, density: float) -> None:
-    """Alloys, standards' numbers, other languages, platings, colours."""
+    """The spec's materials, alloys, numbers of standards, other languages, platings, everyday words."""
     hit = materials.find(text)
     assert isinstance(hit, MaterialHit), hit
-    assert hit.material.density == density
-    assert not hit.doubt
+    assert (hit.material.density, hit.doubt) == (density, "")
+    assert hit.material.source
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "A",
-        "Environment coating",  # holds "iron"
-        "Scfoam",  # holds "cf"
-        "Aluminum foam",
-        "lead free solder",
-        "Nylon glass filled",
-        "PA6-GF30",
-        "PETG-CF",
-        "LW-PLA",
-        "Brass/Steel",
-        "Silver nickel",
-        "Silver paint",
-        "Sintered bronze",
-        "PLA, 20% infill",
-        "Steel wire rope",
-        "Copper cable",
-        "Titanium dioxide",
-        "Zinc plated",
-        "Nickel-plated",
-        "Titanium coated",
-        "Galvanized",
-        "Black oxide",
-        "Hard anodized",
-        "Iron-on vinyl",
-        "Tungsten polymer",
-        "Steel 50 % fill",
-        "20 % PLA",
-        "PLA 20%",
-        "PA 6 %",
-        "PLA, 20 percent",
-        "Bronzefill PLA",
-        "Copperfill",
-        "PP-T20",
-        "PA6 30GF",
-        "Copper clad aluminum",
-        "Alu-Dibond",
-        "PLA wood",
-        "Lead crystal",
-        "Glass ceramic",
-        "Steel core",
-        "Unobtainium",
-        "Default",
-        "---",
-    ],
-)
+@texts(UNKNOWN)
 def test_texts_that_only_look_like_one(materials: MaterialTable, text: str) -> None:
-    """A part of a word, a filled or foamed plastic, two materials at once: no guess, and a reason."""
+    """A part of a word, a filled, foamed or coated material, two at once: no guess, and a reason."""
     miss = materials.find(text)
     assert isinstance(miss, MaterialMiss), miss
     assert miss.reason
+
+
+@texts(MIXED)
+def test_short_words_do_not_make_a_material_of_a_mixture(materials: MaterialTable, text: str) -> None:
+    """A mixture stays unknown, or in doubt."""
+    found = materials.find(text)
+    assert not isinstance(found, MaterialHit) or found.doubt
+
+
+@texts(DOUBTED)
+def test_words_that_deny_a_material_leave_a_doubt(materials: MaterialTable, text: str) -> None:
+    """A colour, a class of other materials, an alloy of a pure one, a question mark."""
+    found = materials.find(text)
+    assert isinstance(found, MaterialHit)
+    assert found.doubt
 
 
 @pytest.mark.parametrize(
@@ -382,88 +369,6 @@ def test_an_installed_freecad_changes_no_result_without_a_word(materials: Materi
     gap = with_cards.find("PLA wood")
     assert isinstance(gap, MaterialHit)
     assert gap.material is cards[2]
-
-
-@pytest.mark.parametrize(
-    ("text", "density"),
-    [
-        ("PE", 945), ("HDPE", 970), ("PE-HD", 970), ("Polyethylene (HDPE)", 970), ("NBR", 1250),
-        ("NBR 70 Shore", 1250), ("EPDM", 1150), ("Viton", 1900), ("cork", 200), ("EPS", 20),
-        ("Styrofoam", 33), ("Al", 2700), ("Cu", 8960), ("304", 8000), ("Steel 304", 8000),
-        ("A2", 8000), ("A2-70", 8000), ("A2 tool steel", 7800), ("PCB", 1850), ("PCB 1.6 mm", 1850),
-        ("FR4 1.6mm", 1850), ("100Cr6", 7810), ("AlMg3", 2670), ("Pertinax", 1350),
-    ],
-)  # fmt: skip
-def test_everyday_words(text: str, density: float) -> None:
-    """What people write into a BOM without thinking of us."""
-    found = load_materials(freecad=False).find(text)
-    assert isinstance(found, MaterialHit), found
-    assert found.material.density == density
-
-
-@pytest.mark.parametrize(
-    "text", ["Al foam", "PE foam", "NBR/steel", "cork-rubber", "Al/PE", "PLA with 20 % cork"]
-)
-def test_short_words_do_not_make_a_material_of_a_mixture(text: str) -> None:
-    """The new names are short; a mixture stays unknown, or in doubt."""
-    found = load_materials(freecad=False).find(text)
-    assert not isinstance(found, MaterialHit) or found.doubt
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        *("Gold anodized", "silver painted", "Titanium white", "Carbon black", "Nickel grey", "gold colour"),
-        *(
-            "metal PLA",
-            "PLA - metal",
-            "Steel with plastic",
-            "plastic coated steel",
-            "Gold 18k",
-            "Tungsten alloy",
-        ),
-        *("Steel?", "~Steel", "Steel (?)", "≈ brass", "Stahl geh?rtet"),
-    ],
-)
-def test_words_that_deny_a_material_leave_a_doubt(materials: MaterialTable, text: str) -> None:
-    """A colour, a class of other materials, an alloy of a pure one, a question mark."""
-    found = materials.find(text)
-    assert isinstance(found, MaterialHit)
-    assert found.doubt
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        *("Steel coated with rubber", "Rubber coated steel", "PVC coated steel", "Steel TiN coated"),
-        *("Aluminium, gold anodized", "PEEK 450CA30", "PA12 30GL", "coated with steel", "plated in gold"),
-    ],
-)
-def test_coats_that_count_and_fills_are_no_material(materials: MaterialTable, text: str) -> None:
-    assert isinstance(materials.find(text), MaterialMiss)
-
-
-@pytest.mark.parametrize(
-    ("text", "density"),
-    [
-        *(
-            ("Steel plated with zinc", 7850),
-            ("Steel coated in nickel, painted", 7850),
-            ("Metal: Steel", 7850),
-        ),
-        *(("Copper, silver plated", 8960), ("Brass nickel plated", 8500), ("Carbon fiber black", 1600)),
-        *(("Titanium Grade 5 black anodized", 4430), ("copper natural", 8960), ("plastic ABS", 1050)),
-        *(("GG-25", 7200), ("AISI316L", 8000), ("EN-AW 6082-T6", 2700), ("C 45", 7850), ("SUS440C", 7700)),
-        *(("TiN", 5220), ("TIN", 7290), ("4140", 7850), ("8.8", 7850), ("Duralumin", 2780), ("ADC12", 2710)),
-        *(("carbon steel, plate", 7850), ("silicon carbide, black", 3100), ("nickel silver wire", 8730)),
-        *(("Soft PVC", 1250), ("Ultem 2300", 1510), ("silicon steel", 7650), ("zn plated steel", 7850)),
-    ],
-)
-def test_platings_grades_and_spellings(materials: MaterialTable, text: str, density: float) -> None:
-    """What is known is said without a doubt."""
-    found = materials.find(text)
-    assert isinstance(found, MaterialHit)
-    assert (found.material.density, found.doubt) == (density, "")
 
 
 @pytest.mark.parametrize("text", ["Air", "FEB", "Pb", "XY", "30 4", "1 7 4"])

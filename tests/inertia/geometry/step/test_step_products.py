@@ -112,13 +112,6 @@ def test_instance_names_are_kept_beside_product_names(
     assert (instance.path, instance.product_path) == (("left hinge",), ("42-0815",))
 
 
-def test_a_lone_part_is_its_own_instance(box: Any, step_part: Any, read_in: Any) -> None:
-    """A file with one part has one instance, called like the part."""
-    assembly = read_in(step_part(box(1, 2, 3), "bracket"))
-    assert [i.path for i in assembly.instances] == [("bracket",)]
-    assert assembly.name == "bracket"
-
-
 def test_solid_and_wire_of_one_product_are_one_product(
     box: Any, step: Any, tmp_path: Path, read_in: Any
 ) -> None:
@@ -215,16 +208,6 @@ def test_a_stated_total_counts_scaled_parts_as_they_stand(stated: float | None, 
 def test_a_stated_volume_may_be_off_by_a_thousandth(stated: float, codes: list[GeometryCode]) -> None:
     """A file's own figure for a part, and where it begins to speak against what was measured."""
     assert [p.code for p in against_stated(1e-6, np.zeros(3), StatedInStep(stated))] == codes
-
-
-def test_a_solid_inside_out_is_turned_and_said(box: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:
-    """A reversed shell has a negative volume in every kernel, in silence; one real part in 100 has it."""
-    path = tmp_path / "reversed.brep"
-    assert BRepTools.Write_s(box(10, 20, 30).Reversed(), str(path))
-    (part,) = read_in(path).prototypes.values()
-    assert part.volume_m3 == pytest.approx(6e-6, rel=1e-9)
-    assert np.linalg.eigvalsh(part.inertia_unit).min() > 0
-    assert codes_of(part) == [GeometryCode.NEGATIVE_VOLUME]
 
 
 def test_a_reversed_solid_inside_another_is_a_cavity(box: Any, tmp_path: Path, read_in: Any) -> None:
