@@ -23,9 +23,11 @@ RELATIONS = (
 )
 
 
-def box(number: int, size: tuple[float, float, float], name: str = "") -> str:
-    """An object with the mesh of a box, one corner in the origin."""
-    body = trimesh.creation.box(size).apply_translation(np.array(size) / 2)
+def box(number: int, *sizes: tuple[float, float, float], name: str = "") -> str:
+    """An object with a mesh of boxes, each with one corner in the origin."""
+    body = trimesh.util.concatenate(
+        [trimesh.creation.box(size).apply_translation(np.array(size) / 2) for size in sizes]
+    )
     vertices = "".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in body.vertices.tolist())
     faces = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in body.faces.tolist())
     named = f' name="{name}"' if name else ""
@@ -68,7 +70,7 @@ ITEM = '<item objectid="1"/>'
 def test_the_unit_is_the_file_s(unit: str, metres: float, write: Any, read_in: Any, codes_of: Any) -> None:
     """All units of the specification; none is assumed."""
     size = (2.0, 3.0, 4.0)
-    assembly = read_in(write({"3D/3dmodel.model": model(box(1, size, "brick"), ITEM, unit)}))
+    assembly = read_in(write({"3D/3dmodel.model": model(box(1, size, name="brick"), ITEM, unit)}))
     (part,) = assembly.prototypes.values()
     assert part.volume_m3 == pytest.approx(24 * metres**3)
     assert part.name == "brick"
@@ -79,7 +81,8 @@ def test_components_are_placed_by_their_transforms(write: Any, read_in: Any) -> 
     """Row vectors, v' = v M: twelve numbers, the translation last; a quarter turn about z and a shift."""
     use = '<component objectid="1" transform="0 1 0 -1 0 0 0 0 1 100 0 0"/><component objectid="1"/>'
     resources = (
-        box(1, (10, 20, 30), "brick") + f'<object id="2" name="pair"><components>{use}</components></object>'
+        box(1, (10, 20, 30), name="brick")
+        + f'<object id="2" name="pair"><components>{use}</components></object>'
     )
     path = write(
         {"3D/3dmodel.model": model(resources, '<item objectid="2" transform="1 0 0 0 1 0 0 0 1 0 0 5"/>')}
@@ -99,7 +102,7 @@ def test_components_are_placed_by_their_transforms(write: Any, read_in: Any) -> 
 
 def test_objects_may_lie_in_other_parts(write: Any, read_in: Any) -> None:
     """The production extension: a component by path."""
-    other = model(box(7, (1, 1, 1), "cube"), "")
+    other = model(box(7, (1, 1, 1), name="cube"), "")
     use = (
         '<object id="1"><components><component p:path="/3D/other.model" objectid="7"/></components></object>'
     )
@@ -115,6 +118,11 @@ BAD = {
         "contains itself",
     ),
     "lost": (model("", ITEM), "object 1 that it does not hold"),
+    "lost part": (
+        model('<object id="1"><components><component p:path="/3D/gone.model" objectid="7"/></components>'
+              '</object>', ITEM),
+        r"3D/gone\.model that it does not hold",
+    ),
     "nothing": (model(box(1, (1, 1, 1)), ""), "builds nothing"),
     "unit": (model(box(1, (1, 1, 1)), ITEM, "parsec"), "'parsec'"),
     "index": (
@@ -136,13 +144,6 @@ def test_bad_models_are_plain_sentences(case: str, write: Any, read_in: Any) -> 
     text, reason = BAD[case]
     with pytest.raises(DocumentError, match=reason):
         read_in(write({"3D/3dmodel.model": text}))
-
-
-def test_a_part_that_is_not_there_is_named(write: Any, read_in: Any) -> None:
-    """A component in a part that the package lacks."""
-    use = '<object id="1"><components><component p:path="/3D/gone.model" objectid="7"/></components></object>'
-    with pytest.raises(DocumentError, match=r"3D/gone\.model that it does not hold"):
-        read_in(write({"3D/3dmodel.model": model(use, ITEM)}))
 
 
 def test_what_trimesh_writes_is_read(tmp_path: Path, read_in: Any) -> None:
@@ -178,18 +179,6 @@ def prusa(*kinds: str) -> str:
     return f'<?xml version="1.0"?><config><object id="1" instances_count="1">{volumes}</object></config>'
 
 
-def merged(*sizes: tuple[float, float, float]) -> str:
-    """Object 1: several boxes with one corner in the origin, in one mesh."""
-    bodies = [trimesh.creation.box(size).apply_translation(np.array(size) / 2) for size in sizes]
-    whole = trimesh.util.concatenate(bodies)
-    vertices = "".join(f'<vertex x="{x!r}" y="{y!r}" z="{z!r}"/>' for x, y, z in whole.vertices.tolist())
-    faces = "".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in whole.faces.tolist())
-    return (
-        f'<object id="1" type="model"><mesh><vertices>{vertices}</vertices>'
-        f"<triangles>{faces}</triangles></mesh></object>"
-    )
-
-
 ASSEMBLED = '<object id="9" name="o"><components>{}</components></object>'
 MOVED = '<component objectid="2" transform="1 0 0 0 1 0 0 0 1 1 1 1"/>'
 
@@ -203,8 +192,7 @@ SLICED = {
 
 
 @pytest.mark.parametrize("case", SLICED)
-@pytest.mark.parametrize("scattered", [False, True])
-@pytest.mark.parametrize("typed", [False, True])
+@pytest.mark.parametrize(("scattered", "typed"), [(False, False), (True, True)])
 def test_parts_of_bambu_and_orca(
     case: str, scattered: bool, typed: bool, write: Any, read_in: Any, codes_of: Any
 ) -> None:
@@ -256,7 +244,7 @@ def test_beams_beside_triangles_are_named(write: Any, read_in: Any, codes_of: An
     beams = (
         '<b:beamlattice xmlns:b="urn:b" radius="1"><b:beams><b:beam v1="0" v2="7"/></b:beams></b:beamlattice>'
     )
-    boxed = box(1, (10, 10, 10), "strut").replace("</mesh>", f"{beams}</mesh>")
+    boxed = box(1, (10, 10, 10), name="strut").replace("</mesh>", f"{beams}</mesh>")
     assembly = read_in(write({ROOT: model(boxed, ITEM)}))
     assert codes_of(assembly) == ["body_missing"]
     assert "strut" in assembly.problems[0].message
@@ -290,14 +278,16 @@ def test_volumes_of_prusaslicer(
 ) -> None:
     """The same, as ranges of the triangles of one mesh."""
     sizes = [(10.0, 10.0, 10.0), (2.0, 2.0, 2.0)][: len(kinds)]
-    assembly = read_in(write({ROOT: model(merged(*sizes), ITEM), PRUSA: prusa(*kinds)}))
+    assembly = read_in(write({ROOT: model(box(1, *sizes), ITEM), PRUSA: prusa(*kinds)}))
     (part,) = assembly.prototypes.values()
     assert part.volume_m3 == pytest.approx(volume * 1e-9)
     assert ("not_counted" in codes_of(assembly) + codes_of(part)) == said
 
 
-@pytest.mark.parametrize("word", ["support", "anti_overhang", "infill", "cutting"])
-@pytest.mark.parametrize("said", ["True", "False"])
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [("support", "False"), *((word, "True") for word in ("support", "anti_overhang", "infill", "cutting"))],
+)
 def test_meshes_of_cura(word: str, said: str, write: Any, read_in: Any, codes_of: Any) -> None:
     """Supports, blockers and modifiers are objects of their own, with a setting that says so."""
     setting = (
@@ -334,7 +324,7 @@ def test_objects_of_another_type_are_left_out(
     kind: str, inside: bool, write: Any, read_in: Any, codes_of: Any
 ) -> None:
     """Built by themselves or as a component; the message names them."""
-    boxes = box(1, (10, 10, 10)) + box(2, (2, 2, 2), "brim").replace('type="model"', f'type="{kind}"')
+    boxes = box(1, (10, 10, 10)) + box(2, (2, 2, 2), name="brim").replace('type="model"', f'type="{kind}"')
     if inside:
         used = '<component objectid="1"/><component objectid="2"/>'
         parts = model(boxes + ASSEMBLED.format(used), '<item objectid="9"/>')
