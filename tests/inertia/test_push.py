@@ -165,51 +165,29 @@ def test_default_densities_and_shares_stay_here(assemble: Fixture, compute: Fixt
     assert "share" in plan_push(shared).skipped[0].reason
 
 
-MOTOR = "Part number,Quantity,Material,Mass,Name\n"
+@pytest.mark.parametrize("apart", [0.0, 0.005])
+def test_a_sub_assembly_gets_its_own_mass(
+    assemble: Fixture, compute: Fixture, at: Fixture, apart: float
+) -> None:
+    """A bought motor is one item; its parts' shares stay here, its mass, volume and centre go to it.
 
-
-def test_a_sub_assembly_gets_its_own_mass(assemble: Fixture, compute: Fixture, at: Fixture) -> None:
-    """A bought motor is one item; its parts' shares stay here, its mass, volume and centre go to it."""
-    case, lid = box("case", 0.1, 0.1, 0.1), box("lid", 0.1, 0.1, 0.1)
-    motors = [
-        item
-        for i in range(2)
-        for item in (
-            (f"l/motor{i}/case", case, at(i, 0, 0), "l/motor/case"),
-            (f"l/motor{i}/lid", lid, at(i, 0, 1), "l/motor/lid"),
-        )
-    ]
+    Five millimetres between the lids of two motors: the item gets a mass and no centre.
+    """
+    motors = []
+    for i in range(2):
+        for name, place in (("case", at(i, 0, 0)), ("lid", at(i, 0, 1 + i * apart))):
+            motors.append((f"l/motor{i}/{name}", box(name, 0.1, 0.1, 0.1), place, f"l/motor/{name}"))
     frames = {("l", f"motor{i}"): at(i, 0, 0) for i in range(2)}
-    report = compute(assemble(*motors, frames=frames), MOTOR + "P01-0001,2,,2.000 kg,motor\n")
+    report = compute(assemble(*motors, frames=frames), HEAD + "P01-0001,2,,2.000 kg,motor\n")
     (one,) = report.sub_assemblies
     assert (one.mass, one.agrees, one.paths) == (2.0, True, ("l/motor0", "l/motor1"))
     plan = plan_push(report)
     (item,) = plan.items
+    centre = {} if apart else {"com_m": [0, 0, 0.5]}
     assert item.part_number == "P01-0001"
-    assert item.properties == {"mass_kg": 2.0, "volume_m3": 0.002, "com_m": [0, 0, 0.5]}
+    assert item.properties == {"mass_kg": 2.0, "volume_m3": 0.002} | centre
     assert {s.name for s in plan.skipped} == {"case", "lid"}
     assert all("written to that one's item" in s.reason for s in plan.skipped)
-
-
-@pytest.mark.parametrize(("apart", "told"), [(0.0, True), (0.005, False)])
-def test_sub_assemblies_that_differ_inside_have_no_common_centre(
-    assemble: Fixture, compute: Fixture, at: Fixture, apart: float, told: bool
-) -> None:
-    """Five millimetres between the lids of two motors: the item gets a mass and no centre."""
-    case, lid = box("case", 0.1, 0.1, 0.1), box("lid", 0.1, 0.1, 0.1)
-    motors = [
-        item
-        for i in range(2)
-        for item in (
-            (f"l/motor{i}/case", case, at(i, 0, 0), "l/motor/case"),
-            (f"l/motor{i}/lid", lid, at(i, 0, 1 + i * apart), "l/motor/lid"),
-        )
-    ]
-    frames = {("l", f"motor{i}"): at(i, 0, 0) for i in range(2)}
-    report = compute(assemble(*motors, frames=frames), MOTOR + "P01-0001,2,,2.000 kg,motor\n")
-    (one,) = report.sub_assemblies
-    assert (one.com is not None) is told
-    assert ("com_m" in plan_push(report).items[0].properties) is told
 
 
 @pytest.mark.parametrize(
@@ -227,7 +205,7 @@ def test_a_sub_assembly_that_nobody_vouches_for_is_named(
 ) -> None:
     """With the reason, in words."""
     asm = assemble(("l/motor/case", box("case", 0.1, 0.1, 0.1), None, "l/motor/case"))
-    plan = plan_push(compute(asm, MOTOR + row + "\n"))
+    plan = plan_push(compute(asm, HEAD + row + "\n"))
     assert "motor" not in {item.name for item in plan.items}
     (said,) = [s.reason for s in plan.skipped if s.name == "motor"]
     assert reason in said
@@ -244,7 +222,7 @@ def test_a_sub_assembly_that_nobody_vouches_for_is_named(
 def test_a_doubtful_mass_is_not_written(assemble: Fixture, compute: Fixture, rows: str, code: str) -> None:
     """Another part's, the row's, or in another unit: the warning keeps it from becoming a fact in Silo."""
     asm = assemble(*((f"l/{i}", box("a", 0.1, 0.1, 0.1)) for i in range(4 if code == "row_total" else 1)))
-    plan = plan_push(compute(asm, MOTOR + rows))
+    plan = plan_push(compute(asm, HEAD + rows))
     assert plan.items == ()
     assert code in plan.skipped[0].reason
 
@@ -254,7 +232,7 @@ def test_two_sub_assemblies_of_one_number_are_not_both_written(assemble: Fixture
     cubes = [
         (f"l/{name}/case", box("case", 0.1, 0.1, 0.1), None, f"l/{name}/case") for name in ("left", "right")
     ]
-    report = compute(assemble(*cubes), MOTOR + "P-1,1,,2.000 kg,left\nP-1,1,,3.000 kg,right\n")
+    report = compute(assemble(*cubes), HEAD + "P-1,1,,2.000 kg,left\nP-1,1,,3.000 kg,right\n")
     plan = plan_push(report)
     assert [(item.part_number, item.properties["mass_kg"]) for item in plan.items] == [("P-1", 2.0)]
     assert "another part has the part number P-1" in {skipped.reason for skipped in plan.skipped}

@@ -208,7 +208,8 @@ def _run(
     report.assembly, report.source = assembly.name, assembly.source
     report.bom = rows.source
     report.default_density = task.options.default_density
-    tell_bom(report, rows)
+    for warning in rows.warnings:
+        report.add_warning("", warning.name, f"BOM {warning}", warning.code)
     for problem in assembly.problems:
         report.add_warning("", "", problem.message, problem.code)
     for doubt in doubts:
@@ -559,12 +560,6 @@ def _tell_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> N
                 f"root link {root}. --loose or --links can say otherwise"
             )
             report.add_warning(root, part.name, words, MassCode.IN_ROOT_LINK)
-
-
-def tell_bom(report: InertiaReport, table: BomTable) -> None:
-    """Add the warnings that arose while the BOM was read."""
-    for warning in table.warnings:
-        report.add_warning("", warning.name, f"BOM {warning}", warning.code)
 
 
 def tell_rows(

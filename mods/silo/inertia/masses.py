@@ -91,11 +91,6 @@ class MassDecision:
     pieces: float = 1.0
     compared: bool = False
 
-    @property
-    def informed(self) -> bool:
-        """Return True if the BOM itself has a mass or a material for the product."""
-        return self.source in (Source.BOM_MASS, Source.MATERIAL) or self.material is not None
-
 
 @dataclass(frozen=True, eq=False)
 class MassRule:
@@ -583,8 +578,11 @@ class Groups:
         self.decisions[index] = self._made.setdefault(key, new)
 
 
+_INFORMED = {Source.BOM_MASS, Source.MATERIAL, Source.SUB_ASSEMBLY_MASS}
+
+
 def _has_data(decision: MassDecision) -> bool:
-    return decision.informed or decision.source is Source.SUB_ASSEMBLY_MASS
+    return decision.source in _INFORMED or decision.material is not None
 
 
 def _doubt(match: Match) -> tuple[Note, ...]:

@@ -68,6 +68,18 @@ def _read_in() -> Callable[..., Assembly]:
     return read_in
 
 
+@pytest.fixture(name="read_document")
+def _read_document(tmp_path: Path, read_in: Callable[..., Assembly]) -> Callable[..., Assembly]:
+    """``read_document(document)``: read what was made, from a STEP or FreeCAD file of its own."""
+
+    def read_document(document: Any) -> Assembly:
+        if isinstance(document, StepDocument):
+            return read_in(document.write(tmp_path / "document.step"))
+        return read_in(document.save(tmp_path / f"{document.label}.FCStd"))
+
+    return read_document
+
+
 @pytest.fixture(name="codes_of")
 def _codes_of() -> Callable[..., list[str]]:
     """The codes of an assembly's problems, or of a prototype's."""

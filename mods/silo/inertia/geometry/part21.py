@@ -403,7 +403,9 @@ def read_products(source: Part21) -> Products:
         },
         count=source.count,
         uses=tuple(_uses(source, facts)),
-        shaped=frozenset(owner for owner, item in items if _is_shape(source, item)),
+        shaped=frozenset(
+            owner for owner, item in items if source.keywords[item] in _SURFACES or _is_body(source, item)
+        ),
         solids={
             n: (word, source.ordinals[n]) for n, word in source.keywords.items() if _SOLID.fullmatch(word)
         },
@@ -413,10 +415,6 @@ def read_products(source: Part21) -> Products:
         },
         stray=stray,
     )
-
-
-def _is_shape(source: Part21, item: int) -> bool:
-    return source.keywords[item] in _SURFACES or _is_body(source, item)
 
 
 def _is_body(source: Part21, item: int) -> bool:

@@ -199,10 +199,10 @@ def test_a_lone_body_is_a_part(body: Any, tmp_path: Path, read_in: Any, codes_of
     assert (assembly.name, part.name) == ("Box", "Box")
 
 
-def test_the_default_material_is_no_material(body: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+def test_the_default_material_is_no_material(body: Any, read_document: Any, codes_of: Any) -> None:
     """FreeCAD gives every untouched part 1 kg/m3: nobody's density."""
     doc = body(Doc("part"), ShapeMaterial=material("7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"))
-    (part,) = read_in(doc.save(tmp_path / "part.FCStd")).prototypes.values()
+    (part,) = read_document(doc).prototypes.values()
     assert (part.step_material, part.step_density) == (None, None)
     assert codes_of(part) == []
 
@@ -234,12 +234,10 @@ def test_densities_come_from_installed_material_cards(
     assert (part.step_material, part.step_density) == ("Fine steel", 7850.0)
 
 
-def test_a_material_that_is_not_installed_is_reported(
-    body: Any, tmp_path: Path, read_in: Any, codes_of: Any
-) -> None:
+def test_a_material_that_is_not_installed_is_reported(body: Any, read_document: Any, codes_of: Any) -> None:
     """An id of somebody's own library: no density, and where to put the cards."""
     doc = body(Doc("part"), ShapeMaterial=material("99999999-9999-9999-9999-999999999999"))
-    (part,) = read_in(doc.save(tmp_path / "part.FCStd")).prototypes.values()
+    (part,) = read_document(doc).prototypes.values()
     assert part.step_density is None
     assert codes_of(part) == ["material"]
     assert "FREECAD_MATERIALS" in part.problems[0].message
@@ -247,26 +245,21 @@ def test_a_material_that_is_not_installed_is_reported(
 
 @pytest.mark.parametrize(("text", "density"), [("7900 kg/m^3", 7900.0), ("1.2 kg/m^3", None), ("much", None)])
 def test_a_linked_material_object_gives_name_and_density(
-    text: str, density: float | None, body: Any, tmp_path: Path, read_in: Any
+    text: str, density: float | None, body: Any, read_document: Any
 ) -> None:
     """As FreeCAD 0.20 does it; what is no density is reported, not used."""
     doc = Doc("part").add("App::MaterialObjectPython", "Mat", Material={"Name": "Steel", "Density": text})
     body(doc, Material=Raw("App::PropertyLink", '<Link value="Mat"/>'))
-    (part,) = read_in(doc.save(tmp_path / "part.FCStd")).prototypes.values()
+    (part,) = read_document(doc).prototypes.values()
     assert (part.step_material, part.step_density) == ("Steel", density)
     assert bool(part.problems) == (density is None)
-
-
-def assembly_of(tmp_path: Path, doc: Doc) -> Path:
-    """The document as an assembly's file."""
-    return doc.save(tmp_path / "top.FCStd")
 
 
 def test_a_missing_file_keeps_its_place(body: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:
     """The link stays an instance called like the file, so that a BOM's mass finds it."""
     doc = Doc("top").link("L", "parts/bolt.FCStd", "Box", Placement=at(7))
     doc.add("App::Part", "Top", Group=locals_("L"))
-    path = assembly_of(tmp_path, doc)
+    path = doc.save(tmp_path / "top.FCStd")
     (instance,) = read_in(path).instances
     part = read_in(path).prototypes[instance.prototype]
     assert (part.name, part.has_solid) == ("bolt", False)
@@ -277,7 +270,7 @@ def test_a_missing_file_keeps_its_place(body: Any, tmp_path: Path, read_in: Any,
 def test_a_file_that_appears_is_read_and_not_taken_from_the_cache(body: Any, tmp_path: Path) -> None:
     """What was missing is part of what a kept reading depends on; so is a linked file's content."""
     doc = Doc("top").link("L", "bolt.FCStd", "Box").add("App::Part", "Top", Group=locals_("L"))
-    path = assembly_of(tmp_path, doc)
+    path = doc.save(tmp_path / "top.FCStd")
     options = ReadOptions(cache_dir=tmp_path / "cache")
 
     def volume() -> float:
@@ -291,9 +284,7 @@ def test_a_file_that_appears_is_read_and_not_taken_from_the_cache(body: Any, tmp
 
 
 @pytest.mark.parametrize("how", ["an empty entry", "no entry", "a mesh"])
-def test_a_body_without_a_shape_is_named(
-    how: str, body: Any, tmp_path: Path, read_in: Any, codes_of: Any
-) -> None:
+def test_a_body_without_a_shape_is_named(how: str, body: Any, read_document: Any, codes_of: Any) -> None:
     """Beside a body of the same part: a feature that FreeCAD could not compute, or no solid at all."""
     doc = body(Doc("part"), "Kept")
     if how == "a mesh":
@@ -303,20 +294,20 @@ def test_a_body_without_a_shape_is_named(
         doc.entries |= {entry: b""} if entry else {}
         doc.add("Part::Feature", "Lost", Shape=Raw("Part::PropertyPartShape", f'<Part file="{entry}"/>'))
     doc.add("App::Part", "Part", Group=locals_("Kept", "Lost"))
-    (part,) = read_in(doc.save(tmp_path / "part.FCStd")).prototypes.values()
+    (part,) = read_document(doc).prototypes.values()
     assert part.volume_m3 == pytest.approx(6e-6)
     assert codes_of(part) == [GeometryCode.BODY_MISSING]
     assert "“Lost”" in part.problems[0].message
 
 
-def test_suppressed_excluded_and_meshes_are_reported(body: Any, tmp_path: Path, read_in: Any) -> None:
+def test_suppressed_excluded_and_meshes_are_reported(body: Any, read_document: Any) -> None:
     """None of them has a mass here; each is named."""
     doc = body(Doc("top"), "Kept")
     doc.link("Gone", "bolt.FCStd", "Box", Suppressed=True)
     body(doc, "Left", SiloBomExclude=True)
     doc.add("Mesh::Feature", "Scan")
     doc.add("Assembly::AssemblyObject", "Top", Group=locals_("Kept", "Gone", "Left", "Scan"))
-    assembly = read_in(assembly_of(tmp_path, doc))
+    assembly = read_document(doc)
     assert [i.name for i in assembly.instances] == ["Kept"]
     assert [p.code for p in assembly.problems] == ["not_counted"] * 3
 
@@ -324,7 +315,7 @@ def test_suppressed_excluded_and_meshes_are_reported(body: Any, tmp_path: Path, 
 @pytest.mark.parametrize("hidden", [False, True], ids=["visible", "hidden"])
 @pytest.mark.parametrize("loose", ["a body", "a link", "a part"])
 def test_what_lies_beside_the_assembly_is_reported(
-    loose: str, hidden: bool, body: Any, tmp_path: Path, read_in: Any
+    loose: str, hidden: bool, body: Any, tmp_path: Path, read_document: Any
 ) -> None:
     """The mass is that of the assembly alone; the visible objects that are not in it are named."""
     body(Doc("bolt")).save(tmp_path / "bolt.FCStd")
@@ -337,7 +328,7 @@ def test_what_lies_beside_the_assembly_is_reported(
     else:
         body(doc, "Inner", **more).add("App::Part", "Loose", Group=locals_("Inner"), **more)
     doc.add("Assembly::AssemblyObject", "Top", Group=locals_("Kept"))
-    assembly = read_in(assembly_of(tmp_path, doc))
+    assembly = read_document(doc)
     assert [i.name for i in assembly.instances] == ["Kept"]
     told = [(problem.code, "“Loose”" in problem.message) for problem in assembly.problems]
     assert told == ([] if hidden else [("not_counted", True)])
@@ -413,18 +404,18 @@ def test_standard_parts_can_be_left_out_of_the_mass(
     assert [problem.code for problem in assembly.problems] == ["no_hardware"]
 
 
-def test_a_container_that_is_hidden_as_a_whole_counts(body: Any, tmp_path: Path, read_in: Any) -> None:
+def test_a_container_that_is_hidden_as_a_whole_counts(body: Any, read_document: Any) -> None:
     """Sources of links are usually hidden; only hidden bodies beside visible ones are left out."""
     doc = body(Doc("part"), "A", Visibility=False)
     body(doc, "B", (1, 1, 1), Visibility=False)
     doc.add("App::Part", "Part", Group=locals_("A", "B"))
-    (part,) = read_in(doc.save(tmp_path / "part.FCStd")).prototypes.values()
+    (part,) = read_document(doc).prototypes.values()
     # The small one lies inside of the large one; both are looked at.
     assert part.volume_m3 * 1e9 == pytest.approx(6000)
     assert [problem.code for problem in part.problems] == [GeometryCode.OVERLAPPING_SOLIDS]
 
 
-def test_bodies_of_different_materials_stay_apart(body: Any, tmp_path: Path, read_in: Any) -> None:
+def test_bodies_of_different_materials_stay_apart(body: Any, read_document: Any) -> None:
     """One part, two materials: two products, since one product has one density."""
     doc = Doc("part").add(
         "App::MaterialObjectPython", "Steel", Material={"Name": "Steel", "Density": "7900 kg/m^3"}
@@ -432,7 +423,7 @@ def test_bodies_of_different_materials_stay_apart(body: Any, tmp_path: Path, rea
     body(doc, "Shaft", Material=Raw("App::PropertyLink", '<Link value="Steel"/>'))
     body(doc, "Grip")
     doc.add("App::Part", "Part", Group=locals_("Shaft", "Grip"))
-    found = {p.name: p.step_density for p in read_in(doc.save(tmp_path / "p.FCStd")).prototypes.values()}
+    found = {p.name: p.step_density for p in read_document(doc).prototypes.values()}
     assert found == {"Shaft": 7900.0, "Grip": None}
 
 
@@ -474,7 +465,7 @@ def test_an_array_of_one_shape_that_another_file_links_to(
 
 
 def test_a_link_array_takes_its_placements_from_the_side_entry(
-    body: Any, tmp_path: Path, read_in: Any
+    body: Any, tmp_path: Path, read_document: Any
 ) -> None:
     """Three elements, two placements: the third stands at the origin; both precisions are read."""
     body(Doc("bolt")).save(tmp_path / "bolt.FCStd")
@@ -484,7 +475,7 @@ def test_a_link_array_takes_its_placements_from_the_side_entry(
         doc.entries["Places"] = struct.pack("<I", 2) + b"".join(struct.pack(form, *row) for row in rows)
         doc.objects["Row"][1]["PlacementList"] = PLACES
         doc.add("App::Part", "Top", Group=locals_("Row"))
-        found = read_in(assembly_of(tmp_path, doc)).instances
+        found = read_document(doc).instances
         assert [i.transform[:3, 3].round(6).tolist() for i in found] == [
             [0.01, 0.1, 0],
             [0.02, 0.1, 0],
@@ -497,7 +488,7 @@ BAD_LISTS = [struct.pack("<I", 2) + b"x" * 30, struct.pack("<I", 4_000_000_000)]
 
 @pytest.mark.parametrize("data", BAD_LISTS)
 def test_a_damaged_list_of_placements_is_an_error(
-    data: bytes, body: Any, tmp_path: Path, read_in: Any
+    data: bytes, body: Any, tmp_path: Path, read_document: Any
 ) -> None:
     """A length that does not fit: no guess where the parts are."""
     body(Doc("bolt")).save(tmp_path / "bolt.FCStd")
@@ -506,21 +497,21 @@ def test_a_damaged_list_of_placements_is_an_error(
     doc.objects["Row"][1]["PlacementList"] = PLACES
     doc.add("App::Part", "Top", Group=locals_("Row"))
     with pytest.raises(DocumentError, match="placements of Row are damaged"):
-        read_in(assembly_of(tmp_path, doc))
+        read_document(doc)
 
 
-def test_an_array_of_a_million_million_is_refused(body: Any, tmp_path: Path, read_in: Any) -> None:
+def test_an_array_of_a_million_million_is_refused(body: Any, tmp_path: Path, read_document: Any) -> None:
     """A number in the XML is no reason to fill the memory."""
     body(Doc("bolt")).save(tmp_path / "bolt.FCStd")
     doc = Doc("top").link("Row", "bolt.FCStd", "Box", ElementCount=10**12)
     doc.add("App::Part", "Top", Group=locals_("Row"))
     with pytest.raises(DocumentError, match="claims 1000000000000 elements"):
-        read_in(assembly_of(tmp_path, doc))
+        read_document(doc)
 
 
 @pytest.mark.parametrize("content", [b"", b"no shape at all", None])
 def test_a_damaged_shape_is_that_part_s_problem(
-    content: bytes | None, body: Any, tmp_path: Path, read_in: Any, codes_of: Any
+    content: bytes | None, body: Any, read_document: Any, codes_of: Any
 ) -> None:
     """Empty, nonsense or missing: the other part is measured anyway."""
     doc = body(body(Doc("top"), "Good"), "Bad")
@@ -529,19 +520,19 @@ def test_a_damaged_shape_is_that_part_s_problem(
     else:
         doc.entries["Bad.Shape.brp"] = content
     doc.add("Assembly::AssemblyObject", "Top", Group=locals_("Good", "Bad"))
-    by_name = {p.name: p for p in read_in(assembly_of(tmp_path, doc)).prototypes.values()}
+    by_name = {p.name: p for p in read_document(doc).prototypes.values()}
     assert by_name["Good"].volume_m3 == pytest.approx(6e-6)
     assert not by_name["Bad"].has_solid
     why = GeometryCode.NO_GEOMETRY if content == b"" else GeometryCode.NOT_READ
     assert why in codes_of(by_name["Bad"])
 
 
-def test_curves_are_no_solid(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+def test_curves_are_no_solid(tmp_path: Path, read_document: Any, codes_of: Any) -> None:
     """A Draft wire in a part's file."""
     doc = Doc("wire").add("Part::Feature", "Wire", Shape=shape("w.brp"), Placement=at(0))
     edge = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 0), gp_Pnt(1, 0, 0)).Edge()
     doc.entries["w.brp"] = brep(edge, tmp_path)
-    (part,) = read_in(doc.save(tmp_path / "wire.FCStd")).prototypes.values()
+    (part,) = read_document(doc).prototypes.values()
     assert codes_of(part) == [GeometryCode.NO_SOLID]
     assert "curves only" in part.problems[0].message
 
@@ -555,13 +546,13 @@ def test_assemblies_in_a_ring_end(tmp_path: Path, read_in: Any) -> None:
     assert [p.code for p in assembly.problems] == ["cycle"]
 
 
-def test_a_link_to_a_face_is_no_component(body: Any, tmp_path: Path, read_in: Any) -> None:
+def test_a_link_to_a_face_is_no_component(body: Any, tmp_path: Path, read_document: Any) -> None:
     """Assembly3 elements link faces: references, no parts."""
     body(Doc("bolt")).save(tmp_path / "bolt.FCStd")
     doc = Doc("top").link("Face", "bolt.FCStd", "Box", LinkedObject=XLink("bolt.FCStd", "Box", ("Face1",)))
     doc.link("Part", "bolt.FCStd", "Box")
     doc.add("App::Part", "Top", Group=locals_("Face", "Part"))
-    assembly = read_in(assembly_of(tmp_path, doc))
+    assembly = read_document(doc)
     assert [i.name for i in assembly.instances] == ["Part"]
     assert [p.code for p in assembly.problems] == ["not_counted"]
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -180,7 +179,7 @@ def test_a_turned_box_has_a_turned_tensor(box: Any, trsf: Any, step_part: Any, r
     assert abs(part.inertia_unit[0, 1]) > 1e-2 * part.inertia_unit.max()
 
 
-def test_an_off_axis_assembly_is_exact(box: Any, trsf: Any, step: Any, tmp_path: Path, read_in: Any) -> None:
+def test_an_off_axis_assembly_is_exact(box: Any, trsf: Any, step: Any, read_document: Any) -> None:
     """Three placed bodies, one of them nested and turned, against the closed form by the parallel axis."""
     document = step()
     cube, rod = (
@@ -192,7 +191,7 @@ def test_an_off_axis_assembly_is_exact(box: Any, trsf: Any, step: Any, tmp_path:
     document.place(outer, inner, trsf((40, -70, 25), ROTATION), "inner")
     document.place(outer, cube, trsf((100, 0, 0)), "cube_1")
     document.place(outer, cube, trsf((-15, 200, 7), ROTATION.T), "cube_2")
-    found = total(read_in(document.write(tmp_path / "offaxis.step")), density=2700.0)
+    found = total(read_document(document), density=2700.0)
 
     cube_volume, rod_volume = 8e-6, math.pi * 0.005**2 * 0.06
     cube_tensor = np.eye(3) * cube_volume * 0.02**2 / 6

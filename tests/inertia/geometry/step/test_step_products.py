@@ -57,7 +57,7 @@ def face() -> Any:
 
 
 def test_a_product_is_kept_once_however_often_it_is_placed(
-    box: Any, trsf: Any, step: Any, tmp_path: Path, read_in: Any
+    box: Any, trsf: Any, step: Any, read_document: Any
 ) -> None:
     """Two uses of a sub-assembly of three uses of a part: one prototype, six instances, paths in full."""
     document = step()
@@ -67,7 +67,7 @@ def test_a_product_is_kept_once_however_often_it_is_placed(
         document.place(sub, bolt, trsf((10 * n, 0, 0)), f"bolt:{n}")
     document.place(top, sub, trsf((0, 0, 0)), "sub:1")
     document.place(top, sub, trsf((0, 500, 0)), "sub:2")
-    assembly = read_in(document.write(tmp_path / "nested.step"))
+    assembly = read_document(document)
     assert [p.name for p in assembly.prototypes.values()] == ["bolt"]
     assert [i.name for i in assembly.instances] == [f"sub:{s}/bolt:{n}" for s in (1, 2) for n in (1, 2, 3)]
     assert assembly.instances[0].product_path == ("sub", "bolt")
@@ -77,50 +77,44 @@ def test_a_product_is_kept_once_however_often_it_is_placed(
 
 
 def test_repeated_instance_names_become_unique_paths(
-    box: Any, trsf: Any, step: Any, tmp_path: Path, read_in: Any
+    box: Any, trsf: Any, step: Any, read_document: Any
 ) -> None:
     """Onshape calls each use like its product: the second and third are marked ``<2>``, ``<3>``."""
     document = step()
     part, top = document.part(box(1, 1, 1), "Part 1"), document.assembly("top")
     for n in range(3):
         document.place(top, part, trsf((n, 0, 0)), "Part 1")
-    assembly = read_in(document.write(tmp_path / "repeated.step"))
+    assembly = read_document(document)
     assert [i.name for i in assembly.instances] == ["Part 1", "Part 1<2>", "Part 1<3>"]
 
 
-def test_different_products_with_one_name_stay_different(
-    box: Any, step: Any, tmp_path: Path, read_in: Any
-) -> None:
+def test_different_products_with_one_name_stay_different(box: Any, step: Any, read_document: Any) -> None:
     """Names are not unique in real exports: three products "Part 1" are three prototypes."""
     document = step()
     top = document.assembly("top")
     for size in (1, 2, 3):
         document.place(top, document.part(box(size, size, size), "Part 1"), name="Part 1")
-    assembly = read_in(document.write(tmp_path / "same_names.step"))
+    assembly = read_document(document)
     assert [p.name for p in assembly.prototypes.values()] == ["Part 1"] * 3
     assert sorted(p.volume_m3 * 1e9 for p in assembly.prototypes.values()) == pytest.approx([1, 8, 27])
 
 
-def test_instance_names_are_kept_beside_product_names(
-    box: Any, step: Any, tmp_path: Path, read_in: Any
-) -> None:
+def test_instance_names_are_kept_beside_product_names(box: Any, step: Any, read_document: Any) -> None:
     """An instance that is called otherwise than its product keeps both names."""
     document = step()
     top = document.assembly("top")
     document.place(top, document.part(box(1, 2, 3), "42-0815"), name="left hinge")
-    (instance,) = read_in(document.write(tmp_path / "names.step")).instances
+    (instance,) = read_document(document).instances
     assert (instance.path, instance.product_path) == (("left hinge",), ("42-0815",))
 
 
-def test_solid_and_wire_of_one_product_are_one_product(
-    box: Any, step: Any, tmp_path: Path, read_in: Any
-) -> None:
+def test_solid_and_wire_of_one_product_are_one_product(box: Any, step: Any, read_document: Any) -> None:
     """The kernel makes leaves 'SOLID' and 'COMPOUND' of a mixed product; it is one product anyway."""
     document = step()
     top = document.assembly("top")
     document.place(top, document.part(compound(box(10, 10, 10), wire()), "mixed"), name="mixed_1")
     document.place(top, document.part(box(1, 1, 1), "plain"), name="plain_1")
-    assembly = read_in(document.write(tmp_path / "mixed.step"))
+    assembly = read_document(document)
     assert sorted(p.name for p in assembly.prototypes.values()) == ["mixed", "plain"]
     assert {i.path[0] for i in assembly.instances} == {"mixed_1", "plain_1"}
     mixed = next(p for p in assembly.prototypes.values() if p.name == "mixed")
@@ -128,14 +122,14 @@ def test_solid_and_wire_of_one_product_are_one_product(
 
 
 def test_a_product_of_surfaces_has_no_volume_and_says_so(
-    box: Any, step: Any, tmp_path: Path, read_in: Any, codes_of: Any
+    box: Any, step: Any, read_document: Any, codes_of: Any
 ) -> None:
     """A surface product before a solid one: no name moves to its neighbour, and the surface is reported."""
     document = step()
     top = document.assembly("top")
     document.place(top, document.part(face(), "label"), name="label")
     document.place(top, document.part(box(2, 2, 2), "block"), name="block")
-    by_name = {p.name: p for p in read_in(document.write(tmp_path / "surface.step")).prototypes.values()}
+    by_name = {p.name: p for p in read_document(document).prototypes.values()}
     assert by_name["block"].volume_m3 == pytest.approx(8e-9)
     assert not by_name["label"].has_solid
     assert codes_of(by_name["label"]) == [GeometryCode.NO_SOLID]
@@ -149,11 +143,11 @@ def test_lost_characters_are_kept_and_marked(box: Any, step_part: Any, read_in: 
     assert GeometryCode.NAME in codes_of(part)
 
 
-def test_names_beyond_ascii_survive(box: Any, step: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+def test_names_beyond_ascii_survive(box: Any, step: Any, read_document: Any, codes_of: Any) -> None:
     """What the file encodes rightly is read rightly, and not marked."""
     document = step()
     document.part(box(1, 1, 1), "Peça Ø5 – 漢字")
-    (part,) = read_in(document.write(tmp_path / "unicode.step")).prototypes.values()
+    (part,) = read_document(document).prototypes.values()
     assert part.name == "Peça Ø5 – 漢字"
     assert codes_of(part) == []
 
@@ -168,7 +162,7 @@ def test_the_part_number_is_the_product_s_id(box: Any, step_part: Any, read_in: 
 
 
 def test_mirrored_and_scaled_placements_are_exact_or_refused_aloud(
-    box: Any, step: Any, tmp_path: Path, read_in: Any, codes_of: Any
+    box: Any, step: Any, read_document: Any, codes_of: Any
 ) -> None:
     """A mirror moves the centre to the other side; a scale of 2 has eight times the volume."""
     mirror, double = gp_Trsf(), gp_Trsf()
@@ -178,7 +172,7 @@ def test_mirrored_and_scaled_placements_are_exact_or_refused_aloud(
     part, top = document.part(box(10, 20, 30), "part"), document.assembly("top")
     document.place(top, part, mirror, "mirrored")
     document.place(top, part, double, "doubled")
-    assembly = read_in(document.write(tmp_path / "stretched.step"))
+    assembly = read_document(document)
     assert codes_of(assembly) == [GeometryCode.SCALED]
     prototype = next(iter(assembly.prototypes.values()))
     volumes, coms, units = place(
@@ -272,7 +266,7 @@ def test_a_product_that_contains_itself_is_refused(tmp_path: Path, read_in: Any)
 
 
 def test_a_part_twice_at_one_place_is_reported(
-    step: Any, box: Any, trsf: Any, tmp_path: Path, read_in: Any, codes_of: Any
+    step: Any, box: Any, trsf: Any, read_document: Any, codes_of: Any
 ) -> None:
     """An accident of copying; both are counted, since the BOM counts both."""
     document = step()
@@ -280,7 +274,7 @@ def test_a_part_twice_at_one_place_is_reported(
     # An exporter that multiplies placements leaves rounding behind.
     for name, along in (("one", 0), ("two", 1e-9), ("three", 20), ("near", 20.01)):
         document.place(top, part, trsf((along, 0, 0)), name)
-    assembly = read_in(document.write(tmp_path / "twice.step"))
+    assembly = read_document(document)
     assert codes_of(assembly) == [GeometryCode.COINCIDENT_PARTS]
     assert "1 (two)" in assembly.problems[0].message
     assert len(assembly.instances) == 4

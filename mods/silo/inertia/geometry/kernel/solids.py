@@ -497,7 +497,7 @@ def closed_shells(shapes: list[Any]) -> tuple[list[Any], list[Any]]:
             for shell in occt.loose_shells_of(sewn):
                 (closed if _is_closed(shell) else left).append(shell)
             left += occt.loose_faces_of(sewn)
-    return [_solid(shell) for shell in closed], left
+    return [BRepBuilderAPI_MakeSolid(TopoDS.Shell(shell)).Solid() for shell in closed], left
 
 
 def _is_closed(shape: Any) -> bool:
@@ -521,10 +521,6 @@ def _sewn(faces: list[Any], tolerance: float) -> Any:
         sewing.Perform()
         return sewing
     return None
-
-
-def _solid(shell: Any) -> Any:
-    return BRepBuilderAPI_MakeSolid(TopoDS.Shell(shell)).Solid()
 
 
 def _flux(shape: Any, point: Floats) -> float:
