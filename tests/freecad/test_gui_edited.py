@@ -10,6 +10,7 @@ from freecad_cases.machines import ENDS
 from gui_cases.window import Window
 
 VERSIONS = ENDS
+PARTS = 11  # beside the assembly, as in the story
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
@@ -20,29 +21,29 @@ def _said(freecad: Window) -> dict[str, Any]:
 
 
 def test_a_recompute_is_no_edit(said: dict[str, Any]) -> None:
-    """FreeCAD marks all 42 documents; one of them has an edit."""
-    assert said["marked"] == 42
+    """FreeCAD marks all documents; one of them has an edit."""
+    assert said["marked"] == PARTS + 1
     states = dict(said["states"])
     assert states.pop("Part7") == "changed"
     assert set(states.values()) == {"recomputed"}
-    assert len(states) == 41
+    assert len(states) == PARTS
 
 
 def test_only_what_was_edited_is_checked(said: dict[str, Any]) -> None:
     """And all, none or only this file by a click; without any there is nothing to commit."""
     told = said["dialog"]
     assert told["checked"] == ["Part7", "Top"]
-    assert told["all"] == [42, True]
+    assert told["all"] == [PARTS + 1, True]
     assert told["none"] == [0, False]
     assert told["this"] == [1, True]
     assert told["edited"] == [2, True]
-    assert "40 more files were only recomputed" in "\n".join(told["texts"])
+    assert f"{PARTS - 1} more files were only recomputed" in "\n".join(told["texts"])
 
 
 def test_what_was_committed_has_no_edits_any_more(said: dict[str, Any]) -> None:
     """Ctrl+Return did it; the others stay as FreeCAD has them."""
     assert not said["edited_left"]
-    assert said["left"] <= 41
+    assert said["left"] <= PARTS
 
 
 @pytest.mark.parametrize("kind", ["length", "constraint", "placement", "label", "sheet", "new", "hidden"])

@@ -123,16 +123,15 @@ def test_identity_survives_in_this_version(said: dict[str, Any]) -> None:
     assert bracket["property"] == (identity if said["properties"] else None)
 
 
-@pytest.mark.parametrize("reader", MOSTLY_ENDS)
-def test_each_version_reads_and_keeps_the_identities(
-    freecad: Window, said: dict[str, Any], reader: str, tmp_path: Path
+def test_another_version_reads_and_keeps_the_identities(
+    freecad: Window, said: dict[str, Any], tmp_path: Path
 ) -> None:
-    """Opened here or in another one, and saved there: each component is the item that it was made."""
+    """Opened and saved by an older or by a newer one: each component is the item that it was made."""
     with freecad.server.client() as client:
         wanted = {number: client.get_item(number).id for number in said["registered"].values()}
     folder = tmp_path.resolve() / "vault"
     shutil.copytree(freecad.vault, folder)
-    top, other = folder / "Top.FCStd", machines.need(reader)
+    top, other = folder / "Top.FCStd", machines.need("0.20" if freecad.freecad.short != "0.20" else "1.1")
     env = other.profile(tmp_path / "profile")
     ((_, live),) = run_freecad([str(top)], command=other.command, env=env)
     assert isinstance(live, Extraction), live

@@ -102,6 +102,14 @@ def test_a_person_reads_it_in_the_dock(day: Told) -> None:
     assert "● Connected to 127.0.0.1" in texts
 
 
+def test_a_page_is_opened_on_the_server_in_use_alone(day: Told) -> None:
+    """What is no page of any server is at most a page of ours; without a browser the address is copied."""
+    url = day.window.server.url
+    assert not [page for page in day["elsewhere"] if not page.startswith(f"{url}/") or "example.org" in page]
+    assert day["opened"] == day["copied"]
+    assert day["opened"].startswith(f"{url}/items/")
+
+
 def test_a_merge_of_somebody_else_is_heard(day: Told) -> None:
     """Live, with its counts."""
     assert day["heard"].splitlines()[:2] == [f"BOM Updated: {day['other']}", "⚠1 unreferenced"]

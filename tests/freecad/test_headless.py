@@ -96,10 +96,6 @@ def _numbers(folder: Path, client: SiloClient) -> dict[str, str]:
     return numbers
 
 
-def _json(capsys: pytest.CaptureFixture[str]) -> Any:
-    return json.loads(capsys.readouterr().out)
-
-
 # --- freecadcmd without our command line --------------------------------------------------------------------
 
 
@@ -131,10 +127,6 @@ def test_freecadcmd_alone_syncs_and_reports(vault: Vault, version: str, tmp_path
     }
     assert "4 of 5 files in order" in (tmp_path / "out.md").read_text()
     assert "[5/5]" in done.stdout
-
-    (vault.folder / "zzz.FCStd").unlink()
-    again = headless(freecad, vault, args, tmp_path, dependencies=True)
-    assert again.returncode == 0, again.stdout
 
 
 # FreeCAD runs this within a function, so that what it imports is not known in methods.
@@ -188,11 +180,10 @@ def test_freecad_that_dies_of_a_file_loses_that_one_only(vault: Vault, version: 
 @pytest.mark.parametrize(
     ("moods", "code", "words"),
     [
-        (Moods(), 0, ("merged",)),
         (Moods(merge="missing"), 0, ("merged", "has no merge", "one by one")),
         (Moods(merge="fails"), 3, ("failed", "deadlock detected")),
     ],
-    ids=["default", "no merge", "merge fails"],
+    ids=["no merge", "merge fails"],
 )
 def test_freecadcmd_syncs_with_the_real_silo(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moods: Moods, code: int, words: tuple[str, ...]
@@ -265,11 +256,24 @@ def test_freecadcmd_without_packages_still_writes_the_boms(
     assert {child["object"]: child["quantity"] for child in entry["children"]} == {"Bolt": 2, "Plate": 1}
 
 
-@pytest.mark.parametrize("version", MOSTLY_ENDS)
-def test_wrong_arguments_are_told_in_plain_words(vault: Vault, version: str, tmp_path: Path) -> None:
-    """Exit code 2 and what was wanted; tests/workbench/test_headless.py has each way of getting it wrong."""
-    done = headless(machines.need(version), vault, "nonsense", tmp_path, dependencies=False)
-    assert (done.returncode, "must be a JSON object" in done.stdout) == (2, True), done.stdout
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        ("nonsense", "must be a JSON object"),  # tests/workbench/test_headless.py has the other mistakes
+        ('{"tops": ["empty"]}', "no FreeCAD files"),
+        ('{"tops": ["vault"], "report": "no/such/folder/out.md"}', "no/such/folder"),
+    ],
+)
+def test_a_wrong_job_is_refused_before_anything_is_done(args: str, words: str, tmp_path: Path) -> None:
+    """Exit code 2 and a sentence; a job that looks into the wrong folder must not be green."""
+    freecad = machines.need(WANTED[0])
+    for name in ("empty", "vault"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "vault" / "top.FCStd").touch()
+    profile = freecad.profile(tmp_path / "profile", dependencies=True)
+    away = {"SILO_API_URL": "http://127.0.0.1:9", "SILO_API_TOKEN": "x"}
+    done = freecad.run(HEADLESS, {**profile, **away, "SILO_ARGS": args}, cwd=tmp_path)
+    assert (done.returncode, words in done.stdout) == (2, True), done.stdout
     assert "Traceback" not in done.stdout
 
 
@@ -283,22 +287,3 @@ def test_a_server_that_does_not_answer_is_told_as_such(vault: Vault, version: st
     (result,) = json.loads((tmp_path / "out.json").read_text())["results"]
     assert result["error"]["code"] == "unreachable"
     assert "0 of 1 files in order" in (tmp_path / "out.md").read_text()
-
-
-def test_an_empty_folder_is_no_success(vault: Vault, tmp_path: Path) -> None:
-    """A job that looks into the wrong folder must not be green."""
-    (tmp_path / "empty").mkdir()
-    args = {"tops": ["empty"]}
-    done = headless(machines.need("1.0"), vault, args, tmp_path, dependencies=True)
-    assert (done.returncode, "no FreeCAD files" in done.stdout) == (2, True), done.stdout
-
-
-def test_a_report_that_cannot_be_written_is_told_before_anything_is_done(
-    vault: Vault, tmp_path: Path
-) -> None:
-    """Not after an hour of work, and nothing is synced by half."""
-    args = {"tops": ["vault"], "report": "no/such/folder/out.md"}
-    done = headless(machines.need("1.0"), vault, args, tmp_path, dependencies=True)
-    assert done.returncode == 2, done.stdout
-    assert "no/such/folder" in done.stdout
-    assert vault.lines("top") == {}

@@ -7,8 +7,6 @@ import os
 import sys
 from typing import Any
 
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
-
 from inside import Gui, QtWidgets, labels, run, tell, wait
 
 

@@ -3,13 +3,9 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import zipfile
 from collections.abc import Callable
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
     VAULT,
@@ -17,12 +13,15 @@ from inside import (
     Gui,
     QtCore,
     QtWidgets,
-    addon,
     assembly,
-    boxes,
+    close,
     close_all,
+    commit,
     part,
+    preview,
+    ready,
     register,
+    registering,
     run,
     settled,
     tell,
@@ -34,10 +33,7 @@ from inside import (
 def story() -> None:
     from silo.workbench.start import commands
 
-    one = addon()
-    one.preferences.set("AskRegister", False)
-    one.preferences.set("AskComment", False)
-    wait(lambda: one.session.shown.connection == "online")
+    one = ready()
     top = project()
     register(*(doc for doc in App.listDocuments().values() if doc.Name in ("Plate", "Top")))
     # Opened as people do it: what the assembly links to has no window of its own.
@@ -129,32 +125,20 @@ def nothing(_one: Any) -> None:
     """A command that this story does not know."""
 
 
-def commit(one: Any) -> None:
-    seen = len(boxes("Committed")) + len(boxes("BOM Updated"))
-    Gui.runCommand("Origin_Commit")
-    wait(lambda: len(boxes("Committed")) + len(boxes("BOM Updated")) > seen and settled())
-
-
-def preview(one: Any) -> None:
-    Gui.runCommand("Silo_BOM")
-    window = wait(lambda: next(iter(one.previews._open.values()), None))
-    wait(lambda: window._preview is not None)
+def compare(_one: Any) -> None:
+    window = preview(App.ActiveDocument)
     if window.sync_button.isEnabled():
         window.sync_button.click()
         wait(lambda: settled() and window._preview is not None)
-    window.close()
-    wait(lambda: not one.previews._open)
+    close(window)
 
 
-def registering(one: Any) -> None:
-    Gui.runCommand("Silo_RegisterParts")
-    window = wait(lambda: next(iter(one.registrations._open.values()), None))
-    wait(lambda: window.rows)
+def register_parts(_one: Any) -> None:
+    window = registering(App.ActiveDocument)
     window.register_button.click()
     wait(lambda: all(row.finished for row in window.rows) and settled())
     tell(registered=[row.component() for row in window.rows])
-    window.close()
-    wait(lambda: not one.registrations._open)
+    close(window)
 
 
 def mass(one: Any) -> None:
@@ -247,9 +231,9 @@ def project_view(one: Any) -> None:
 
 
 RUNS: dict[str, Callable[[Any], None]] = {
-    "Origin_Commit": commit,
-    "Silo_BOM": preview,
-    "Silo_RegisterParts": registering,
+    "Origin_Commit": lambda _one: commit(App.ActiveDocument),
+    "Silo_BOM": compare,
+    "Silo_RegisterParts": register_parts,
     "Silo_Mass": mass,
     "Silo_Activity": activity,
     "Silo_Settings": settings,

@@ -3,11 +3,7 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import Gui, QtWidgets, addon, run, tell, wait
 

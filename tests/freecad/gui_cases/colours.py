@@ -6,11 +6,7 @@ The light is the base colour of each face: what a person chose, without shades.
 
 from __future__ import annotations
 
-import os
-import sys
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import FOLDER, VAULT, App, Gui, QtWidgets, run, tell
 

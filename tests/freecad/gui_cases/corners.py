@@ -3,19 +3,14 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import sys
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
     VAULT,
     App,
     Gui,
     QtWidgets,
-    addon,
     assembly,
     boxes,
     close_all,
@@ -25,7 +20,10 @@ from inside import (
     pane,
     part,
     press,
+    ready,
     register,
+    registering,
+    row_of,
     run,
     settled,
     tell,
@@ -99,10 +97,9 @@ def copied(one: Any) -> None:
     one.dock.show_and_raise()
     wait(lambda: "2 files carry the same Silo identity" in "".join(labels(one.dock)))
     press(one.dock, "New part…")
-    window = wait(lambda: next(iter(one.registrations._open.values()), None))
-    wait(lambda: window.rows)
+    window = registering()
     tell(copied_rows=[[row.component(), row.number, row.checked] for row in window.rows])
-    second = next(row for row in window.rows if row.component() == "Bracket2.FCStd")
+    second = row_of(window, "Bracket2.FCStd")
     second.number, second.checked = "new", True
     window._register_checked()
     wait(lambda: second.finished and settled())
@@ -155,9 +152,7 @@ def height(button: Any) -> int:
 
 
 def story() -> None:
-    one = addon()
-    one.preferences.set("AskRegister", False)
-    wait(lambda: one.session.shown.connection == "online")
+    one = ready(comments=True)
     partly_loaded(one)
     unnamed(one)
     copied(one)

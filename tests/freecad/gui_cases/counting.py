@@ -4,23 +4,24 @@
 from __future__ import annotations
 
 import os
-import sys
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 import Draft
 from inside import (
-    FOLDER,
     VAULT,
     App,
     Gui,
-    addon,
     assembly,
     button_texts,
+    close,
     close_all,
     pane,
     part,
+    picture,
+    preview,
+    ready,
+    registering,
+    row_of,
     run,
     settled,
     tell,
@@ -33,12 +34,9 @@ from silo.workbench.register.dialog import BUTTON, NO_PART
 
 
 def story() -> None:
-    one = addon()
-    one.preferences.set("AskComment", False)
-    one.preferences.set("AskRegister", False)
-    wait(lambda: one.session.shown.connection == "online")
+    one = ready()
     top = build()
-    declare(one, top)
+    declare(top)
     close_all()
     moved_part(one)
 
@@ -63,14 +61,6 @@ def build() -> Any:
     return doc
 
 
-def dialog_of(one: Any, doc: Any) -> Any:
-    App.setActiveDocument(doc.Name)
-    Gui.runCommand("Silo_RegisterParts")
-    dialog = wait(lambda: next(iter(one.registrations._open.values()), None))
-    wait(lambda: dialog.rows)
-    return dialog
-
-
 def press(dialog: Any, section: str) -> Any:
     number = next(number for number, row in enumerate(dialog.rows) if row.section == section)
     dialog.table.cellWidget(dialog._places[number], BUTTON).click()
@@ -81,41 +71,38 @@ def texts(table: Any) -> list[str]:
     return [table.item(row, 0).text() for row in range(table.rowCount())]
 
 
-def declare(one: Any, doc: Any) -> None:
-    dialog = dialog_of(one, doc)
+def declare(doc: Any) -> None:
+    dialog = registering(doc)
     dialog.resize(1100, 520)
     tell(
         offered=texts(dialog.table),
         checked=[row.component() for row in dialog.rows if row.checked],
     )
-    photograph(dialog, "declare")
+    picture(dialog, "declare")
     dialog.register_button.click()
     wait(lambda: sum(row.finished for row in dialog.rows) >= 3 and settled())
     motors = press(dialog, "modelled")
     wait(lambda: motors.finished and settled())
     tell(number=motors.result.part_number, ids=[doc.getObject(n).SiloItemId for n in ("Motor", "Motor001")])
-    dialog.close()
-    wait(lambda: not one.registrations._open)
+    close(dialog)
     tell(modified=bool(Gui.getDocument(doc.Name).Modified))
-    again = dialog_of(one, doc)
+    again = registering(doc)
     tell(again=texts(again.table))
-    photograph(again, "declared")
+    picture(again, "declared")
     taken = press(again, "declared")
     wait(lambda: not taken.candidate.decided and settled())
-    jig = next(row for row in again.rows if row.component() == "Jig")
+    jig = row_of(again, "Jig")
     again.table.cellWidget(again._places[again.rows.index(jig)], NO_PART).click()
     wait(lambda: jig.section == "no part" and settled())
     tell(excluded=doc.getObject("Jig").SiloBomExclude, remark=jig.note()[0])
-    again.close()
-    wait(lambda: not one.registrations._open)
-    third = dialog_of(one, doc)
+    close(again)
+    third = registering(doc)
     tell(third=texts(third.table))
-    photograph(third, "no-part")
+    picture(third, "no-part")
     back = press(third, "no part")
     wait(lambda: back.section == "modelled" and settled())
     tell(asked_again="SiloBomExclude" not in doc.getObject("Jig").PropertiesList)
-    third.close()
-    wait(lambda: not one.registrations._open)
+    close(third)
     motor = doc.getObject("Motor")
     tell(left="SiloItemId" in motor.PropertiesList and bool(motor.SiloItemId), meta=sorted(doc.Meta))
 
@@ -125,10 +112,8 @@ def moved_part(one: Any) -> None:
     os.replace(VAULT / "Bolt.FCStd", VAULT / "moved" / "Bolt.FCStd")
     from_the_pane(one)
     top = App.openDocument(str(VAULT / "Top.FCStd"))
-    Gui.runCommand("Silo_BOM")
-    window = wait(lambda: next(iter(one.previews._open.values()), None))
-    wait(lambda: window._preview is not None)
-    photograph(window, "broken")
+    window = preview(top)
+    picture(window, "broken")
     tell(can_mend=window.relink_button.isVisibleTo(window), tip=window.relink_button.toolTip())
     before = window._preview
     window.relink_button.click()
@@ -150,7 +135,7 @@ def moved_part(one: Any) -> None:
     top.recompute()
     window.verify_button.click()
     tell(differs=window._view_text.text(), selection=[obj.Name for obj in Gui.Selection.getSelection()])
-    photograph(window, "differs")
+    picture(window, "differs")
     window.close()
 
 
@@ -164,25 +149,18 @@ def from_the_pane(one: Any) -> None:
     wait(settled)
     one.dock.show_and_raise()
     wait(lambda: "Sync without it" in button_texts(one.dock))
-    photograph(one.dock, "blocked")
+    picture(one.dock, "blocked")
     tell(waits=pane()[0])
     press_button(one.dock, "Sync without it")
     wait(lambda: settled() and "Incomplete" in pane()[0])
     tell(without=pane()[0])
     press_button(one.dock, "Relink…")
-    window = wait(lambda: next(iter(one.previews._open.values()), None))
+    window = preview()
     wait(lambda: top.getObject("First").LinkedObject is not None)
     wait(lambda: window._preview is not None and settled())
     tell(relinked=os.path.relpath(top.getObject("First").LinkedObject.Document.FileName, VAULT))
-    window.close()
-    wait(lambda: not one.previews._open)
+    close(window)
     close_all()  # the link is mended in this session only
-
-
-def photograph(widget: Any, name: str) -> None:
-    App.Console.PrintMessage(f"{name}\n")
-    Gui.updateGui()
-    widget.grab().save(str(FOLDER / f"{name}.png"))
 
 
 run(story)

@@ -1,30 +1,29 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Inside FreeCAD: a recompute marks all 42 files of a project; which does a commit take?"""
+"""Inside FreeCAD: a recompute marks all files of a project; which does a commit take?"""
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
     VAULT,
     App,
     Gui,
     QtCore,
+    QtGui,
     QtWidgets,
-    addon,
     assembly,
     boxes,
     close_all,
+    committed,
     dialog,
     labels,
     modified,
     part,
+    ready,
     register,
+    registering,
     run,
     settled,
     tell,
@@ -32,19 +31,17 @@ from inside import (
     wait,
 )
 
-PARTS = 41
+PARTS = 11
 
 
 def story() -> None:
-    one = addon()
-    one.preferences.set("AskRegister", False)
-    wait(lambda: one.session.shown.connection == "online")
+    one = ready(comments=True)
     of_each_kind()
     project(one)
 
 
 def project(one: Any) -> None:
-    """41 parts in an assembly, opened as people do it; everything is recomputed, one part is edited."""
+    """Parts in an assembly, opened as people do it; everything is recomputed, one part is edited."""
     made = [part(f"Part{number}") for number in range(PARTS)]
     top = assembly("Top", *((f"L{n}", box, 0) for n, box in enumerate(made))).Document
     register(top)
@@ -70,35 +67,28 @@ def project(one: Any) -> None:
     App.setActiveDocument(doc.Name)
     with dialog("SiloCommitDialog", look):
         Gui.runCommand("Origin_Commit")
-    wait(lambda: boxes("BOM Updated") or boxes("Committed"))
-    wait(settled)
+    wait(lambda: committed() and settled())
     tell(
         left=sum(map(modified, App.listDocuments().values())), edited_left=modified(App.getDocument("Part7"))
     )
-    unregistered(one)
+    unregistered()
 
 
 def press_keys(window: Any) -> None:
     """Ctrl+Return, from the comment."""
     for kind in (QtCore.QEvent.Type.ShortcutOverride, QtCore.QEvent.Type.KeyPress):
-        event = KeyEvent(kind, QtCore.Qt.Key.Key_Return, QtCore.Qt.KeyboardModifier.ControlModifier)
+        event = QtGui.QKeyEvent(kind, QtCore.Qt.Key.Key_Return, QtCore.Qt.KeyboardModifier.ControlModifier)
         QtWidgets.QApplication.sendEvent(window.comment, event)
     if window.isVisible():
         # No window manager gives it the focus here, so Qt does not look for a shortcut.
         window.shortcuts[0].activated.emit()
 
 
-def KeyEvent(*arguments: Any) -> Any:
-    from inside import QtGui
-
-    return QtGui.QKeyEvent(*arguments)
-
-
 def checked(window: Any) -> list[str]:
     return [row.label for row in window.chosen()]
 
 
-def unregistered(one: Any) -> None:
+def unregistered() -> None:
     """A commit of an assembly without a number: its comment goes along with its registration."""
     close_all()
     doc = assembly("New", ("P", part("FreshPlate"), 0)).Document
@@ -112,8 +102,7 @@ def unregistered(one: Any) -> None:
 
     with dialog("SiloCommitDialog", look):
         Gui.runCommand("Origin_Commit")
-    found = wait(lambda: next(iter(one.registrations._open.values()), None))
-    wait(lambda: found.rows)
+    found = registering()
     found.register_button.click()
     wait(lambda: all(row.finished for row in found.rows) and settled())
     numbers = {row.component(): row.result.part_number for row in found.rows}

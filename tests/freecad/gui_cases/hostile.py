@@ -3,14 +3,11 @@
 
 from __future__ import annotations
 
-import os
 import re
-import sys
 from collections.abc import Iterator
 from typing import Any
 
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
-
+import inside
 from inside import (
     FOLDER,
     VAULT,
@@ -18,11 +15,11 @@ from inside import (
     Gui,
     QtCore,
     QtWidgets,
-    addon,
     boxes,
     dialog,
     labels,
     press,
+    ready,
     run,
     settled,
     tell,
@@ -117,8 +114,7 @@ def preview(one: Any) -> None:
     press(one.dock, "Show")
     tell(shown=[obj.Name for obj in Gui.Selection.getSelection()])
     press(one.dock, "Show all…")
-    window = wait(lambda: next(iter(one.previews._open.values()), None))
-    wait(lambda: window._preview is not None)
+    window = inside.preview()
     tell(preview=look(window, "preview"))
     window.table.setCurrentItem(window.table.topLevelItem(0))
     window.show_button.click()
@@ -132,17 +128,13 @@ def preview(one: Any) -> None:
 
 
 def register(one: Any) -> None:
-    Gui.runCommand("Silo_RegisterParts")
-    window = wait(lambda: next(iter(one.registrations._open.values()), None))
-    wait(lambda: window.rows)
+    window = inside.registering(App.ActiveDocument)
     tell(register=look(window, "register"))
     window.close()
 
 
 def story() -> None:
-    one = addon()
-    one.preferences.set("AskRegister", False)
-    wait(lambda: one.session.shown.connection == "online")
+    one = ready(comments=True)
     doc = App.openDocument(str(VAULT / "Top.FCStd"))
     App.setActiveDocument(doc.Name)
     # It is loaded in part only, so FreeCAD will not save it.

@@ -290,6 +290,64 @@ def register(*documents: Any) -> dict[str, str]:
     return numbers
 
 
+def ready(*, comments: bool = False) -> Any:
+    """The add-on, once it is connected.
+
+    comments
+        a commit asks for one; without, none of its dialogs come up unless there is something to decide.
+    """
+    one = addon()
+    one.preferences.set("AskRegister", False)
+    one.preferences.set("AskComment", comments)
+    wait(lambda: one.session.shown.connection == "online")
+    return one
+
+
+def commit(doc: Any) -> None:
+    """Commit a document by the command, until its box is there."""
+    seen = len(committed())
+    App.setActiveDocument(doc.Name)
+    Gui.runCommand("Origin_Commit")
+    wait(lambda: len(committed()) > seen and settled())
+
+
+def committed() -> list[str]:
+    """The boxes of our commits."""
+    return [*boxes("Committed"), *boxes("BOM Updated")]
+
+
+def preview(doc: Any = None) -> Any:
+    """The window of *Compare BOM with Silo* for a document, or that which is open, with its answer."""
+    found = _window("Silo_BOM", doc, addon().previews)
+    wait(lambda: found._preview is not None)
+    return found
+
+
+def registering(doc: Any = None) -> Any:
+    """The dialog *Register Parts* for a document, or that which came up by itself, with its rows."""
+    found = _window("Silo_RegisterParts", doc, addon().registrations)
+    wait(lambda: found.rows)
+    return found
+
+
+def _window(command: str, doc: Any, flow: Any) -> Any:
+    if doc is not None:
+        App.setActiveDocument(doc.Name)
+        Gui.runCommand(command)
+    return wait(lambda: next(iter(flow._open.values()), None))
+
+
+def row_of(dialog: Any, component: str) -> Any:
+    """The row of a component in *Register Parts*."""
+    return next(row for row in dialog.rows if row.component() == component)
+
+
+def close(window: Any) -> None:
+    """Close the window of a preview or of a registration."""
+    window.close()
+    wait(lambda: not addon().previews._open and not addon().registrations._open)
+
+
 def close_all() -> None:
     """Close all documents."""
     for name in list(App.listDocuments()):

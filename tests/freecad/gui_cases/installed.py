@@ -3,26 +3,17 @@
 
 from __future__ import annotations
 
-import os
-import sys
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
-
-from inside import App, Gui, addon, boxes, part, register, run, settled, tell, wait
+from inside import commit, committed, part, ready, register, run, tell
 
 
 def story() -> None:
     import silo
 
-    one = addon()
-    one.preferences.set("AskComment", False)
-    wait(lambda: one.session.shown.connection == "online")
-    doc = part(os.environ["SILO_PART"]).Document
+    ready()
+    doc = part("Lever").Document
     register(doc)
-    App.setActiveDocument(doc.Name)
-    Gui.runCommand("Origin_Commit")
-    wait(lambda: boxes("Committed: ") and settled())
-    tell(**{"from": silo.__path__[0]}, committed=boxes("Committed: "))
+    commit(doc)
+    tell(**{"from": silo.__path__[0]}, committed=committed())
 
 
 run(story)

@@ -3,13 +3,9 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from itertools import pairwise
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 import FreeCAD as App
 import FreeCADGui as Gui

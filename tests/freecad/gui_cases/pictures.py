@@ -7,13 +7,10 @@ import faulthandler
 import os
 import shutil
 import stat
-import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
     FOLDER,
@@ -22,11 +19,14 @@ from inside import (
     QtCore,
     QtGui,
     QtWidgets,
-    addon,
     ask,
     boxes,
+    close,
     dialog,
     in_property_editor,
+    preview,
+    ready,
+    registering,
     run,
     settled,
     unmark,
@@ -42,17 +42,15 @@ PANE_WIDTH = 400
 def story() -> None:
     # A long afternoon, on a busy machine; whoever started it ends what does not end.
     faulthandler.cancel_dump_traceback_later()
-    one = addon()
-    one.preferences.set("AskRegister", False)
-    wait(lambda: one.session.shown.connection == "online")
+    one = ready(comments=True)
     top = open_machine()
     arrange(one)
     if os.environ.get("SILO_TOUR"):
         tour(one, top)
         return
     new_parts(top)
-    preview(one, top)
-    registering(one, top)
+    photograph_and_close(preview(top), "preview")
+    photograph_and_close(registering_with_edits(top), "register")
     commit(one, top)
     project(one)
     offline(one, top)
@@ -259,14 +257,9 @@ def tour(one: Any, top: Any) -> None:
 # --- what is photographed --------------------------------------------------------------------------------
 
 
-def preview(one: Any, top: Any) -> None:
-    App.setActiveDocument(top.Name)
-    Gui.runCommand("Silo_BOM")
-    window = wait(lambda: next(iter(one.previews._open.values()), None))
-    wait(lambda: window._preview is not None)
-    photograph(window, "preview")
-    window.close()
-    wait(lambda: not one.previews._open)
+def photograph_and_close(window: Any, name: str) -> None:
+    photograph(window, name)
+    close(window)
 
 
 def commit(one: Any, top: Any) -> None:
@@ -292,16 +285,10 @@ def commit(one: Any, top: Any) -> None:
     Gui.Selection.clearSelection()
 
 
-def registering(one: Any, top: Any) -> None:
+def registering_with_edits(top: Any) -> Any:
     App.getDocument("ParallelKey").getObject("Body").Length = 8
     mark(App.getDocument("ParallelKey"))
-    App.setActiveDocument(top.Name)
-    Gui.runCommand("Silo_RegisterParts")
-    window = wait(lambda: next(iter(one.registrations._open.values()), None))
-    wait(lambda: window.rows)
-    photograph(window, "register")
-    window.close()
-    wait(lambda: not one.registrations._open)
+    return registering(top)
 
 
 def project(one: Any) -> None:

@@ -3,16 +3,11 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
     App,
     Gui,
-    addon,
     ask,
     assembly,
     boxes,
@@ -21,6 +16,7 @@ from inside import (
     link,
     part,
     press,
+    ready,
     register,
     run,
     settled,
@@ -111,9 +107,7 @@ def press_soon(window: Any, text: str) -> None:
 
 
 def story() -> None:
-    one = addon()
-    one.preferences.set("AskComment", False)
-    one.preferences.set("AskRegister", False)
+    one = ready()
     one.dock.show_and_raise()
     bolt = part("Bolt")
     top = assembly("Top", ("B1", bolt, 0))
@@ -123,7 +117,6 @@ def story() -> None:
     numbers = register(*(obj.Document for obj in (bolt, top, gearbox, frame, other)))
     tell(numbers=numbers)
     ask("break")
-    wait(lambda: one.session.shown.connection == "online")
     refused(one, gearbox, other)
     discarded(one, frame)
     read_only(one, other, bolt)

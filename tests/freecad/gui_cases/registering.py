@@ -3,27 +3,26 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import stat
-import sys
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
     VAULT,
     App,
     Gui,
     QtCore,
-    addon,
     ask,
     assembly,
     boxes,
+    close,
     close_all,
     labels,
     link,
     part,
+    ready,
+    registering,
+    row_of,
     run,
     settled,
     tell,
@@ -35,9 +34,8 @@ from silo.workbench.register.dialog import BUTTON, COMPONENT, NAME, NUMBER
 
 
 def story() -> None:
-    one = addon()
-    one.preferences.set("AskComment", False)
-    wait(lambda: one.session.shown.connection == "online")
+    one = ready()
+    one.preferences.set("AskRegister", True)
     parts = {name: part(name) for name in ("Bracket", "MotorMount", "Fixed", "Twin", "Construction")}
     two = two_parts()
     (VAULT / "Fixed.FCStd").chmod(stat.S_IRUSR)
@@ -54,22 +52,19 @@ def story() -> None:
     # An edit that is not saved yet goes along.
     parts["Bracket"].Length = 33
 
-    App.setActiveDocument(top.Name)
-    Gui.runCommand("Silo_RegisterParts")
-    dialog = wait(lambda: next(iter(one.registrations._open.values()), None))
-    wait(lambda: dialog.rows)
+    dialog = registering(top)
     tell(
         offered={
             row.component(): [row.name, row.item_type, row.category, row.checked, row.note()[0]]
             for row in dialog.rows
         }
     )
-    for row in range(len(dialog.rows)):
-        if dialog.rows[row].guesses:
+    for number, row in enumerate(dialog.rows):
+        if row.guesses:
             # A guess is registered where a person says so.
-            dialog.table.item(row, COMPONENT).setCheckState(QtCore.Qt.CheckState.Checked)
-    uncheck(dialog, "Construction.FCStd")
-    rename(dialog, "MotorMount.FCStd", "Motor mount")
+            dialog.table.item(number, COMPONENT).setCheckState(QtCore.Qt.CheckState.Checked)
+    cell(dialog, "Construction.FCStd", COMPONENT).setCheckState(QtCore.Qt.CheckState.Unchecked)
+    cell(dialog, "MotorMount.FCStd", NAME).setText("Motor mount")
     dialog.register_button.click()
     wait(lambda: done(dialog) >= 6 and settled())
     wait(lambda: boxes("BOM Updated: ") and settled())
@@ -84,13 +79,11 @@ def story() -> None:
 
     # The next commit asks again, for those that were skipped.
     one.commits.start(App.ActiveDocument)
-    again = wait(lambda: next(iter(one.registrations._open.values()), None))
-    wait(lambda: again.rows)
+    again = registering()
     tell(asked_again=[row.component() for row in again.rows])
-    again.close()
-    wait(lambda: not one.registrations._open)
+    close(again)
     same_part(one)
-    partly_loaded(one)
+    partly_loaded()
 
 
 def same_part(one: Any) -> None:
@@ -108,22 +101,13 @@ def same_part(one: Any) -> None:
     frame.recompute()
     # FreeCAD 0.20's save command would ask about the files that the links have touched.
     frame.save()
-
-    def rows() -> Any:
-        App.setActiveDocument(frame.Name)
-        Gui.runCommand("Silo_RegisterParts")
-        found = wait(lambda: next(iter(one.registrations._open.values()), None))
-        wait(lambda: found.rows)
-        return found
-
-    dialog = rows()
-    for number in (row_of(dialog, "Extra.FCStd"), row_of(dialog, "Frame.FCStd")):
-        dialog.table.cellWidget(number, BUTTON).click()
-        wait(lambda row=dialog.rows[number]: row.finished and settled())
+    dialog = registering(frame)
+    for row in (row_of(dialog, "Extra.FCStd"), row_of(dialog, "Frame.FCStd")):
+        dialog.table.cellWidget(dialog.rows.index(row), BUTTON).click()
+        wait(lambda row=row: row.finished and settled())
     asked = {row.component(): row.number for row in dialog.rows if row.candidate.same_as}
     selected_before = dialog.register_button.isEnabled()
-    item = dialog.table.item(row_of(dialog, "Bracket.FCStd"), NUMBER)
-    item.setData(QtCore.Qt.ItemDataRole.UserRole, "same")
+    cell(dialog, "Bracket.FCStd", NUMBER).setData(QtCore.Qt.ItemDataRole.UserRole, "same")
     answered = {row.component(): row.number for row in dialog.rows if row.candidate.same_as}
     dialog.register_button.click()
     wait(settled)
@@ -134,18 +118,16 @@ def same_part(one: Any) -> None:
         notes=[row.note()[0] for row in dialog.rows if row.candidate.same_as],
         button=dialog.skip_button.text(),
     )
-    dialog.close()
-    wait(lambda: not one.registrations._open)
+    close(dialog)
     App.setActiveDocument(frame.Name)
     Gui.runCommand("Silo_RegisterParts")
     empty = wait(lambda: next(iter(one.registrations._open.values()), None))
     wait(lambda: "have their Silo part number" in " ".join(labels(empty)))
     tell(left_to_ask=[row.component() for row in empty.rows])
-    empty.close()
-    wait(lambda: not one.registrations._open)
+    close(empty)
 
 
-def partly_loaded(one: Any) -> None:
+def partly_loaded() -> None:
     """FreeCAD loads of these two files only what is linked; one of them has an edit that it cannot save."""
     close_all()
     boxes_of = {name: part(name) for name in ("Half", "Quiet")}
@@ -159,16 +141,13 @@ def partly_loaded(one: Any) -> None:
     App.openDocument(top)
     App.getDocument("Half").getObject("Box").Length = 44
     partial = [bool(App.getDocument(name).Partial) for name in boxes_of]
-    App.setActiveDocument("Whole")
-    Gui.runCommand("Silo_RegisterParts")
-    dialog = wait(lambda: next(iter(one.registrations._open.values()), None))
-    wait(lambda: dialog.rows)
-    tell(partial=partial, half=[(row := dialog.rows[row_of(dialog, "Half.FCStd")]).checked, row.note()[0]])
+    dialog = registering(App.getDocument("Whole"))
+    tell(partial=partial, half=[(row := row_of(dialog, "Half.FCStd")).checked, row.note()[0]])
     quiet = row_of(dialog, "Quiet.FCStd")
-    dialog.table.cellWidget(quiet, BUTTON).click()
-    wait(lambda: (dialog.rows[quiet].result is not None) and settled())
+    dialog.table.cellWidget(dialog.rows.index(quiet), BUTTON).click()
+    wait(lambda: quiet.result is not None and settled())
     tell(
-        quiet=dialog.rows[quiet].note()[0],
+        quiet=quiet.note()[0],
         objects=sorted(obj.Name for obj in App.getDocument("Quiet").Objects if obj.Name in ("Box", "Unused")),
         half_edit=float(App.getDocument("Half").getObject("Box").Length),
     )
@@ -186,17 +165,8 @@ def two_parts() -> Any:
     return doc
 
 
-def row_of(dialog: Any, component: str) -> int:
-    return next(i for i, row in enumerate(dialog.rows) if row.component() == component)
-
-
-def uncheck(dialog: Any, component: str) -> None:
-    item = dialog.table.item(row_of(dialog, component), COMPONENT)
-    item.setCheckState(QtCore.Qt.CheckState.Unchecked)
-
-
-def rename(dialog: Any, component: str, name: str) -> None:
-    dialog.table.item(row_of(dialog, component), NAME).setText(name)
+def cell(dialog: Any, component: str, column: int) -> Any:
+    return dialog.table.item(dialog.rows.index(row_of(dialog, component)), column)
 
 
 def done(dialog: Any) -> int:

@@ -4,10 +4,7 @@
 from __future__ import annotations
 
 import os
-import sys
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
     App,
@@ -16,12 +13,13 @@ from inside import (
     addon,
     ask,
     assembly,
-    boxes,
     button_texts,
+    commit,
     link,
     part,
     picture,
     press,
+    ready,
     register,
     run,
     settled,
@@ -31,10 +29,9 @@ from inside import (
 )
 
 
-def commit() -> None:
-    seen = len(boxes("Committed")) + len(boxes("BOM Updated"))
-    Gui.runCommand("Origin_Commit")
-    wait(lambda: len(boxes("Committed")) + len(boxes("BOM Updated")) > seen and settled())
+def draw(doc: Any) -> None:
+    """Commit, and wait for the models."""
+    commit(doc)
     wait(lambda: addon().session._models.idle, 240)
     tell(drawn=ask("drawn"))
 
@@ -55,8 +52,7 @@ def view(name: str) -> None:
 
 
 def story() -> None:
-    wait(lambda: addon().session.shown.connection == "online")
-    addon().preferences.set("AskComment", False)
+    one = ready()
     plate, bolt, knob = part("Plate"), part("Bolt"), part("Knob")
     plate.Length, plate.Width, plate.Height = 100, 60, 5
     bolt.Height = 30
@@ -77,23 +73,20 @@ def story() -> None:
     App.setActiveDocument(doc.Name)
     Gui.ActiveDocument.ActiveView.viewIsometric()
     Gui.SendMsgToActiveView("ViewFit")
-    commit()
+    draw(doc)
     doc.getObject("Bolt").Placement.Base = App.Vector(60, 10, -10)
     doc.removeObject("Gone")
     link(top, "New", knob).Placement.Base = App.Vector(85, 45, 5)
     doc.recompute()
-    commit()
+    draw(doc)
     tell(numbers=numbers, modified_before=modified_now())
     import pivy.coin  # noqa: F401 - wraps the scene graph
 
-    graph = Gui.ActiveDocument.ActiveView.getSceneGraph()
-    bare[0] = [
-        graph.getChild(n).getTypeId().getName().getString() for n in range(graph.getNumChildren())
-    ].count("Separator")
+    bare[0] = nodes()
     lights(doc)
     compares()
     tell(modified=modified_now())
-    held(doc)
+    held(one, doc)
 
 
 def modified_now() -> list[str]:
@@ -128,11 +121,10 @@ def compares() -> None:
     window.close()
 
 
-def held(doc: Any) -> None:
+def held(one: Any, doc: Any) -> None:
     """*Compare with revision 3* of a commit that waits, since a colleague was quicker; pressed twice."""
     from silo.workbench.commit.plan import plan
 
-    one = addon()
     ask("colleague")
     one.commits.run(plan(doc, one.desk.documents).rows, "mine")
     wait(lambda: [entry for entry in one.session.shown.waiting if entry.newer] and settled())

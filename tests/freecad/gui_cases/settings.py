@@ -4,11 +4,8 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import FOLDER, Gui, QtCore, QtWidgets, addon, run, tell, wait
 

@@ -3,22 +3,18 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from typing import Any
-
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
     FOLDER,
     App,
     Gui,
     QtWidgets,
-    addon,
     ask,
     assembly,
     boxes,
     button_texts,
+    close,
     dialog,
     labels,
     link,
@@ -26,12 +22,14 @@ from inside import (
     pane,
     part,
     press,
+    ready,
     register,
     run,
     settled,
     tell,
     wait,
 )
+from inside import preview as preview_of
 from themes import in_themes
 
 
@@ -61,14 +59,11 @@ def make() -> dict[str, Any]:
 
 
 def story() -> None:
-    one = addon()
-    one.preferences.set("AskRegister", False)
+    one = ready(comments=True)
     made = make()
     docs = {name: obj.Document for name, obj in made.items()}
     numbers = register(*(docs[name] for name in ("plate", "bolt", "gearbox", "top")))
     tell(numbers=numbers)
-    wait(lambda: one.session.shown.connection == "online")
-
     # 1. Everything is dirty: sub-assembly and part below the top.
     made["gearbox"].Document.getObject("Bolts").ElementCount = 8
     made["plate"].Length = 50
@@ -95,6 +90,7 @@ def story() -> None:
     one.dock.show_and_raise()
     wait(lambda: any("BOM Updated" in text for text in labels(one.dock)))
     tell(dock=labels(one.dock))
+    pages(one)
 
     # 4. Somebody else merges: the pane hears of it.
     tell(other=ask("other merge"))
@@ -122,6 +118,19 @@ def story() -> None:
     preview(one, docs["top"])
 
 
+def pages(one: Any) -> None:
+    """Without a browser the address is on the clipboard; another server's page is not opened at all."""
+    from silo.workbench.gui import qt
+
+    asked: list[str] = []
+    qt.open_url = asked.append
+    for url in ("https://example.org/items/A01-0001/bom", "javascript:alert(1)//", "file:///etc/passwd"):
+        one.buttons.open_page(url)
+    tell(elsewhere=asked[:])
+    press(one.dock, "View in Silo →")
+    tell(opened=asked[-1], copied=QtWidgets.QApplication.clipboard().text())
+
+
 def _is_synced(diff: Any) -> bool:
     return not diff.added and not diff.quantity_changed
 
@@ -129,10 +138,7 @@ def _is_synced(diff: Any) -> bool:
 def preview(one: Any, top: Any) -> None:
     """6. The preview: what differs, then Sync."""
     top.getObject("Gearbox2").ElementCount = 3
-    App.setActiveDocument(top.Name)
-    Gui.runCommand("Silo_BOM")
-    window = wait(lambda: next(iter(one.previews._open.values()), None))
-    wait(lambda: window._preview is not None)
+    window = preview_of(top)
     window.table.setColumnWidth(1, 460)  # little is left for what a sync does
     window.resize(1, 480)  # as narrow as its buttons let it be
     for _ in range(20):
@@ -147,8 +153,7 @@ def preview(one: Any, top: Any) -> None:
     window.table.setCurrentItem(item)
     window.show_button.click()
     tell(selected=[obj.Name for obj in Gui.Selection.getSelection(top.Name)])
-    window.close()
-    wait(lambda: not one.previews._open)
+    close(window)
     # 7. Light and dark.
     in_themes(one)
 

@@ -126,7 +126,7 @@ class Window:
         log = self.folder / "freecad.log"
         with log.open("wb") as output, _display(self.pixels) as display, self._answering():
             process = subprocess.Popen(
-                [self.freecad.sibling("freecad"), str(SCRIPTS / script)],
+                [self.freecad.sibling("freecad"), "-P", str(SCRIPTS), str(SCRIPTS / script)],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
