@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from freecad_cases import machines
-from freecad_cases.machines import MOSTLY_ENDS, REPOSITORY
+from freecad_cases.machines import MOSTLY_ENDS, MOSTLY_NEWEST, REPOSITORY
 from gui_cases.window import Window, window
 
 VERSIONS = MOSTLY_ENDS
@@ -84,7 +84,7 @@ def test_the_same_part_is_counted_at_a_press_in_the_pane(corners: dict[str, Any]
     assert "identity" not in corners["same_again"]
 
 
-@pytest.mark.parametrize("version", MOSTLY_ENDS)
+@pytest.mark.parametrize("version", MOSTLY_NEWEST)
 def test_a_forks_commit_is_hooked_and_not_replaced(version: str, tmp_path: Path) -> None:
     """By its QAction, by the save, by its origin; the BOM follows once each time."""
     with window(version, tmp_path) as freecad:

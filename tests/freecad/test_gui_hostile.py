@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
-from freecad_cases.machines import ENDS
+from freecad_cases.machines import NEWEST
 from gui_cases import hostile_vault
 from gui_cases.window import Window
 
-VERSIONS = ENDS
+VERSIONS = NEWEST
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 

@@ -27,14 +27,19 @@ def page(path: str) -> str:
     return f"https://silo.example.com{path}"
 
 
+def send(vault: Vault, snapshot: Any, **more: Any) -> None:
+    """Commit this, and send it."""
+    vault.commit(snapshot, **more)
+    vault.send()
+
+
 def box(vault: Vault) -> PaneEntry:
     return of_sent(vault.told[-1], page, now=0.0)
 
 
 def test_a_merge_is_the_box_of_the_spec(vault: Vault) -> None:
     """Counts, the link to the server's page, and what has no number."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 12), vault.part("Cover", identity="no-item")))
-    vault.send()
+    send(vault, vault.snapshot(vault.part("Bolt", 12), vault.part("Cover", identity="no-item")))
     assert entry_text(box(vault)).splitlines() == [
         f"BOM Updated: {vault.number} Top",
         "+1 added",
@@ -51,8 +56,7 @@ def test_a_merge_is_the_box_of_the_spec(vault: Vault) -> None:
 
 def test_a_commit_of_a_released_product_says_which_draft_it_is_part_of(vault: Vault) -> None:
     """The released revision stays as it is; before the first release nothing is said."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 12)))
-    vault.send()
+    send(vault, vault.snapshot(vault.part("Bolt", 12)))
     sent = vault.told[-1]
     assert sent.result is not None
     assert "draft" not in entry_text(of_sent(sent, page, now=0.0))
@@ -67,8 +71,7 @@ def test_a_commit_of_a_released_product_says_which_draft_it_is_part_of(vault: Va
 
 def test_a_commit_says_what_is_open_in_its_product(vault: Vault) -> None:
     """In the sub-assemblies, as the server keeps it; what is open in its own BOM is said already."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 12)))
-    vault.send()
+    send(vault, vault.snapshot(vault.part("Bolt", 12)))
     assert "Open in" not in entry_text(box(vault)), "this Silo keeps no summaries"
     kept = ProductSummary(
         part_number=vault.number,
@@ -116,15 +119,13 @@ def test_pane_and_command_line_count_in_the_same_words(lists: dict[str, Any]) ->
 def test_a_missing_component_has_two_ways_out(vault: Vault) -> None:
     """On the first BOM too: mend the link, or sync without it. Where none is missing, neither is offered."""
     gone = replace(vault.part("Bolt", 2), missing=True)
-    vault.commit(vault.snapshot(gone, broken=True))
-    vault.send()
+    send(vault, vault.snapshot(gone, broken=True))
     (line,) = (line for line in box(vault).lines if "waits until" in line.text)
     assert [(action.do, action.text, action.document) for action in line.actions] == [
         (Do.MEND, "Relink…", str(vault.top)),
         (Do.SYNC_WITHOUT, "Sync without it", str(vault.top)),
     ]
-    vault.commit(vault.snapshot(broken=True), content=b"other")
-    vault.send()
+    send(vault, vault.snapshot(broken=True), content=b"other")
     assert not [line.actions for line in box(vault).lines if "waits until" in line.text and line.actions]
 
 
@@ -138,8 +139,7 @@ def test_however_much_is_broken_registering_stays_within_reach(vault: Vault) -> 
         )
         for n in range(1000)
     )
-    vault.commit(replace(snapshot, extraction=replace(snapshot.extraction, findings=lost)))
-    vault.send()
+    send(vault, replace(snapshot, extraction=replace(snapshot.extraction, findings=lost)))
     made = box(vault)
     offered = [a.do for line in made.lines for a in line.actions if a.do is not Do.SHOW]
     assert offered == [Do.PREVIEW, Do.REGISTER]
@@ -148,16 +148,14 @@ def test_however_much_is_broken_registering_stays_within_reach(vault: Vault) -> 
 
 def test_a_broken_link_can_be_shown_in_the_model(vault: Vault) -> None:
     """By the objects that the finding names."""
-    vault.commit(vault.snapshot(vault.part("Bolt"), broken=True))
-    vault.send()
+    send(vault, vault.snapshot(vault.part("Bolt"), broken=True))
     (show,) = [a for line in box(vault).lines for a in line.actions]
     assert (show.do, show.document, show.objects) == (Do.SHOW, str(vault.top), ("Link",))
 
 
 def test_a_merge_line_by_line_is_reported(vault: Vault) -> None:
     """A server without the merge route took single calls: not one step, and people know it."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 4)))
-    vault.send()
+    send(vault, vault.snapshot(vault.part("Bolt", 4)))
     (sent,) = vault.told
     assert sent.result is not None
     warning = MergeWarning(type=NOT_ATOMIC, part_number=vault.number, message="written one by one")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,9 +14,19 @@ from silo.bom.model import BomEntry
 from silo.outbox.entry import Commit, Entry, State
 from silo.outbox.store import Store
 from silo.workbench.commit.flow import of_held
-from silo.workbench.pane.activity import Do, can_send, heading, meant_for_another, rows
+from silo.workbench.pane.activity import Do, WaitingRow, can_send, heading, meant_for_another, rows
 
 HERE = "https://silo.example.com"
+
+
+def row_of(entry: Entry, **changes: Any) -> WaitingRow:
+    """The row of an entry of which this is different."""
+    (row,) = rows([replace(entry, **changes)], HERE)
+    return row
+
+
+def asked(row: WaitingRow) -> list[Do]:
+    return [action.do for action in row.actions]
 
 
 @pytest.fixture(name="entry")
@@ -28,7 +39,7 @@ def _entry(tmp_path: Path) -> Entry:
 
 def test_what_simply_waits(entry: Entry) -> None:
     """Which document, what of it, since when."""
-    (row,) = rows([entry], HERE)
+    row = row_of(entry)
     assert (row.title, row.what, row.since, row.reason) == ("Top", "file and BOM", 1001.0, "")
     assert (row.urgent, row.actions) == (False, ())
 
@@ -38,23 +49,23 @@ def test_what_a_person_must_look_at_comes_first(entry: Entry) -> None:
     held = replace(entry, state=State.HELD, reason="413: too large", bom_left=False)
     first, _ = rows([entry, held], HERE)
     assert (first.urgent, first.reason, first.what) == (True, "413: too large", "file")
-    assert [a.do for a in first.actions] == [Do.RETRY, Do.SAVE_COPY, Do.DISCARD]
+    assert asked(first) == [Do.RETRY, Do.SAVE_COPY, Do.DISCARD]
     assert {a.target for a in first.actions} == {str(entry.id)}
 
 
 def test_a_bom_has_no_copy_to_save(entry: Entry) -> None:
     """Its file has arrived."""
-    (row,) = rows([replace(entry, state=State.HELD, file_left=False, reason="no")], HERE)
-    assert [a.do for a in row.actions] == [Do.RETRY, Do.DISCARD]
+    row = row_of(entry, state=State.HELD, file_left=False, reason="no")
+    assert asked(row) == [Do.RETRY, Do.DISCARD]
 
 
 def test_what_is_meant_for_another_address_says_so(entry: Entry) -> None:
     """And can be sent here, by a person's word only."""
     away = replace(entry, server="http://old.example:80/api")
-    (row,) = rows([away], HERE)
+    row = row_of(away)
     assert row.urgent
     assert row.reason == "It is meant for old.example:80, which is not the server in use."
-    assert [a.do for a in row.actions] == [Do.SEND_HERE, Do.SAVE_COPY, Do.DISCARD]
+    assert asked(row) == [Do.SEND_HERE, Do.SAVE_COPY, Do.DISCARD]
     assert meant_for_another([entry, away], HERE) == (away.id,)
 
 
@@ -66,8 +77,8 @@ def test_without_a_server_nothing_is_meant_for_another(entry: Entry) -> None:
 
 def test_what_is_out_of_date_is_not_offered_again(entry: Entry) -> None:
     """A retry would undo something newer."""
-    (row,) = rows([replace(entry, state=State.HELD, superseded=True, reason="x")], HERE)
-    assert [a.do for a in row.actions] == [Do.SAVE_COPY, Do.DISCARD]
+    row = row_of(entry, state=State.HELD, superseded=True, reason="x")
+    assert asked(row) == [Do.SAVE_COPY, Do.DISCARD]
     assert "would undo it" in row.reason
 
 
@@ -75,7 +86,7 @@ def test_a_held_commit_has_the_choices_of_the_dialog(entry: Entry) -> None:
     """Open theirs, take theirs, mine on top; a commit without a path of its own can only go or be dropped."""
     newer = {"revision_number": 2, "created_by": "alice", "comment": "less"}
     held = replace(entry, state=State.HELD, reason="alice committed revision 2", newer=newer)
-    (row,) = rows([held], HERE)
+    row = row_of(held)
     assert [(a.do, a.text) for a in row.actions[:4]] == [
         (Do.OPEN_THEIRS, "Open theirs beside mine"),
         (Do.COMPARE, "Compare with revision 2"),
@@ -83,17 +94,17 @@ def test_a_held_commit_has_the_choices_of_the_dialog(entry: Entry) -> None:
         (Do.RETRY, "Commit mine on top"),
     ]
     assert [a.do for a in row.actions[4:]] == [Do.SAVE_COPY, Do.DISCARD]
-    (row,) = rows([replace(held, path="")], HERE)
-    assert [a.do for a in row.actions] == [Do.RETRY, Do.SAVE_COPY, Do.DISCARD]
-    (row,) = rows([replace(held, server="http://old.example:80")], HERE)
-    assert [a.do for a in row.actions] == [Do.SEND_HERE, Do.SAVE_COPY, Do.DISCARD]
+    row = row_of(held, path="")
+    assert asked(row) == [Do.RETRY, Do.SAVE_COPY, Do.DISCARD]
+    row = row_of(held, server="http://old.example:80")
+    assert asked(row) == [Do.SEND_HERE, Do.SAVE_COPY, Do.DISCARD]
 
 
 def test_the_reason_that_stands_above_is_not_repeated(entry: Entry) -> None:
     """Without a connection each row would give the same one; what can be done about it stays."""
     failed = replace(entry, reason="nothing answers")
     (row,) = rows([failed], HERE, said="nothing answers")
-    assert (row.reason, [a.do for a in row.actions]) == ("", [Do.SAVE_COPY, Do.DISCARD])
+    assert (row.reason, asked(row)) == ("", [Do.SAVE_COPY, Do.DISCARD])
     assert rows([failed], HERE, said="the disk is full")[0].reason == "nothing answers"
 
 
@@ -137,6 +148,6 @@ def test_what_a_server_that_was_set_back_has_lost_goes_with_retry_all(entry: Ent
         held = replace(entry, state=State.HELD, newer=newer)
         assert can_send([held], HERE) is can
         # Nothing of a colleague's could be taken: the server's revision is an older one of this computer.
-        (row,) = rows([held], HERE)
+        row = row_of(held)
         assert (Do.TAKE_THEIRS not in [one.do for one in row.actions]) is can
         assert ("Retry" in [one.text for one in row.actions]) is can

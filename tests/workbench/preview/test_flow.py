@@ -9,7 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
-from desk import Document, Office
+from desk import Document, Office, PreviewWindow
 
 from silo.bom.errors import DocumentError, InputError, UnreachableError
 from silo.bom.findings import Finding, FindingCode, Severity
@@ -43,14 +43,25 @@ def _top(office: Office) -> Document:
     return top
 
 
-def test_compare_sync_and_compare_again(office: Office, flow: PreviewFlow, top: Document) -> None:
-    """What would be added is added; the file is not sent."""
-    flow.start(top)
+def opened(office: Office, flow: PreviewFlow, doc: Document) -> PreviewWindow:
+    """The window of a document, with its comparison."""
+    flow.start(doc)
     office.settle()
     (window,) = office.desk.previews
-    assert [line.part_number for line in window.filled[0].top.diff.added] == ["M01-0002"]
-    window.flow.sync(window.filled[0], False, False)
+    return window
+
+
+def sync(office: Office, window: PreviewWindow) -> None:
+    """Press the button."""
+    window.flow.sync(window.filled[-1], False, False)
     office.settle()
+
+
+def test_compare_sync_and_compare_again(office: Office, flow: PreviewFlow, top: Document) -> None:
+    """What would be added is added; the file is not sent."""
+    window = opened(office, flow, top)
+    assert [line.part_number for line in window.filled[0].top.diff.added] == ["M01-0002"]
+    sync(office, window)
     assert [line.quantity for line in office.silo.get_bom("M01-0001")] == [3]
     assert office.files("Top") == []
     flow.again(top.FileName)
@@ -66,11 +77,8 @@ def test_a_sync_does_not_undo_a_colleagues_newer_file(
     Path(top.FileName).write_bytes(b"three plates")
     office.silo.upload_file(number, top.FileName, "mine")
     office.desk.documents.base(top).origin = sha256(b"three plates").hexdigest()
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.previews
-    window.flow.sync(window.filled[0], False, False)
-    office.settle()
+    window = opened(office, flow, top)
+    sync(office, window)
     theirs = office.folder / "theirs.FCStd"
     theirs.write_bytes(b"without plates")
     office.silo.user = "alice"
@@ -80,8 +88,7 @@ def test_a_sync_does_not_undo_a_colleagues_newer_file(
         top.parts = dict.fromkeys(top.parts, 5)
         flow.again(top.FileName)
         office.settle()
-        window.flow.sync(window.filled[-1], False, False)
-        office.settle()
+        sync(office, window)
         assert [line.quantity for line in office.silo.get_bom(number)] == [3], edited
         assert "alice has committed revision 2 since" in office.sent[-1].entry.remark
 
@@ -92,29 +99,24 @@ def test_bom_and_file_of_a_sync_are_of_one_state(office: Office, flow: PreviewFl
     Path(top.FileName).write_bytes(b"three plates")
     office.silo.upload_file(number, top.FileName, "mine")
     top.changed = False
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.previews
+    window = opened(office, flow, top)
     sub = office.document("Sub")
     for edit in (lambda: top.parts.update(dict.fromkeys(top.parts, 5)), lambda: top.parts.update({sub: 1})):
         edit()
         top.content = b"as edited: %d" % len(top.parts)
         office.desk.documents.save(top)
         before = office.silo.get_bom(number)
-        window.flow.sync(window.filled[-1], False, False)
-        office.settle()
+        sync(office, window)
         assert (office.silo.get_bom(number), office.sent) == (before, [])
         assert "was edited since the comparison" in window.filled[-1].note
         assert "was edited since the comparison" not in window.filled[0].note
     office.silo.upload_file(number, top.FileName, "mine")
-    window.flow.sync(window.filled[-1], False, False)
-    office.settle()
+    sync(office, window)
     assert [line.quantity for line in office.silo.get_bom(number)] == [5, 1]
     assert len(office.sent) == 1
     top.parts[sub] = 2
     window.flow.closed(window.path)
-    window.flow.sync(window.filled[-1], False, False)
-    office.settle()
+    sync(office, window)
     assert (len(office.sent), office.bugs) == (1, [])
 
 
@@ -123,14 +125,11 @@ def test_a_closed_document_is_reported_in_its_window(
 ) -> None:
     """Comparing again, with Silo and with the 3D view, needs it, and so does a sync: its file may be another
     one by now."""
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.previews
+    window = opened(office, flow, top)
     office.desk.open.remove(top)
     window.flow.again(window.path)
     window.flow.verify(window.filled[0])
-    window.flow.sync(window.filled[0], False, False)
-    office.settle()
+    sync(office, window)
     assert [str(error) for error in window.failed] == [
         "Top.FCStd is not open any more. Open it, then compare again."
     ] * 3
@@ -140,9 +139,7 @@ def test_a_closed_document_is_reported_in_its_window(
 def test_one_window_per_document(office: Office, flow: PreviewFlow, top: Document) -> None:
     """It comes to the front; closed, a new one is opened."""
     flow.start(top)
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.previews
+    window = opened(office, flow, top)
     assert window.raised == 1
     window.flow.closed(window.path)
     flow.start(top)
@@ -186,9 +183,7 @@ def test_the_view_is_compared_and_what_no_line_explains_is_selected(
     office: Office, flow: PreviewFlow, top: Document, shown: list[tuple[str, tuple[str, ...]]]
 ) -> None:
     """The first assembly that differs, wherever it lies."""
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.previews
+    window = opened(office, flow, top)
     office.desk.witnessed = [Account(top.FileName, True), Account("/sub", True)]
     window.flow.verify(window.filled[0])
     assert (window.seen, shown) == ([("125 of 125", True)], [])
@@ -204,9 +199,7 @@ def test_broken_links_are_mended_where_one_file_fits(
     office: Office, flow: PreviewFlow, top: Document
 ) -> None:
     """And the comparison is made again; a refusal is shown."""
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.previews
+    window = opened(office, flow, top)
     broken = tuple(
         Finding(FindingCode.MISSING_FILE, Severity.ERROR, "gone", did_you_mean=meant)
         for meant in ("", "/new")
@@ -238,9 +231,7 @@ def test_the_pane_s_button_mends_once(
 def test_a_line_says_why_it_counts_so_many(office: Office, flow: PreviewFlow, top: Document) -> None:
     """By the keys of the line, in the assembly that holds it; also of a line without a part number."""
     top.parts[office.document("Loose", registered=False)] = 2
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.previews
+    window = opened(office, flow, top)
     lines = [row for row in _flat(rows(window.filled[0])) if row.parts]
     assert [Path(row.parts[0][0]).stem for row in lines] == ["Plate", "Loose"]
     flow.why(top.FileName, lines[0].document, lines[0].assembly, [("", str(n)) for n in range(20)])

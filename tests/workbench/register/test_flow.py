@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from desk import Document, Office
+from desk import Document, Office, RegisterWindow
 
 from silo.bom.errors import ReadOnlyError, SiloError
 from silo.registering.items import Journal
@@ -35,9 +35,18 @@ def _top(office: Office) -> Document:
     return top
 
 
-def orders(office: Office) -> list[Order]:
-    offer = office.desk.registers[0].offers[-1]
-    return [Order(c, c.proposal.name, "part", "M01") for c in offer.candidates]
+def opened(office: Office, flow: RegisterFlow, doc: Document) -> RegisterWindow:
+    """The dialog of a document, with its rows."""
+    flow.start(doc)
+    office.settle()
+    (window,) = office.desk.registers
+    return window
+
+
+def register(office: Office, window: RegisterWindow) -> None:
+    """Register all that is offered, as a part each."""
+    window.register([Order(c, c.proposal.name, "part", "M01") for c in window.offers[-1].candidates])
+    office.settle()
 
 
 def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Document) -> None:
@@ -47,12 +56,9 @@ def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Docu
     for key, file in (("asked", plate), ("other", "/v/b")):
         same = Action(Do.SAME, "Same part", "id", objects=(file, "/v/a"))
         office.session.add(PaneEntry(key, "x", 1.0, lines=(EntryLine("2 files", Tone.WARNING, (same,)),)))
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.registers
+    window = opened(office, flow, top)
     assert sorted(c.proposal.name for c in window.offers[0].candidates) == ["Plate", "Shaft"]
-    window.register(orders(office))
-    office.settle()
+    register(office, window)
     assert [result.error for result in window.results] == [None, None]
     assert window.stops == 1
     assert office.files("Plate") == [b"Plate"]
@@ -69,12 +75,9 @@ def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Docu
 
 def test_one_undo_takes_back_what_was_registered(office: Office, flow: RegisterFlow, top: Document) -> None:
     """New items are archived, the files forget them, and the assembly's BOM waits for nobody."""
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.registers
+    window = opened(office, flow, top)
     assert not flow.can_take_back(window.path)
-    window.register(orders(office))
-    office.settle()
+    register(office, window)
     numbers = [result.part_number or "" for result in window.results]
     assert flow.can_take_back(window.path)
     flow.take_back(window.path)
@@ -84,8 +87,7 @@ def test_one_undo_takes_back_what_was_registered(office: Office, flow: RegisterF
     assert not {item.part_number for item in office.silo.search_items("")} & set(numbers)
     assert not flow.can_take_back(window.path)
     assert not flow._journal.item_ids()
-    window.register(orders(office))  # and they can be registered again
-    office.settle()
+    register(office, window)  # and they can be registered again
     assert [result.error for result in window.results] == [None] * 4
     assert len({result.item_id for result in window.results}) == 4
 
@@ -94,17 +96,14 @@ def test_what_waits_of_an_item_that_goes_is_discarded(
     office: Office, flow: RegisterFlow, top: Document
 ) -> None:
     """Its file would be refused for ever."""
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.registers
+    window = opened(office, flow, top)
 
     def refuse(name: str) -> None:
         if name == "upload_file":
             raise ReadOnlyError("maintenance")
 
     office.silo.before = refuse
-    window.register(orders(office))
-    office.settle()
+    register(office, window)
     assert {Path(entry.path).stem for entry in office.session.shown.waiting} >= {"Plate", "Shaft"}
     flow.take_back(window.path)
     office.settle()
@@ -115,11 +114,8 @@ def test_what_cannot_be_taken_back_is_said_and_stays(
     office: Office, flow: RegisterFlow, top: Document
 ) -> None:
     """A file that cannot be written keeps its item."""
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.registers
-    window.register(orders(office))
-    office.settle()
+    window = opened(office, flow, top)
+    register(office, window)
     office.desk.refusal = SiloError("the disk is full")
     flow.take_back(window.path)
     office.settle()
@@ -132,10 +128,7 @@ def test_no_unsaved_edits_are_left(office: Office, flow: RegisterFlow, top: Docu
     """What FreeCAD marks because its parts were saved is saved too, after them; a person's edits are not."""
     edited = office.document("Edited")
     edited.parts.update(top.parts)
-    flow.start(top)
-    office.settle()
-    office.desk.registers[0].register(orders(office))
-    office.settle()
+    register(office, opened(office, flow, top))
     assert not top.changed
     assert office.desk.documents.saved[-1] == "Top"
     assert edited.changed
@@ -146,17 +139,15 @@ def test_a_server_that_refuses_leaves_the_files_alone(
     office: Office, flow: RegisterFlow, top: Document
 ) -> None:
     """And the dialog shows why, row by row."""
-    flow.start(top)
-    office.settle()
+    window = opened(office, flow, top)
 
     def refuse(name: str) -> None:
         if name == "create_item":
             raise ReadOnlyError("maintenance")
 
     office.silo.before = refuse
-    office.desk.registers[0].register(orders(office))
-    office.settle()
-    assert {type(result.error) for result in office.desk.registers[0].results} == {ReadOnlyError}
+    register(office, window)
+    assert {type(result.error) for result in window.results} == {ReadOnlyError}
     assert [doc.identity for doc in top.parts] == ["", ""]
     assert [Path(doc.FileName).read_bytes() for doc in top.parts] == [b"Shaft", b"Plate"]
 
@@ -165,10 +156,8 @@ def test_a_dialog_that_was_closed_meanwhile_is_not_drawn(
     office: Office, flow: RegisterFlow, top: Document
 ) -> None:
     """What it had asked for is done anyway."""
-    flow.start(top)
-    office.settle()
-    (window,) = office.desk.registers
-    window.register(orders(office))
+    window = opened(office, flow, top)
+    window.register([Order(c, c.proposal.name, "part", "M01") for c in window.offers[-1].candidates])
     window.flow.closed(window.path)
     office.settle()
     assert (window.results, window.stops) == ([], 0)

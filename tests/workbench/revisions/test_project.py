@@ -46,6 +46,23 @@ class Place:
         assert not errors
         return views[-1]
 
+    def commit_all(self, flow: ProjectFlow, comment: str) -> None:
+        flow.commit_all(comment)
+        self.office.settle()
+
+    def committed(self) -> ProjectFlow:
+        """That of a FreeCAD which has sent all files."""
+        flow = self.flow()
+        self.look(flow)
+        self.commit_all(flow, "")
+        return flow
+
+    def opened(self, doc: Document) -> Document:
+        """Let FreeCAD have a document open."""
+        for docs in (self.cad.docs, self.office.desk.open):
+            docs.append(doc)
+        return doc
+
     def states(self, flow: ProjectFlow) -> dict[str, str]:
         return {row.place: row.state.name for row in self.look(flow).rows}
 
@@ -91,8 +108,7 @@ def test_commit_all_sends_every_file_that_silo_does_not_have(place: Place) -> No
     flow = place.flow()
     assert place.states(flow) == {"Sheet.FCStd": "NEW", "parts/Plate.FCStd": "NEW"}
     assert [row.place for row in flow.view.shown("plate", only_left=True)] == ["parts/Plate.FCStd"]
-    flow.commit_all("the first")
-    place.office.settle()
+    place.commit_all(flow, "the first")
     assert place.states(flow) == {"Sheet.FCStd": "SAME", "parts/Plate.FCStd": "SAME"}
     assert flow.view.shown("", only_left=True) == []
     assert flow.view.heading() == "2 files, 0 of them different from Silo"
@@ -103,47 +119,35 @@ def test_commit_all_sends_every_file_that_silo_does_not_have(place: Place) -> No
 
 
 def test_unsaved_edits_are_shown_saved_and_sent(place: Place) -> None:
-    flow = place.flow()
-    place.look(flow)
-    flow.commit_all("")
-    place.office.settle()
+    flow = place.committed()
     path = place.root / "parts" / "Plate.FCStd"
     before = path.read_bytes()
     edited = place.write("edited")
     path.write_bytes(before)
-    doc = Document("Plate", str(path), edited, place.identity)
+    doc = place.opened(Document("Plate", str(path), edited, place.identity))
     place.office.desk.documents.base(doc).settle(place.office.session.outbox)  # as when it is opened
-    for docs in (place.cad.docs, place.office.desk.open):
-        docs.append(doc)
     doc.recomputed = True  # FreeCAD marks it, but nothing differs
     assert not any(row.edits for row in place.look(flow).rows)
     doc.recomputed = False
     view = place.look(flow)
     assert [(row.place, row.edits) for row in view.shown("", only_left=True)] == [("parts/Plate.FCStd", True)]
     assert view.rows[1].words().endswith("unsaved edits")
-    flow.commit_all("edited")
-    place.office.settle()
+    place.commit_all(flow, "edited")
     assert place.office.files("Plate")[-1] == edited
     assert place.look(flow).shown("", only_left=True) == []
 
 
 def test_an_open_file_without_an_item_is_saved_and_sent(place: Place) -> None:
     """It is a document of its own."""
-    flow = place.flow()
-    place.look(flow)
-    flow.commit_all("")
-    place.office.settle()
+    flow = place.committed()
     path = place.root / "Sheet.FCStd"
     before = path.read_bytes()
     part("Sheet", "edited").save(path)
     edited = path.read_bytes()
     path.write_bytes(before)
-    doc = Document("Sheet", str(path), edited, "", several=True)
-    for docs in (place.cad.docs, place.office.desk.open):
-        docs.append(doc)
+    place.opened(Document("Sheet", str(path), edited, "", several=True))
     assert [row.place for row in place.look(flow).shown("", only_left=True)] == ["Sheet.FCStd"]
-    flow.commit_all("edited")
-    place.office.settle()
+    place.commit_all(flow, "edited")
     assert path.read_bytes() == edited
     assert place.look(flow).shown("", only_left=True) == []
 
@@ -151,10 +155,7 @@ def test_an_open_file_without_an_item_is_saved_and_sent(place: Place) -> None:
 @pytest.mark.parametrize("choice", [Choice.ON_TOP, Choice.TAKE, Choice.OPEN])
 def test_a_new_version_over_edits_is_a_question(place: Place, choice: Choice) -> None:
     """Commit All leaves the file alone; each answer does what it says, and loses nothing."""
-    flow = place.flow()
-    place.look(flow)
-    flow.commit_all("")
-    place.office.settle()
+    flow = place.committed()
     theirs = place.colleague_commits()
     assert place.states(flow)["parts/Plate.FCStd"] == "NEWER"
     mine = place.write("mine")
@@ -162,8 +163,7 @@ def test_a_new_version_over_edits_is_a_question(place: Place, choice: Choice) ->
     assert row.state.name == "BOTH"
     assert row.theirs is not None
     assert row.theirs.headline.startswith("alice committed revision 2")
-    flow.commit_all("not this one")
-    place.office.settle()
+    place.commit_all(flow, "not this one")
     assert place.office.files("Plate")[-1] == theirs
     flow.decide(row, choice)
     place.office.settle()
@@ -180,10 +180,7 @@ def test_a_new_version_over_edits_is_a_question(place: Place, choice: Choice) ->
 
 
 def test_without_a_connection_the_folder_says_what_it_remembers(place: Place) -> None:
-    flow = place.flow()
-    place.look(flow)
-    flow.commit_all("")
-    place.office.settle()
+    flow = place.committed()
     place.write("edited")
 
     def refuse(_name: str) -> None:

@@ -72,65 +72,45 @@ def test_nothing_set_up_is_no_error() -> None:
     assert not choose_server(ServerPreferences(), EMPTY, {}).configured
 
 
-@pytest.mark.parametrize(
-    ("known", "store", "env", "wanted"),
-    [
-        pytest.param(
-            ServerPreferences(HOME, "from-preference"),
-            EMPTY,
-            {},
-            ServerChoice(HOME, "from-preference", True, SettingSource.PREFERENCES, SettingSource.PREFERENCES),
-            id="preferences alone",
-        ),
-        pytest.param(
-            ServerPreferences(HOME, "from-preference"),
-            Store({HOME: "from-keyring"}),
-            {},
-            ServerChoice(HOME, "from-keyring", True, SettingSource.PREFERENCES, SettingSource.KEYRING),
-            id="keyring before preference",
-        ),
-        pytest.param(
-            ServerPreferences(HOME, "from-preference"),
-            Store({HOME: "from-keyring"}),
-            {"SILO_API_TOKEN": "from-env"},
-            ServerChoice(HOME, "from-env", True, SettingSource.PREFERENCES, SettingSource.ENVIRONMENT),
-            id="environment before keyring",
-        ),
-        pytest.param(
-            ServerPreferences(HOME, "from-preference"),
-            Store({HOME: "home", OTHER: "other"}),
-            {"SILO_API_URL": OTHER},
-            ServerChoice(OTHER, "other", True, SettingSource.ENVIRONMENT, SettingSource.KEYRING),
-            id="the other server's own token",
-        ),
-        pytest.param(
-            ServerPreferences(HOME, "from-preference"),
-            EMPTY,
-            {"SILO_API_URL": OTHER},
-            ServerChoice(OTHER, "", True, SettingSource.ENVIRONMENT, SettingSource.NONE),
-            id="a token is sent to no other server",
-        ),
-        pytest.param(
-            ServerPreferences(HOME, "from-preference"),
-            EMPTY,
-            {"SILO_API_URL": HOME + "/"},
-            ServerChoice(
-                HOME + "/", "from-preference", True, SettingSource.ENVIRONMENT, SettingSource.PREFERENCES
-            ),
-            id="the same server, written otherwise",
-        ),
-        pytest.param(
-            ServerPreferences(HOME, "t", verify=True),
-            EMPTY,
-            {"SILO_SSL_VERIFY": "false"},
-            ServerChoice(HOME, "t", False, SettingSource.PREFERENCES, SettingSource.PREFERENCES),
-            id="environment decides about certificates",
-        ),
-    ],
-)
-def test_who_wins(known: ServerPreferences, store: Store, env: dict[str, str], wanted: ServerChoice) -> None:
+ENVIRONMENT, KEYRING, PAGE = SettingSource.ENVIRONMENT, SettingSource.KEYRING, SettingSource.PREFERENCES
+MINE = ServerPreferences(HOME, "mine")
+# What is set in the environment and in the keyring, and what of it counts.
+CASES: dict[str, tuple[dict[str, str], dict[str, str], ServerChoice]] = {
+    "preferences alone": ({}, {}, ServerChoice(HOME, "mine", True, PAGE, PAGE)),
+    "keyring before preference": ({}, {HOME: "kept"}, ServerChoice(HOME, "kept", True, PAGE, KEYRING)),
+    "environment before keyring": (
+        {"SILO_API_TOKEN": "here"},
+        {HOME: "kept"},
+        ServerChoice(HOME, "here", True, PAGE, ENVIRONMENT),
+    ),
+    "the other server's own token": (
+        {"SILO_API_URL": OTHER},
+        {HOME: "kept", OTHER: "other"},
+        ServerChoice(OTHER, "other", True, ENVIRONMENT, KEYRING),
+    ),
+    "a token is sent to no other server": (
+        {"SILO_API_URL": OTHER},
+        {},
+        ServerChoice(OTHER, "", True, ENVIRONMENT),
+    ),
+    "the same server, written otherwise": (
+        {"SILO_API_URL": HOME + "/"},
+        {},
+        ServerChoice(HOME + "/", "mine", True, ENVIRONMENT, PAGE),
+    ),
+    "environment decides about certificates": (
+        {"SILO_SSL_VERIFY": "false"},
+        {},
+        ServerChoice(HOME, "mine", False, PAGE, PAGE),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_who_wins(case: str) -> None:
     """Environment, then keyring, then preference; a token belongs to its server."""
-    assert choose_server(known, store, env) == wanted
+    env, tokens, wanted = CASES[case]
+    assert choose_server(MINE, Store(tokens), env) == wanted
 
 
 def test_the_configuration_file_comes_last() -> None:
