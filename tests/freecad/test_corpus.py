@@ -3,19 +3,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from freecad_cases import answers, corpora
 from freecad_cases.corpora import Corpus
 from freecad_cases.machines import WANTED
 from freecad_cases.truth import CONTROL, TRUTH
-
-from silo.bom.errors import SiloError
-from silo.bom.links import extract
-from silo.bom.model import Extraction
-from silo.bom.roots import choose_assembly
-from silo.fcstd import Library
 
 ARCHIVES = {version: corpora.ARCHIVES / f"corpus-{version}.zip" for version in WANTED}
 KEYS = [(version, key) for version, archive in ARCHIVES.items() for key in corpora.packed_keys(archive)]
@@ -28,26 +20,18 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Corpus]:
     return {version: corpora.unpack(archive, folder / version) for version, archive in ARCHIVES.items()}
 
 
-def read(top: Path) -> Extraction | SiloError:
-    try:
-        with Library() as library:
-            return extract(choose_assembly(library.open(top)))
-    except SiloError as error:
-        return error
-
-
 @pytest.mark.parametrize(("version", "key"), KEYS, ids=[f"{version}-{key}" for version, key in KEYS])
 def test_the_reader_gives_the_truth(unpacked: dict[str, Corpus], version: str, key: str) -> None:
     """BOM, findings with their places, consolidation and identities are as written in the truth table."""
     corpus = unpacked[version]
-    found = read(corpus.top(key))
+    found = answers.read(corpus.top(key))
     assert answers.differences(found, corpora.truth_of(key), corpus.base(key)) == []
 
 
 @pytest.mark.parametrize("name", CONTROL_CASES)
 def test_the_control_cases_are_counted_right(name: str) -> None:
     """The published golden set: every one of T1 to T11 as expected.json says."""
-    found = read(CONTROL / name / "top.FCStd")
+    found = answers.read(CONTROL / name / "top.FCStd")
     assert answers.differences(found, TRUTH[name], CONTROL / name) == []
 
 

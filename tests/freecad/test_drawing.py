@@ -105,10 +105,7 @@ def test_each_occurrence_stands_where_freecad_shows_it(version: str, tmp_path: P
     (tmp_path / "asked.json").write_text(json.dumps(asked))
     files = {"SILO_ASKED": str(tmp_path / "asked.json"), "SILO_OUT": str(tmp_path / "answers.json")}
     script = Path(__file__).parent / "freecad_cases" / "placed.py"
-    done = freecad.run(
-        script, {**freecad.profile(tmp_path / "profile"), **files}, cwd=tmp_path, timeout_s=1800
-    )
-    assert done.returncode == 0, done.stdout[-3000:]
+    freecad.must_run(script, {**freecad.profile(tmp_path / "profile"), **files}, cwd=tmp_path, timeout_s=1800)
     same, measured = 0, []
     for top, answers in json.loads((tmp_path / "answers.json").read_text()).items():
         for one, answer in zip(mine[top], answers, strict=True):

@@ -202,8 +202,7 @@ def test_a_file_of_a_newer_freecad_keeps_what_is_unknown_here(
             script.write_text(_PART_OF_1_1)
             newer = machines.need("1.1")
             env = {**newer.profile(tmp_path / "newer"), "SILO_OUT": str(freecad.vault / name)}
-            made = newer.run(script, env, cwd=tmp_path)
-            assert made.returncode == 0, made.stdout
+            newer.must_run(script, env, cwd=tmp_path)
         freecad.server.down()
         freecad.server.freecad_version = "1.1"
         freecad.server.up()

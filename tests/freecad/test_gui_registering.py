@@ -138,8 +138,7 @@ def test_another_version_reads_and_keeps_the_identities(
     assert identities(live) == set(wanted.values())
 
     files = [str(path) for path in sorted(folder.glob("*.FCStd")) if path.stem not in ("Top", "Fixed")]
-    done = other.run(RESAVE, {**env, "SILO_FILES": json.dumps([*files, str(top)])}, cwd=tmp_path)
-    assert done.returncode == 0, done.stdout
+    other.must_run(RESAVE, {**env, "SILO_FILES": json.dumps([*files, str(top)])}, cwd=tmp_path)
     with Library() as library:
         assert identities(extract(choose_assembly(library.open(top)))) == set(wanted.values())
 

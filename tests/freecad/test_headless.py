@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import uuid
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.cli.main import main
+from silo.fcstd import Library
 from silo_server.run import running_server
 
 pytestmark = pytest.mark.freecad
@@ -37,27 +38,13 @@ class Vault:
     folder: Path
     client: SiloClient
     env: dict[str, str]
-
-    @property
-    def top(self) -> Path:
-        return self.folder / "top.FCStd"
+    numbers: dict[str, str] = field(default_factory=dict)
 
     def lines(self, part_of: str) -> dict[str, float]:
         """What the server's BOM of an assembly holds, by file name of the component."""
-        return {
-            self.names[line.child_part_number]: line.quantity
-            for line in self.client.get_bom(self.numbers[part_of])
-        }
-
-    @property
-    def names(self) -> dict[str, str]:
-        return {number: name for name, number in self.numbers.items()}
-
-    @property
-    def numbers(self) -> dict[str, str]:
-        told = json.loads((self.folder / "numbers.json").read_text())
-        assert isinstance(told, dict)
-        return told
+        names = {number: name for name, number in self.numbers.items()}
+        lines = self.client.get_bom(self.numbers[part_of])
+        return {names[line.child_part_number]: line.quantity for line in lines}
 
 
 @pytest.fixture
@@ -77,23 +64,11 @@ def vault(
             monkeypatch.setenv(name, value)
         assert main(["register", "--yes", str(folder / "top.FCStd")]) == 0
         capsys.readouterr()
-        with SiloClient(server.base_url, token) as client:
-            found = Vault(folder, client, env)
-            numbers = _numbers(folder, client)
-            (folder / "numbers.json").write_text(json.dumps(numbers))
-            yield found
-
-
-def _numbers(folder: Path, client: SiloClient) -> dict[str, str]:
-    from silo.fcstd import Library
-
-    numbers = {}
-    with Library() as library:
-        for path in folder.glob("*.FCStd"):
-            item = client.get_item_by_uuid(library.open(path).Meta["SiloUUID"])
-            assert item is not None
-            numbers[path.stem] = str(item["part_number"])
-    return numbers
+        with SiloClient(server.base_url, token) as client, Library() as library:
+            ids = {path.stem: library.open(path).Meta["SiloUUID"] for path in folder.glob("*.FCStd")}
+            items = client.get_items_by_uuid(ids.values())
+            numbers = {name: items[identity].part_number for name, identity in ids.items()}
+            yield Vault(folder, client, env, numbers)
 
 
 # --- freecadcmd without our command line --------------------------------------------------------------------

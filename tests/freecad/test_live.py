@@ -28,8 +28,7 @@ def session(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
         "SILO_OUT": str(folder / "answers.json"),
         "SILO_MODS": str(REPOSITORY / "mods"),
     }
-    done = freecad.run(SCRIPT, env, cwd=folder)
-    assert done.returncode == 0, done.stdout[-4000:]
+    freecad.must_run(SCRIPT, env, cwd=folder)
     answers = json.loads((folder / "answers.json").read_text())
     assert isinstance(answers, dict)
     return answers

@@ -21,10 +21,8 @@ from freecad_cases.public import FOLDER, PublicAssembly, public_assemblies
 
 from silo.bom.errors import SiloError
 from silo.bom.findings import FindingCode
-from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.report import flat_lines
-from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.freecads import run_freecad
 
@@ -61,7 +59,7 @@ class Matrix:
     def file(self, top: Path) -> Extraction | SiloError:
         """What the FCStd reader says of a file."""
         if top not in self._files:
-            self._files[top] = _walk_file(top)
+            self._files[top] = answers.read(top)
         return self._files[top]
 
 
@@ -69,14 +67,6 @@ def _walk_live(freecad: FreeCAD, tops: list[Path], profile: Path) -> Answers:
     env = freecad.profile(profile)
     results = run_freecad([str(top) for top in tops], command=freecad.command, timeout_s=120, env=env)
     return {Path(top): found for top, found in results}
-
-
-def _walk_file(top: Path) -> Extraction | SiloError:
-    try:
-        with Library() as library:
-            return extract(choose_assembly(library.open(top)))
-    except SiloError as error:
-        return error
 
 
 @pytest.fixture(scope="session")

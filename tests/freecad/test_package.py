@@ -31,8 +31,7 @@ def _read(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     folder = tmp_path_factory.mktemp("package").resolve()
     out = folder / "told.json"
     env = {"SILO_TEST_PACKAGE": str(REPOSITORY / "package.xml"), "SILO_TEST_OUT": str(out)}
-    run = freecad.run(SCRIPT, {**freecad.profile(folder / "home"), **env}, cwd=folder)
-    assert run.returncode == 0, run.stdout
+    freecad.must_run(SCRIPT, {**freecad.profile(folder / "home"), **env}, cwd=folder)
     told = json.loads(out.read_text())
     assert isinstance(told, dict)
     return {**told, "version": request.param}

@@ -16,15 +16,13 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from freecad_cases import machines
+from freecad_cases import answers, machines
 from freecad_cases.machines import WANTED, FreeCAD
 
 from silo.bom.errors import SiloError
 from silo.bom.findings import FindingCode
-from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.report import flat_lines
-from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.freecads import run_freecad
 from silo.inertia.geometry.fcstd import Entries, StoredFacts, Unpacked, measured_files
@@ -51,14 +49,6 @@ def counted(found: Extraction) -> dict[str, int]:
         if name in VOLUMES:
             pieces[VOLUMES[name]] += count
     return dict(pieces)
-
-
-def read(top: Path) -> Extraction | SiloError:
-    try:
-        with Library() as library:
-            return extract(choose_assembly(library.open(top)))
-    except SiloError as error:
-        return error
 
 
 def weighed(top: Path) -> dict[str, int]:
@@ -90,8 +80,7 @@ def build(freecad: FreeCAD, folder: Path, seeds: list[int]) -> dict[int, dict[st
     folder.mkdir()
     env = freecad.profile(folder.parent / f"{folder.name}-profile")
     job = json.dumps({"out": str(folder), "seeds": seeds})
-    done = freecad.run(SCRIPT, {**env, "SILO_RANDOM": job}, cwd=folder)
-    assert done.returncode == 0, done.stdout[-3000:]
+    freecad.must_run(SCRIPT, {**env, "SILO_RANDOM": job}, cwd=folder)
     return dict(json.loads(line) for line in (folder / "truth.jsonl").read_text().splitlines())
 
 
@@ -128,7 +117,7 @@ def hunt(version: str, tmp_path: Path, first: int, projects: int) -> list[str]:
         paths = [str(top) for top in tops.values()]
         live = dict(run_freecad(paths, command=freecad.command, env=env, witness=said))
         for seed, top in tops.items():
-            file, seen = read(top), live[str(top)]
+            file, seen = answers.read(top), live[str(top)]
             blocked += isinstance(seen, SiloError) or seen.blocked
             wrong += judge(seed, truth[seed], file, seen, said.get(str(top), []))
     print(f"FreeCAD {version}: {projects} projects, {blocked} blocked, {len(wrong)} wrong", *wrong, sep="\n")

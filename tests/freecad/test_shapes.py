@@ -60,10 +60,9 @@ def _built(freecad: FreeCAD, tmp_path: Path) -> Callable[[Path], Path]:
     def run(script: Path) -> Path:
         out = tmp_path / "out"
         out.mkdir()
-        done = freecad.run(
+        freecad.must_run(
             script, {"SILO_OUT": str(out), **freecad.profile(tmp_path / "builder")}, cwd=tmp_path
         )
-        assert done.returncode == 0, done.stdout[-2000:]
         return out
 
     return run

@@ -48,8 +48,7 @@ def test_freecad_reads_and_keeps_what_we_stamp(version: str, tmp_path: Path) -> 
     assert answers.uuids_of(live.entries, str(folder)) == wanted
 
     files = [str(folder / f"{name}.FCStd") for name in ("bolt", "plate", "sub", "top")]
-    done = freecad.run(RESAVE, {**env, "SILO_FILES": json.dumps(files)}, cwd=tmp_path)
-    assert done.returncode == 0, done.stdout
+    freecad.must_run(RESAVE, {**env, "SILO_FILES": json.dumps(files)}, cwd=tmp_path)
     with Library() as library:
         document = library.open(top)
         assert document.ProgramVersion.startswith(version)

@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from freecad_cases import machines
+from freecad_cases import answers, machines
 from freecad_cases.machines import WANTED
 
 from silo.bom.findings import FindingCode
-from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import flat_lines
-from silo.bom.roots import choose_assembly
 from silo.bom.standard import STANDARD_PARTS
 from silo.fcstd import Library
 from silo.freecads import run_freecad
@@ -53,11 +51,6 @@ def pieces(found: Extraction) -> dict[str, int]:
     return dict(sum((Counter({name_of(one): n}) for one, n in flat_lines(found.entries)), Counter()))
 
 
-def read(top: Path) -> Extraction:
-    with Library() as library:
-        return extract(choose_assembly(library.open(top)))
-
-
 def weighed(top: Path) -> Counter[str]:
     """The pieces with a mass, by their object or their designation."""
     with Library() as library:
@@ -73,8 +66,7 @@ def _built(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     freecad = machines.need(request.param)
     folder = tmp_path_factory.mktemp("uses").resolve()
     env = freecad.profile(folder / "profile")
-    done = freecad.run(SCRIPT, {**env, "SILO_OUT": str(folder / "projects")}, cwd=folder)
-    assert done.returncode == 0, done.stdout[-3000:]
+    freecad.must_run(SCRIPT, {**env, "SILO_OUT": str(folder / "projects")}, cwd=folder)
     tops = {name: folder / "projects" / name / "top.FCStd" for name in TRUTH}
     said: dict[str, Any] = {}
     live = dict(
@@ -88,7 +80,7 @@ def test_each_way_of_use_is_counted_as_a_person_would(built: Any, project: str) 
     """By the file and in FreeCAD alike, and as FreeCAD's own view has it."""
     top, live, accounts = built[project]
     counts, own, beside = TRUTH[project]
-    file = read(top)
+    file = answers.read(top)
     for found in (file, live):
         assert (pieces(found), found.blocked) == (counts, False)
         assert {one.object_name: one.quantity for one in found.assembly.own} == own
@@ -100,7 +92,7 @@ def test_each_way_of_use_is_counted_as_a_person_would(built: Any, project: str) 
 @pytest.mark.parametrize("project", TRUTH)
 def test_what_is_counted_is_weighed(built: Any, project: str) -> None:
     top, _, _ = built[project]
-    found = read(top)
+    found = answers.read(top)
     leaves = Counter({name_of(one): n for one, n in flat_lines(found.entries) if not one.children})
     leaves.update({one.object_name: one.quantity for one in found.assembly.own})
     assert weighed(top) == leaves

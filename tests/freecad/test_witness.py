@@ -62,8 +62,7 @@ def test_each_wrong_count_is_found(version: str, tmp_path: Path) -> None:
     out = tmp_path / "answers.json"
     script = Path(__file__).parent / "freecad_cases" / "wrong_counts.py"
     env = {**freecad.profile(tmp_path / "profile"), "SILO_OUT": str(out)}
-    done = freecad.run(script, env, cwd=tmp_path)
-    assert done.returncode == 0, done.stdout[-3000:]
+    freecad.must_run(script, env, cwd=tmp_path)
     answers = json.loads(out.read_text())
     assert len(answers) > 20
     for fault, told in answers.items():
@@ -100,8 +99,7 @@ def test_a_fault_of_the_witness_is_not_freecads(tmp_path: Path) -> None:
     job.write_text(json.dumps({"tops": tops, "lines": str(out), "verify": True}))
     script = Path(__file__).parent / "freecad_cases" / "own_fault.py"
     env = {**freecad.profile(tmp_path / "profile"), "SILO_ARGS_FILE": str(job)}
-    done = freecad.run(script, env, cwd=tmp_path)
-    assert done.returncode == 0, done.stdout[-3000:]
+    freecad.must_run(script, env, cwd=tmp_path)
     lines = [json.loads(line) for line in out.read_text().splitlines()]
     failed, fine = (line for line in lines if "begun" not in line)
     assert failed["top"] == tops[0]

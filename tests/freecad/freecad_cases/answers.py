@@ -12,8 +12,20 @@ from freecad_cases.truth import Truth
 
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, Place
+from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction, walk_entries
 from silo.bom.report import to_plain
+from silo.bom.roots import choose_assembly
+from silo.fcstd import Library
+
+
+def read(top: Path) -> Extraction | SiloError:
+    """What the reader of files says of a file."""
+    try:
+        with Library() as library:
+            return extract(choose_assembly(library.open(top)))
+    except SiloError as error:
+        return error
 
 
 def component(entry: BomEntry, base: str) -> str:

@@ -46,8 +46,7 @@ def ask_freecad(freecad: FreeCAD, folder: Path) -> Answers:
         "SILO_TOPS": json.dumps(copies),
         "SILO_OUT": str(out),
     }
-    done = freecad.run(Path(__file__).with_name("native_bom.py"), env, cwd=folder)
-    assert done.returncode == 0, done.stdout[-4000:]
+    freecad.must_run(Path(__file__).with_name("native_bom.py"), env, cwd=folder)
     answers: Answers = json.loads(out.read_text())
     return answers
 

@@ -57,8 +57,7 @@ def build(freecad: FreeCAD, folder: Path) -> Corpus:
     """Have a FreeCAD build all the cases that it can."""
     folder.mkdir(parents=True)
     env = freecad.profile(folder.parent / f"profile-{freecad.short}")
-    done = freecad.run(BUILD, {**env, "SILO_CASES_OUT": str(folder)}, cwd=folder)
-    assert done.returncode == 0, f"FreeCAD {freecad.short} did not build its cases:\n{done.stdout[-4000:]}"
+    freecad.must_run(BUILD, {**env, "SILO_CASES_OUT": str(folder)}, cwd=folder)
     return load(folder)
 
 

@@ -84,6 +84,11 @@ class FreeCAD:
             check=False,
         )
 
+    def must_run(self, script: Path, env: Mapping[str, str], *, cwd: Path, timeout_s: float = 300) -> None:
+        """Run a script that has to succeed."""
+        done = self.run(script, env, cwd=cwd, timeout_s=timeout_s)
+        assert done.returncode == 0, f"FreeCAD {self.short}, {script.name}: {done.stdout[-4000:]}"
+
 
 @cache
 def freecads() -> Mapping[str, FreeCAD]:
