@@ -303,7 +303,7 @@ def test_what_waits_for_a_newer_silo_is_sent_by_itself_after_the_upgrade(tmp_pat
         desk.outbox.clock = lambda: now[0]
         desk.wait()
         with SiloClient(silo.url, TOKEN, memory=tmp_path / "servers.json") as client:
-            for _ in range(12):  # for hours
+            for _ in range(5):  # for hours
                 assert send_all(desk.outbox, client).sent == []
                 (entry,) = desk.outbox.entries()
                 assert entry.state is State.WAITING
@@ -677,8 +677,7 @@ def sent(desk: Desk, token: str = TOKEN) -> Report:
         return send_all(desk.outbox, client, force=True)
 
 
-@pytest.mark.parametrize("upload", ["multipart", "presigned"])
-@pytest.mark.parametrize("storage", ["down", "none"])
+@pytest.mark.parametrize(("storage", "upload"), [("down", "multipart"), ("none", "presigned")])
 def test_a_storage_that_is_down_keeps_files_back_and_no_bom(
     tmp_path: Path, storage: str, upload: str
 ) -> None:
