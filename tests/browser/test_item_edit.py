@@ -174,21 +174,6 @@ def test_archived_and_found_again(api: Api, visit: Visit) -> None:
     assert api.get(f"/api/items/{number}")["name"] == "Old clamp"
 
 
-def test_viewers_change_no_item(api: Api, visit: Visit) -> None:
-    """They see properties, and no way to change them; the address is refused."""
-    number = api.item(name="Fixed")
-    page = visit("viewer")
-    page.goto(f"/items/{number}")
-    for name in ("Edit item", "New item", "Upload"):
-        expect(page.get_by_role("link", name=name).or_(page.get_by_role("button", name=name))).to_have_count(
-            0
-        )
-    for path in ("/items/new", f"/items/{number}/edit"):
-        answer = page.goto(path)
-        assert answer is not None
-        assert answer.status == 403
-
-
 def test_what_a_program_wrote_can_be_edited(api: Api, visit: Visit) -> None:
     """Spaces at ends, line breaks, a text too long for a form: none of them is a change of anybody's."""
     odd = {"supplier": "ACME ", "material": "steel\nhardened", "own": " x\r\ny ", "log": "z" * 20_000}

@@ -111,12 +111,3 @@ def test_a_notice_and_a_problem_do_not_turn(api: Api, visit: Visit, names: dict[
     page.locator("#checked").wait_for()
     assert measured(page, LOOSE) == []
     assert measured(page, WIDER) <= 0
-
-
-def test_a_line_s_source_is_no_type(api: Api, visit: Visit, names: dict[str, str]) -> None:
-    """The badge says where a line comes from; "assembly" is what an item is."""
-    fill(api, names)
-    page = visit("viewer")
-    page.goto(f"/items/{names['top']}/bom")
-    badges = page.locator("section[aria-labelledby=lines] .badge.assembly, .badge.manual")
-    assert set(badges.all_inner_texts()) == {"from CAD", "by hand"}

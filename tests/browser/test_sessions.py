@@ -164,6 +164,9 @@ def test_loading_a_page_again_makes_nothing_twice(api: Api, visit: Visit, user: 
     page.reload()
     expect(page.get_by_label("The token")).to_have_count(0)
     expect(page.get_by_role("rowheader", name="laptop")).to_have_count(1)
+    page.get_by_role("button", name="Revoke laptop").click()
+    expect(page.locator(".notice")).to_contain_text("revoked")
+    assert api.as_(secret).call("GET", "/api/auth/me").status == 401
     admin = visit("admin")
     admin.goto("/users")
     admin.get_by_role("button", name=f"Login link for {user}").click()

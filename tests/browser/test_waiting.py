@@ -120,15 +120,6 @@ def test_a_bom_that_changed_meanwhile_is_left_and_named(api: Api, visit: Visit) 
     assert (len(api.lines(first)), len(api.lines(second))) == (3, 1)
 
 
-def test_viewers_see_what_waits_and_change_nothing(api: Api, visit: Visit) -> None:
-    """The table, no boxes, no buttons."""
-    parent = waits(api, "seen")
-    page = visit("viewer")
-    page.goto("/waiting?folder=seen")
-    expect(row(page, parent)).to_have_count(1)
-    expect(page.locator("main input[type=checkbox], main form[method=post]")).to_have_count(0)
-
-
 def page_time(api: Api, parent: str) -> str:
     """When the last sync was, as a page shows it."""
     return str(api.get(f"/api/items/{parent}")["last_sync"]["at"])[:16].replace("T", " ")

@@ -15,7 +15,6 @@ from silo_server.run import RunningServer, prepare, running_server
 from silo_server.settings import Settings
 
 TOKEN = "silo_pages"
-KINDS = ["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)]
 
 
 @pytest.fixture(scope="session")
@@ -26,16 +25,22 @@ def databases(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Databases]:
     made.close()
 
 
-@pytest.fixture(params=KINDS)
-def url(request: pytest.FixtureRequest, databases: Databases) -> str:
-    """A database at the newest schema, once of each kind."""
-    return databases.new(str(request.param))
+@pytest.fixture(scope="session", params=["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)])
+def kind(request: pytest.FixtureRequest) -> str:
+    """Which database a test is over: each, or that of :func:`hunting.over` where they cannot differ."""
+    return str(request.param)
 
 
-@pytest.fixture(params=KINDS)
-def empty_url(request: pytest.FixtureRequest, databases: Databases) -> str:
-    """A database without a schema, once of each kind."""
-    return databases.empty(str(request.param))
+@pytest.fixture
+def url(kind: str, databases: Databases) -> str:
+    """A database at the newest schema, of each kind."""
+    return databases.new(kind)
+
+
+@pytest.fixture
+def empty_url(kind: str, databases: Databases) -> str:
+    """A database without a schema, of each kind."""
+    return databases.empty(kind)
 
 
 @pytest.fixture

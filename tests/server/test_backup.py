@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hunting import over
 from server_testing import Api, Databases, bom, form_body, wait_until
 from sqlalchemy import text
 
@@ -29,7 +30,7 @@ VOLATILE = {"server_state", "events", "audit", "login_links", "login_attempts", 
 
 
 def fill(api: Api) -> str:
-    """A BOM with history, an upload, and names of all kinds; returns the assembly."""
+    """A released BOM with history, an upload, and names of all kinds; returns the assembly."""
     parent, *children = api.items(
         5, description="Größe ½ 'quoted' \u202e", properties={"a": [1, {"b": None}]}
     )
@@ -42,6 +43,9 @@ def fill(api: Api) -> str:
     ordered = {"part_number": children[0], "quantity": "2.50", "price": "0.10", "currency": "USD"}
     api.good("POST", f"/api/items/{parent}/orders", {"parts": [ordered]})
     api.good("PUT", "/api/rates", {"currency": "EUR", "rates": {"USD": "0.9"}})
+    api.good("PUT", "/api/users/admin", {"approver": True})
+    api.good("POST", f"/api/items/{parent}/releases", {"with_parts": True})
+    api.good("POST", f"/api/items/{parent}/releases/A/approval", {"override": "a trial"})
     return parent
 
 
@@ -77,9 +81,8 @@ def tables(url: str, files: Path) -> dict[str, list[tuple[Any, ...]]]:
     return found
 
 
-@pytest.mark.parametrize("to", ["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)])
-def test_what_was_saved_comes_back_on_either_database(
-    url: str, databases: Databases, tmp_path: Path, to: str
+def test_what_was_saved_comes_back_on_the_other_database(
+    kind: str, url: str, databases: Databases, tmp_path: Path
 ) -> None:
     """Every row of every table and every file, while the first server still runs; the second server works."""
     settings = Settings(database_url=url, files_dir=tmp_path / "files")
@@ -91,10 +94,10 @@ def test_what_was_saved_comes_back_on_either_database(
         send_document(api, parent, b"of two parts")
         backup.back_up(settings, tmp_path / "saved")
         lines, history = api.get(bom(parent)), api.get(bom(parent, "history"))
-        rates = api.get("/api/rates")
+        rates, frozen = api.get("/api/rates"), api.get(f"/api/items/{parent}/releases/A")
         before = tables(url, tmp_path)
     assert backup.verify(tmp_path / "saved").missing_files == []
-    other = databases.empty(to)
+    other = databases.empty("sqlite" if kind == "postgres" else "postgres")
     backup.restore(Settings(database_url=other, files_dir=tmp_path / "other"), tmp_path / "saved")
     after = tables(other, tmp_path)
     assert {n: after[n] for n in after if n not in VOLATILE} == {
@@ -107,6 +110,7 @@ def test_what_was_saved_comes_back_on_either_database(
         assert api.get(bom(parent)) == lines
         assert api.get(bom(parent, "history")) == history
         assert api.get("/api/rates") == rates
+        assert api.get(f"/api/items/{parent}/releases/A") == frozen
         assert api.call("GET", f"/api/items/{parent}/file").body == b"first"
         assert api.call("GET", f"/api/documents/{BOTH}/file").body == b"of two parts"
         told = api.get(f"/api/documents/{BOTH}")
@@ -120,6 +124,7 @@ def test_what_was_saved_comes_back_on_either_database(
         assert api.get(bom(parent, "history"))[0]["id"] > history[0]["id"]
 
 
+@over("sqlite")
 def test_a_restore_lets_nobody_in_who_was_sent_away(url: str, databases: Databases, tmp_path: Path) -> None:
     """Tokens that were revoked and users who were locked out since stay so; sessions and links are over.
 
@@ -255,6 +260,7 @@ def saved(db: Database, tmp_path: Path) -> Path:
     return tmp_path / "saved"
 
 
+@over("sqlite")
 def test_a_damaged_backup_is_refused_before_anything_is_touched(saved: Path, tmp_path: Path) -> None:
     """A byte of the database, a byte of a file, a file gone, no manifest, a format of the future."""
     target = Settings(database_url=f"sqlite:///{tmp_path / 'new.db'}", files_dir=tmp_path / "new")
@@ -284,6 +290,7 @@ def test_a_damaged_backup_is_refused_before_anything_is_touched(saved: Path, tmp
     refused("use a newer one")
 
 
+@over("sqlite")
 def test_what_the_server_lost_is_named_and_the_rest_is_saved(
     db: Database, saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

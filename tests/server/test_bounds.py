@@ -9,13 +9,13 @@ import json
 import socket
 import threading
 import uuid
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from hunting import over
 from server_testing import Api, bom, merge_body, sqlite_database
 from sqlalchemy import Engine, event
 from web_visitor import Visitor
@@ -75,6 +75,7 @@ def used_everywhere(db: Database) -> str:
     return "BOLT"
 
 
+@over("postgres")
 def test_where_used_of_a_bolt_that_is_used_everywhere(db: Database) -> None:
     """It comes in pages, the nearest first, each use once, whatever the number of parents."""
     number = used_everywhere(db)
@@ -93,6 +94,7 @@ def test_where_used_of_a_bolt_that_is_used_everywhere(db: Database) -> None:
     ]
 
 
+@over("sqlite")
 def test_one_level_reads_one_level(db: Database) -> None:
     """``depth`` bounds what is read, not only what is shown."""
     with db.write() as tx:
@@ -107,6 +109,7 @@ def test_one_level_reads_one_level(db: Database) -> None:
     assert [row.total for row in tree.expand(read[4], 4, 100)] == [2, 4, 8, 16]
 
 
+@over("sqlite")
 def test_a_structure_that_would_fill_the_memory_is_not_read(url: str, tmp_path: Path) -> None:
     """Below the bound all views; above it 413 with a way out, and pages that still show the item."""
     bounded = Settings(database_url=url, files_dir=tmp_path, max_expanded_rows=3)
@@ -183,32 +186,6 @@ def test_two_columns_of_one_meaning_that_differ_are_refused(
         assert len(imports.read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1
 
 
-def test_guesses_that_come_at_once_are_all_counted(url: str, tmp_path: Path) -> None:
-    """Twenty-four wrong passwords at the same moment: at most five are looked at, the others get "try later".
-
-    A slow machine may be too busy for one of the five, too.
-    """
-    guesses = 24
-    with running_server(url, token="silo_guess", files_dir=tmp_path) as server:
-        with Api(server.base_url, "silo_guess") as api:
-            api.good("POST", "/api/users", {"username": "ann", "password": "the right password"})
-        gate, statuses = threading.Barrier(guesses), Counter[int]()
-
-        def guess(number: int) -> None:
-            with Api(server.base_url) as api:
-                gate.wait(60)
-                body = {"username": "ann", "password": f"wrong password {number}"}
-                statuses[api.call("POST", "/api/auth/login", body).status] += 1
-
-        threads = [threading.Thread(target=guess, args=(n,)) for n in range(guesses)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join(60)
-    assert 1 <= statuses[401] <= 5
-    assert statuses[401] + statuses[429] + statuses[503] == guesses
-
-
 def test_a_turnstile_lets_in_so_many_and_no_more() -> None:
     """Places, waiting room, and patience are bounded; what left makes room again."""
     turnstile = Turnstile(places=2, waiting=1, seconds=0.05, who="tests")
@@ -278,6 +255,7 @@ def test_half_a_request_is_not_waited_for_for_ever(
             assert api.item()
 
 
+@over("sqlite")
 def test_what_waits_is_listed_and_counted_without_reading_all_lines(db: Database) -> None:
     """Each kind once, archived ones never; every page counts them, so only what waits is looked at."""
     asked: list[tuple[str, Any]] = []
@@ -414,16 +392,3 @@ def test_every_cursor_of_the_database_is_closed_by_its_reader() -> None:
             found += 1
             assert node in closed, f"{path.name}: {ast.unparse(node)}"
     assert found >= 5
-
-
-def test_an_export_is_whole_and_says_its_length(url: str, tmp_path: Path) -> None:
-    """It is streamed from the disk; a client still knows how much is to come."""
-    with (
-        running_server(url, token="silo_export", files_dir=tmp_path) as server,
-        Api(server.base_url, "silo_export") as api,
-    ):
-        parent, child = api.items(2)
-        api.merge(parent, {child: 2})
-        for suffix in ("csv", "xlsx"):
-            answer = api.call("GET", bom(parent, f"export.{suffix}"))
-            assert int(answer.headers["content-length"]) == len(answer.body) > 100

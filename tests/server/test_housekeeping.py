@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hunting import over
 from large_boms import fcstd_with_picture, form_file
 from server_testing import Api, bom, run_alone, sqlite_database, wait_until
 from sqlalchemy import func, select, text
@@ -94,6 +95,7 @@ def test_an_error_is_logged_at_once_and_the_next_run_comes(
     assert run.problem == "files: odd 2"
 
 
+@over("sqlite")
 def test_a_busy_server_trims_its_log(url: str, tmp_path: Path) -> None:
     """News all the time, so that no poll is ever idle: the clock alone decides; the run is shown."""
     settings = Settings(
@@ -149,6 +151,7 @@ def test_the_log_and_the_answers_are_bounded_in_bytes(url: str, tmp_path: Path) 
     db.close()
 
 
+@over("sqlite")
 @pytest.mark.parametrize("retention", [False, True])
 def test_what_is_kept_by_age(url: str, tmp_path: Path, retention: bool) -> None:
     """Sessions, answers to syncs go in their time; history and audit only where somebody asked for it."""
@@ -184,6 +187,7 @@ def test_what_is_kept_by_age(url: str, tmp_path: Path, retention: bool) -> None:
             assert api.quantities(parent) == {child: 3, **rest}
 
 
+@over("sqlite")
 def test_an_answer_kept_as_a_reference_is_the_same_answer(url: str, tmp_path: Path) -> None:
     """Whatever lines there are and whatever happened since: the repeat's bytes are the first answer's."""
     with running_server(url, token=TOKEN, files_dir=tmp_path) as server, Api(server.base_url, TOKEN) as api:
@@ -209,6 +213,7 @@ def _old(path: Path) -> None:
     os.utime(path, (0, 0))
 
 
+@over("sqlite")
 def test_uploads_that_nothing_refers_to_are_collected(url: str, tmp_path: Path) -> None:
     """What no revision has, after a day; never what one has, nor what was uploaded again meanwhile.
 

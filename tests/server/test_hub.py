@@ -9,6 +9,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
+from hunting import over
 from server_testing import Api
 
 from silo_server import events as log
@@ -17,6 +18,7 @@ from silo_server.events import RING_EVENTS
 from silo_server.run import RunningServer, running_server
 from silo_server.values import NewEvent, dumps
 
+pytestmark = over("sqlite")
 TOKEN = "silo_hub"
 
 

@@ -10,6 +10,7 @@ from uuid import uuid4
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
+from hunting import over
 from sqlalchemy import Connection, MetaData, Table, inspect, select, text
 
 from silo.bom.errors import ConfigError
@@ -100,6 +101,7 @@ def test_a_filled_database_comes_up_step_by_step_with_its_rows(first: Database) 
     assert welcome.username == "zoe"
 
 
+@over("sqlite")
 @pytest.mark.parametrize(
     ("revision", "sentence"),
     [

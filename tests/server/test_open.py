@@ -96,6 +96,37 @@ def test_what_is_open_below_is_in_every_view(
         assert (line["open"] or "") == words
 
 
+def test_a_banner_names_what_is_missing_until_a_sync_brings_it(
+    api: Api, visitors: dict[str, Visitor]
+) -> None:
+    """An incomplete BOM never looks complete, and an assembly that was never synced never like a part."""
+    top, part, sub, never = *api.items(2), *api.items(2, item_type="assembly")
+    pin = {"reason": "unregistered", "name": "Pin <b>", "file": "Pin.FCStd", "object": "Pin", "quantity": 3}
+    body = merge_body({part: 1})
+    api.good("POST", bom(sub, "merge"), {**body, "left_out": [{**GAP, "quantity": 2}, pin]})
+    api.merge(top, {sub: 1, never: 1})
+
+    def shown(path: str) -> str:
+        return (
+            visitors["viewer"].get(f"/items/{path}").body.decode().replace("<bdi>", "").replace("</bdi>", "")
+        )
+
+    for page in (shown(sub), shown(f"{sub}/bom")):
+        for words in (
+            "Incomplete: 1 missing, 1 unregistered",
+            "Lid.FCStd",
+            "3 × Pin &lt;b&gt; (Pin.FCStd): no part",
+        ):
+            assert words in page
+        assert "Nothing to decide" not in page
+    for path, count in ((top, 1), (f"{top}?view=flat", 1), (never, 1), (part, 0)):
+        assert ("never synced" in shown(path)) == count, path
+    assert "this item has no children" in shown(part)
+    api.good("POST", bom(sub, "merge"), {**body, "left_out": []})
+    page = shown(f"{sub}/bom")
+    assert ("Incomplete" in page, "Nothing to decide" in page) == (False, True)
+
+
 def test_a_part_that_cad_has_in_one_place_and_no_more_in_another(api: Api) -> None:
     """How much of the total is in doubt is counted, over all ways to it and for all pieces."""
     top, sub, part, other = api.items(4)

@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from fastapi import Request
+from hunting import over
 from server_testing import Api, ServerProcess, run_alone, sqlite_database
 from sqlalchemy.exc import InternalError, OperationalError
 from starlette.types import Message
@@ -88,6 +89,7 @@ def test_a_full_disk_is_said_as_that(error: Exception, full: bool) -> None:
     assert ("disk is full" in json.loads(bytes(answer.body))["message"]) == full
 
 
+@over("sqlite")
 @pytest.mark.parametrize("of_session", [False, True])
 def test_a_stream_ends_with_its_credential(url: str, tmp_path: Path, of_session: bool) -> None:
     """At once, and not with the next heartbeat; others go on."""
@@ -147,7 +149,7 @@ def test_a_stream_ends_if_its_credential_went_before_it_began(tmp_path: Path) ->
 
 def test_half_an_upload_does_not_hold_a_server_that_stops(tmp_path: Path) -> None:
     """It is told so, and the server ends in good order."""
-    with ServerProcess(sqlite_database(tmp_path / "x.db"), tmp_path, TOKEN) as server:
+    with ServerProcess.forked(sqlite_database(tmp_path / "x.db"), tmp_path, TOKEN) as server:
         with Api(server.base_url, TOKEN) as api:
             number = api.item()
         parts = urlsplit(server.base_url)

@@ -15,11 +15,11 @@ from typing import Any
 import pytest
 from server_testing import Api, Databases, bom, merge_body, wait_until
 from sqlalchemy import func, select, text
-from web_visitor import link_of
+from web_visitor import enter
 
 from silo.bom.errors import CycleError
 from silo_server.db.engine import Database, Tx
-from silo_server.run import RunningServer, prepare, running_server
+from silo_server.run import prepare
 from silo_server.services.bom import history, review
 from silo_server.services.bom.merge import merge_bom, read_merge_order
 from silo_server.services.items import NewItem, create_item, get_item
@@ -104,20 +104,6 @@ def test_two_edges_of_a_ring_are_not_added_together(pg: Database) -> None:
     assert [type(error) for error in raised] == [CycleError]
 
 
-@pytest.fixture
-def server(url: str, tmp_path: Path) -> Iterator[RunningServer]:
-    """A server of each kind."""
-    with running_server(url, token="silo_races", files_dir=tmp_path / "files") as running:
-        yield running
-
-
-@pytest.fixture
-def api(server: RunningServer) -> Iterator[Api]:
-    """The admin."""
-    with Api(server.base_url, "silo_races") as caller:
-        yield caller
-
-
 def asked(api: Api, parent: str) -> dict[str, float]:
     """The open conflicts: part number → what CAD says."""
     found = api.get(bom(parent, "review"))["conflicts"]
@@ -169,23 +155,12 @@ def test_an_undo_does_not_close_a_ring(api: Api) -> None:
     assert api.get(bom(top)) == []
 
 
-def test_a_restore_does_not_close_a_ring(api: Api) -> None:
-    """As for the undo."""
-    top, sub = api.items(2)
-    api.good("POST", bom(top), {"child_part_number": sub})
-    there = api.get(bom(top, "history"))[0]["id"]
-    api.good("DELETE", bom(top, sub))
-    api.good("POST", bom(sub), {"child_part_number": top})
-    assert api.bad(409, "POST", bom(top, "restore"), {"change_id": there})["error"] == "cycle"
-
-
 @pytest.mark.parametrize("method", ["DELETE", "PUT", "PATCH", "POST"])
 def test_no_method_that_changes_goes_without_the_forms_secret(api: Api, method: str) -> None:
     """A session's cookie alone changes nothing, whichever the method."""
     parent, child = api.items(2)
     api.good("POST", bom(parent), {"child_part_number": child})
-    link = link_of(api, "admin")
-    cookie = api.as_(None).call("POST", link).headers["set-cookie"].split(";")[0]
+    cookie = enter(api, "admin").cookie
     path = {"DELETE": bom(parent, child), "PUT": bom(parent, child), "POST": "/api/items"}.get(
         method, f"/api/items/{parent}/properties"
     )

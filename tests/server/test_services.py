@@ -12,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from hunting import over
 from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import select, update
@@ -245,6 +246,7 @@ def test_a_bulk_update_changes_only_its_rows(db: Database) -> None:
     assert names[ids[15]] == ("x", None)
 
 
+@over("sqlite")
 def test_the_secret_of_a_form_is_given_again_for_a_minute(db: Database) -> None:
     """A repeat of the form is the same token; later, or after it was revoked, the secret stays unknown."""
     with db.write() as tx:
@@ -273,6 +275,7 @@ def test_the_secret_of_a_form_is_given_again_for_a_minute(db: Database) -> None:
         make(secret)
 
 
+@over("sqlite")
 def test_sessions_and_links_end(db: Database) -> None:
     """By the clock, and with their user: also where the rows are still there."""
 
@@ -309,6 +312,7 @@ def test_sessions_and_links_end(db: Database) -> None:
     assert actor_by_session(db, session.secret, "here") is None
 
 
+@over("sqlite")
 def test_a_failed_transaction_leaves_nothing(db: Database) -> None:
     """All or nothing, the item's event and number included."""
     name = uuid.uuid4().hex

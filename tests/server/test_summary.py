@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hunting import examples
+from hunting import examples, over
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from server_testing import Databases, merge_body
@@ -53,6 +53,7 @@ from silo_server.services.items import (
 from silo_server.settings import Settings
 from silo_server.values import Actor, LineState, Role
 
+pytestmark = over("sqlite")
 ASSEMBLIES, PARTS = 4, 4
 GAP = {"reason": "missing", "name": "Lid", "file": "Lid.FCStd", "object": "Body", "quantity": 1}
 

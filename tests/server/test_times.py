@@ -8,6 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from random import Random
 
+from hunting import over
+
 from silo_server.db.engine import Database
 from silo_server.run import prepare
 from silo_server.services.bom.history import change_at, list_changes, state_at
@@ -71,6 +73,7 @@ def test_changes_of_one_bom_by_many_writers(url: str) -> None:
     second.close()
 
 
+@over("sqlite")
 def test_changes_under_clocks_that_are_set_back(url: str) -> None:
     """Merges, edits, and changes of the item: each is later than the one before."""
     first = filled(url, wild(1))

@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 
 import psycopg
 import pytest
+from hunting import over
 from server_testing import Api, Databases, bom, run_alone, wait_until
 from sqlalchemy import make_url
 
@@ -90,6 +91,7 @@ def test_reads_and_health_go_on_while_writers_wait(url: str, tmp_path: Path) -> 
         assert api.call("PUT", f"/api/items/{parent}", {"name": "free again"}).status == 200
 
 
+@over("sqlite")
 def test_many_may_ask_for_the_health_at_once(db: Database, tmp_path: Path) -> None:
     """One look serves all who wait for it, while others begin the next."""
     probe = Probe(db, FileStore(tmp_path))
@@ -107,6 +109,7 @@ def test_many_may_ask_for_the_health_at_once(db: Database, tmp_path: Path) -> No
     probe.stop()
 
 
+@over("sqlite")
 def test_the_last_use_of_a_token_is_noted_when_it_can_be(db: Database) -> None:
     """Reading with a token needs no write; what could not be noted is noted later."""
     with db.read() as tx:
@@ -133,6 +136,7 @@ class Meanwhile(Database):
             self.then()
 
 
+@over("sqlite")
 def test_a_use_that_comes_while_others_are_written_down_is_noted_next(db: Database) -> None:
     """It is not taken for one of them."""
     busy = Meanwhile(db.settings)
@@ -145,6 +149,7 @@ def test_a_use_that_comes_while_others_are_written_down_is_noted_next(db: Databa
     busy.close()
 
 
+@over("sqlite")
 def test_what_no_request_waits_for_is_tried_again_after_any_error(
     db: Database, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

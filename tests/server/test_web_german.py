@@ -11,8 +11,6 @@ import pytest
 from server_testing import Api, bom, form_body, merge_body
 from web_visitor import ROLES, Visitor
 
-from silo_server.web.render import sentence
-
 VIEWER, EDITOR, ADMIN = ROLES
 # Words of English sentences that no German text has.
 ENGLISH = re.compile(
@@ -209,24 +207,3 @@ def test_a_table_that_cannot_be_imported_is_german(
             headers={"Cookie": editor.cookie, "Accept": "text/html", **headers},
         )
         assert english(page.body.decode()) == []
-
-
-def test_the_api_answers_in_english(api: Api) -> None:
-    """Machines compare it."""
-    answer = api.call(
-        "GET", "/api/items/NOPE", headers={"Accept-Language": "de", "Cookie": "silo_language=de"}
-    )
-    assert answer.json()["message"] == "item 'NOPE' does not exist on this server"
-
-
-@pytest.mark.parametrize(
-    ("text", "shown"),
-    [
-        ("nothing was chosen", "Nothing was chosen."),
-        ("a01-0001 is archived", "a01-0001 is archived."),
-        ("'bolt' is archived?", "'bolt' is archived?"),
-        ("", ""),
-    ],
-)
-def test_a_message_begins_with_a_capital_but_a_part_number_stays(text: str, shown: str) -> None:
-    assert sentence(text) == shown

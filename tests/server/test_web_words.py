@@ -168,10 +168,13 @@ def test_a_merge_has_its_counts() -> None:
 
 @pytest.mark.parametrize(
     ("message", "shown"),
-    [("", ""), ("no file", "No file."), ("No file.", "No file."), ("which one?", "Which one?")],
+    [
+        *[("", ""), ("no file", "No file."), ("No file.", "No file."), ("which one?", "Which one?")],
+        *[("a01-0001 is archived", "a01-0001 is archived."), ("'bolt' is archived?", "'bolt' is archived?")],
+    ],
 )
 def test_a_message_is_shown_as_a_sentence(message: str, shown: str) -> None:
-    """With a capital, and one end."""
+    """With a capital, but a part number or a name stays as it is; and one end."""
     assert sentence(message) == shown
 
 

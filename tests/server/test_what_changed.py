@@ -9,6 +9,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
+from hunting import over
 from large_boms import form_file
 from openpyxl import load_workbook
 from server_testing import Api, bom
@@ -164,6 +165,7 @@ def test_the_files_have_the_same_rows(
     assert visitors["viewer"].get(f"/items/{top}/changes?since=2026-13-99").status == 400
 
 
+@over("sqlite")
 def test_a_look_within_the_hour_is_the_same_look(db: Database) -> None:
     """The product page shows what changed since the visit before this one, not since the last reload."""
     with db.write() as tx:
