@@ -292,7 +292,7 @@ COMPRESSED_BYTES = 1400
 COMPRESSION = 5
 # A stream of events must not be held back, a file keeps its length and its ranges.
 _AS_IT_IS = re.compile(r"/(?:events|thumbnail|geometry|structure|file(?:/[0-9]+)?|export\.xlsx)$")
-UPLOAD_PATH = re.compile(r"/(?:api/)?items/[^/]+/file$")
+UPLOAD_PATH = re.compile(r"/(?:api/)?(?:items|documents)/[^/]+/file$")
 
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
