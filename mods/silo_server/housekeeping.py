@@ -25,7 +25,7 @@ import os
 import shutil
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
@@ -43,6 +43,7 @@ from prometheus_client import (
     generate_latest,
     multiprocess,
 )
+from prometheus_client.core import GaugeMetricFamily, Metric
 from sqlalchemy import ColumnElement, Table, delete, func, insert, select, text, update
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -180,24 +181,12 @@ def _old(
     return step
 
 
-def _now(tx: Tx) -> datetime:
-    return tx.at
-
-
 def _days(setting: str) -> Callable[[Tx], datetime | None]:
     def age(tx: Tx) -> datetime | None:
         days = getattr(tx.settings, setting)
         return tx.at - timedelta(days=days) if days else None
 
     return age
-
-
-def _attempts(tx: Tx) -> datetime:
-    return tx.at - timedelta(seconds=10 * tx.settings.login_window_seconds)
-
-
-def _places(tx: Tx) -> datetime:
-    return tx.at - timedelta(days=PLACE_DAYS)
 
 
 def _answers(tx: Tx) -> int:
@@ -266,11 +255,17 @@ def _models(tx: Tx) -> int:
 
 
 _STEPS: dict[str, Step] = {
-    "sessions": _old(sessions, "id_hash", "expires_at", _now),
-    "login links": _old(login_links, "token_hash", "expires_at", _now),
-    "login attempts": _old(login_attempts, "id", "at", _attempts, login_attempts.c.outcome != "proved"),
-    "places of logins": _old(login_attempts, "id", "at", _places),
-    "start tokens": _old(api_tokens, "id", "expires_at", _now, api_tokens.c.name == START_TOKEN),
+    "sessions": _old(sessions, "id_hash", "expires_at", lambda tx: tx.at),
+    "login links": _old(login_links, "token_hash", "expires_at", lambda tx: tx.at),
+    "login attempts": _old(
+        login_attempts,
+        "id",
+        "at",
+        lambda tx: tx.at - timedelta(seconds=10 * tx.settings.login_window_seconds),
+        login_attempts.c.outcome != "proved",
+    ),
+    "places of logins": _old(login_attempts, "id", "at", lambda tx: tx.at - timedelta(days=PLACE_DAYS)),
+    "start tokens": _old(api_tokens, "id", "expires_at", lambda tx: tx.at, api_tokens.c.name == START_TOKEN),
     "answers": _answers,
     "events": _events,
     "audit": _old(audit, "id", "at", _days("audit_days")),
@@ -440,26 +435,27 @@ class Metrics:
         with db.read() as tx:
             mode, run = mode_of(tx), last_run(tx)
             horizon, head = events.bounds(tx)
-        _gauge(now, "silo_read_only", "1 while the server takes no changes", float(mode != "normal"))
-        _gauge(now, "silo_events_kept", "Events in the log", float(head - horizon))
-        _gauge(now, "silo_event_newest_id", "Id of the newest event", float(head))
-        _gauge(now, "silo_files_free_bytes", "Free space on the disk of the uploads", files.free())
+        gauges: list[tuple[str, str, float]] = [
+            ("silo_read_only", "1 while the server takes no changes", mode != "normal"),
+            ("silo_events_kept", "Events in the log", head - horizon),
+            ("silo_event_newest_id", "Id of the newest event", head),
+            ("silo_files_free_bytes", "Free space on the disk of the uploads", files.free()),
+        ]
         path = db.settings.sqlite_path
         if path is not None:
-            _gauge(now, "silo_database_bytes", "Size of the SQLite database", float(path.stat().st_size))
             wal = path.with_name(path.name + "-wal")
             size = wal.stat().st_size if wal.exists() else 0
-            _gauge(now, "silo_database_wal_bytes", "Size of the SQLite write-ahead log", float(size))
+            gauges += [
+                ("silo_database_bytes", "Size of the SQLite database", path.stat().st_size),
+                ("silo_database_wal_bytes", "Size of the SQLite write-ahead log", size),
+            ]
         if run is not None:
-            _gauge(
-                now,
-                "silo_housekeeping_age_seconds",
-                "Since the last run",
-                max(0.0, db.clock().timestamp() - datetime.fromisoformat(run.at).timestamp()),
-            )
-            _gauge(
-                now, "silo_housekeeping_failed", "1 where it could not do all", float(run.problem is not None)
-            )
+            age = db.clock().timestamp() - datetime.fromisoformat(run.at).timestamp()
+            gauges += [
+                ("silo_housekeeping_age_seconds", "Since the last run", max(0.0, age)),
+                ("silo_housekeeping_failed", "1 where it could not do all", run.problem is not None),
+            ]
+        now.register(_Gauges(gauges))
         counted = self._registry
         if os.environ.get(SHARED):
             counted = CollectorRegistry()
@@ -503,11 +499,11 @@ def standing(db: Database, hub: Hub, files: FileStore, large_reads: Turnstile) -
     }
 
 
-def _gauge(registry: CollectorRegistry, name: str, text: str, value: float) -> None:
-    from prometheus_client.core import GaugeMetricFamily
+class _Gauges:
+    """Numbers of this moment: (name, text, value) each."""
 
-    class One:
-        def collect(self) -> list[GaugeMetricFamily]:
-            return [GaugeMetricFamily(name, text, value)]
+    def __init__(self, gauges: Sequence[tuple[str, str, float]]) -> None:
+        self._gauges = gauges
 
-    registry.register(One())
+    def collect(self) -> list[Metric]:
+        return [GaugeMetricFamily(name, text, float(value)) for name, text, value in self._gauges]

@@ -50,7 +50,6 @@ from silo_server.routes.models import (
     Text,
 )
 from silo_server.services.bom import history, imports, review, transfer, tree
-from silo_server.services.bom import review as service
 from silo_server.services.bom.frozen import changes_of
 from silo_server.services.bom.lines import (
     LineId,
@@ -74,15 +73,15 @@ from silo_server.services.bom.merge import (
     remember_refusal,
 )
 from silo_server.services.bom.review import told_quantities
-from silo_server.services.bom.summary import standing_alone, summary_of
+from silo_server.services.bom.summary import Summary, standing_alone, summary_of
 from silo_server.services.bom.transfer import View
 from silo_server.services.items import get_by_numbers, get_item
 from silo_server.services.revisions import clean_name
 from silo_server.settings import stamp, wire
 from silo_server.values import Item, LineState, dumps, to_wire
 
-router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
-several = APIRouter(prefix="/api", tags=["bom"])
+router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"], responses=READ_ERRORS)
+several = APIRouter(prefix="/api", tags=["bom"], responses=READ_ERRORS)
 
 Depth = Annotated[int, Query(ge=1, le=tree.MAX_DEPTH)]
 MERGE_BODY = {
@@ -97,7 +96,7 @@ MERGE_BODY = {
 }
 
 
-@router.get("", response_model=list[LineOut], responses=READ_ERRORS)
+@router.get("", response_model=list[LineOut])
 def get_bom(call: Viewer, part_number: str) -> Response:
     """Return the BOM lines of an item, one level. ``ETag`` is the version of the BOM, for ``If-Match``."""
     with call.read() as tx:
@@ -106,7 +105,7 @@ def get_bom(call: Viewer, part_number: str) -> Response:
     return json_answer(rows, headers={"ETag": etag_of(item.bom_version)})
 
 
-@several.post("/items/boms", response_model=BomsOut, responses=READ_ERRORS)
+@several.post("/items/boms", response_model=BomsOut)
 def get_boms(call: Viewer, body: NumbersBody) -> Response:
     """Return the BOM lines of many items, one level each; unknown items are absent. Changes nothing.
 
@@ -196,7 +195,7 @@ async def merge(call: Editor, part_number: str, expected: ExpectedVersion) -> Re
     return raw_json(outcome.answer, headers={"ETag": etag_of(outcome.version)})
 
 
-@router.get("/expanded", response_model=list[LineOut], responses=READ_ERRORS)
+@router.get("/expanded", response_model=list[LineOut])
 def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) -> Response:
     """Return the tree as rows, parents before their children, with the quantity per parent and in total."""
     with call.server.large_reads.enter():
@@ -206,16 +205,15 @@ def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) 
         return raw_json(render_expanded(tree.expand(graph, depth, call.server.settings.max_expanded_rows)))
 
 
-@router.get("/flat", responses=READ_ERRORS)
+@router.get("/flat")
 def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return the leaf parts with their quantities, multiplied down the tree and added up; 409 for a cycle."""
     with call.server.large_reads.enter(), call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
-        open_boms = summary_of(tx, graph.root).open.values()
+        summary = summary_of(tx, graph.root)
     return {
         "part_number": graph.root.part_number,
-        "incomplete": {bom.part_number: bom.incomplete for bom in open_boms if bom.incomplete},
-        "open": {bom.part_number: bom.questions for bom in open_boms if bom.questions},
+        **_open_to_wire(summary),
         "flat_bom": [
             {
                 "part_number": row.line.child_part_number,
@@ -233,7 +231,14 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
     }
 
 
-@router.get("/cost", responses=READ_ERRORS)
+def _open_to_wire(summary: Summary) -> dict[str, Any]:
+    return {
+        name: {bom.part_number: words for bom in summary.open.values() if (words := getattr(bom, of_bom))}
+        for name, of_bom in (("open", "questions"), ("incomplete", "incomplete"))
+    }
+
+
+@router.get("/cost")
 def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return the flat BOM × ``standard_cost``, per currency; ``missing`` names the parts without a cost."""
     with call.server.large_reads.enter(), call.read() as tx:
@@ -250,7 +255,7 @@ def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
     }
 
 
-@router.get("/mass", responses=READ_ERRORS)
+@router.get("/mass")
 def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return the mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names parts without one."""
     with call.server.large_reads.enter(), call.read() as tx:
@@ -267,7 +272,7 @@ def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
     }
 
 
-@router.get("/summary", responses=READ_ERRORS)
+@router.get("/summary")
 def get_summary(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return the summary of a product over all levels: what is open, mass, cost, counts, the last change.
 
@@ -280,8 +285,7 @@ def get_summary(call: Viewer, part_number: str) -> dict[str, Any]:
     costs = summary.worth.costs.items()
     return {
         "part_number": item.part_number,
-        "open": {bom.part_number: bom.questions for bom in summary.open.values() if bom.questions},
-        "incomplete": {bom.part_number: bom.incomplete for bom in summary.open.values() if bom.incomplete},
+        **_open_to_wire(summary),
         "questions": summary.questions,
         **to_wire(summary, "open", "worth", "as_part", "levels", "no_mass", "no_cost", "changed"),
         "levels": len(summary.levels),
@@ -297,7 +301,7 @@ def get_summary(call: Viewer, part_number: str) -> dict[str, Any]:
     }
 
 
-@router.get("/where-used", response_model=list[dict[str, Any]], responses=READ_ERRORS)
+@router.get("/where-used", response_model=list[dict[str, Any]])
 def get_where_used(
     call: Viewer,
     part_number: str,
@@ -406,7 +410,7 @@ def _members(value: Mapping[str, Any]) -> bytes:
     return pydantic_core.to_json(value)[1:-1]
 
 
-review_router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom review"])
+review_router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom review"], responses=READ_ERRORS)
 
 ChangeId = Annotated[int, Path(ge=0, le=2**62)]
 
@@ -419,7 +423,7 @@ class DecisionBody(RequestBody):
 
     child_part_number: Short = ""
     line_id: Short | None = None
-    action: service.ReviewAction
+    action: review.ReviewAction
     reason: Text | None = None
 
 
@@ -446,11 +450,11 @@ class UndoBody(RequestBody):
     change_id: models.ChangeId
 
 
-@review_router.get("/review", responses=READ_ERRORS)
+@review_router.get("/review")
 def get_review(call: Viewer, part_number: str) -> Response:
     """Return the open questions of a BOM: unreferenced lines, conflicts (both values), and the last merge."""
     with call.read() as tx:
-        open_lines = service.review(tx, part_number)
+        open_lines = review.review(tx, part_number)
         open_below = summary_of(tx, open_lines.parent).told(open_lines.parent.id)
     name = open_lines.parent.part_number
     body = {
@@ -484,13 +488,13 @@ def get_review(call: Viewer, part_number: str) -> Response:
 )
 def resolve(call: Editor, part_number: str, body: ResolveBody, expected: ExpectedVersion) -> Response:
     """Decide on lines: ``remove``, ``keep`` (as intentional), ``take_cad``, ``keep_silo``."""
-    decisions = [service.Decision(d.child_part_number, d.action, d.reason, d.line_id) for d in body.decisions]
+    decisions = [review.Decision(d.child_part_number, d.action, d.reason, d.line_id) for d in body.decisions]
     with call.write() as tx:
-        change_id, version = service.resolve(tx, part_number, decisions, expected)
+        change_id, version = review.resolve(tx, part_number, decisions, expected)
         return _changed(change_id, version)
 
 
-@review_router.get("/history", responses=READ_ERRORS)
+@review_router.get("/history")
 def list_history(
     call: Viewer, part_number: str, limit: Annotated[int, Query(ge=1, le=500)] = 50, before: PageFrom = None
 ) -> list[dict[str, Any]]:
@@ -500,7 +504,7 @@ def list_history(
     return [change_to_wire(change) for change in changes]
 
 
-@review_router.get("/history/{change_id}", responses=READ_ERRORS)
+@review_router.get("/history/{change_id}")
 def get_change(call: Viewer, part_number: str, change_id: ChangeId) -> dict[str, Any]:
     """Return one change with its lines before and after."""
     with call.read() as tx:
@@ -519,7 +523,7 @@ def get_change(call: Viewer, part_number: str, change_id: ChangeId) -> dict[str,
     return {**change_to_wire(change), "lines": rows}
 
 
-@review_router.get("/history/{change_id}/bom", responses=READ_ERRORS)
+@review_router.get("/history/{change_id}/bom")
 def get_past_bom(call: Viewer, part_number: str, change_id: ChangeId) -> list[dict[str, Any]]:
     """Return the BOM as this change left it; 0 is the empty BOM before the first change."""
     with call.read() as tx:
@@ -539,7 +543,7 @@ def get_past_bom(call: Viewer, part_number: str, change_id: ChangeId) -> list[di
 Point = Annotated[str, Query(max_length=40), WithJsonSchema(context.POINT)]
 
 
-@review_router.get("/compare", responses=READ_ERRORS)
+@review_router.get("/compare")
 def compare(
     call: Viewer,
     part_number: str,
@@ -631,16 +635,19 @@ def _changed(change_id: int, version: int) -> Response:
     return json_answer({"change_id": change_id, "version": version}, headers={"ETag": etag_of(version)})
 
 
-transfer_router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom transfer"])
+transfer_router = APIRouter(
+    prefix="/api/items/{part_number}/bom", tags=["bom transfer"], responses=READ_ERRORS
+)
 
 SPOOL_BYTES = 1024 * 1024
 CHUNK = 64 * 1024
+CSV = "text/csv; charset=utf-8; header=present"
 XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
 
 
 def content_of(media_type: str) -> dict[int | str, dict[str, Any]]:
     """Return the documented answers of a route that sends a file."""
-    return {**READ_ERRORS, 200: {"content": {media_type: {}}, "description": "The file"}}
+    return {200: {"content": {media_type: {}}, "description": "The file"}}
 
 
 IMPORT_BODY = {
@@ -687,14 +694,8 @@ def export_csv(call: Viewer, part_number: str, wanted: As, semicolons: bool = Fa
     ``pieces``: totals for so many pieces; ``q``, ``type``: only the lines that match. ``semicolons``: for an
     Excel that expects 1,5 instead of 1.5.
     """
-    return _exported(
-        call,
-        part_number,
-        wanted,
-        partial(transfer.to_csv, semicolons=semicolons),
-        "text/csv; charset=utf-8; header=present",
-        "csv",
-    )
+    write = partial(transfer.to_csv, semicolons=semicolons)
+    return _exported(call, part_number, wanted, write, CSV, "csv")
 
 
 @transfer_router.get("/export.xlsx", response_class=Response, responses=content_of(XLSX))
@@ -704,7 +705,7 @@ def export_xlsx(call: Viewer, part_number: str, wanted: As, pictures: bool = Fal
     return _exported(call, part_number, wanted, partial(transfer.to_xlsx, picture=shown), XLSX, "xlsx")
 
 
-@transfer_router.get("/export.json", responses=READ_ERRORS)
+@transfer_router.get("/export.json")
 def export_json(call: Viewer, part_number: str, wanted: As) -> Response:
     """Return the BOM as JSON."""
     return _exported(call, part_number, wanted, transfer.to_json, "application/json", "json")
@@ -715,7 +716,7 @@ Moment = Annotated[str, Query(max_length=40), WithJsonSchema({"anyOf": [context.
 Since = Annotated[str, Query(alias="from", min_length=1, max_length=40), WithJsonSchema(context.MOMENT)]
 
 
-@transfer_router.get("/changes", responses=READ_ERRORS)
+@transfer_router.get("/changes")
 def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -> dict[str, Any]:
     """Return the changes in a product over all levels: lines, quantities, data and files of its parts.
 
@@ -737,7 +738,7 @@ def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -
 def changes_csv(call: Viewer, part_number: str, since: Since, to: Moment = "") -> Response:
     """Return the changes in a product as CSV."""
     make = partial(transfer.export_changes, part_number=part_number, since=since, until=to)
-    return file_of(call, make, transfer.to_csv, "text/csv; charset=utf-8; header=present", "changes.csv")
+    return file_of(call, make, transfer.to_csv, CSV, "changes.csv")
 
 
 @transfer_router.get("/changes.xlsx", response_class=Response, responses=content_of(XLSX))

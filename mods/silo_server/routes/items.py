@@ -8,14 +8,13 @@ what is sent to either address arrives at both.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 from urllib.parse import quote
 
 import anyio.to_thread
-from fastapi import APIRouter, Path, Query
+from fastapi import APIRouter, Depends, Path, Query
 from pydantic import Field, TypeAdapter, ValidationError
 from starlette.datastructures import UploadFile
 from starlette.responses import FileResponse, Response
@@ -23,6 +22,7 @@ from starlette.responses import FileResponse, Response
 from silo.api import wire
 from silo.api.wire import FactSource, HeldItem, ItemTexts, LinkedFile
 from silo.bom.errors import NotFoundError, RejectedError
+from silo.bom.numbers import whole_number
 from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer
 from silo_server.routes import context
 from silo_server.routes.context import (
@@ -55,7 +55,6 @@ from silo_server.routes.models import (
 )
 from silo_server.schema import describe, describe_form, find_schema, schemas
 from silo_server.services import items, revisions, scene, search
-from silo_server.services import items as service
 from silo_server.services.bom.merge import (
     NEVER,
     LastSync,
@@ -65,12 +64,11 @@ from silo_server.services.bom.merge import (
     text_problem,
 )
 from silo_server.services.bom.tree import where_used
-from silo_server.services.items import preview_number
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin, revision_to_wire
 from silo_server.values import Document, Item, Revision, to_wire
 
-router = APIRouter(prefix="/api", tags=["items"])
+router = APIRouter(prefix="/api", tags=["items"], responses=READ_ERRORS)
 
 PATCH_BODY = {
     "requestBody": {
@@ -87,7 +85,7 @@ Offset = Annotated[int, Query(ge=0, le=10_000_000)]
 Word = Annotated[Short, Query()]
 
 
-@router.get("/items", response_model=list[ItemOut], responses=READ_ERRORS)
+@router.get("/items", response_model=list[ItemOut])
 def list_items(
     call: Viewer,
     search: Word = "",
@@ -102,7 +100,7 @@ def list_items(
 
     ``X-Total-Count`` is the number of all items that match.
     """
-    query = service.ItemQuery(
+    query = items.ItemQuery(
         search=search or q,
         item_type=item_type,
         category=category,
@@ -111,11 +109,11 @@ def list_items(
         offset=offset,
     )
     with call.read() as tx:
-        items_of_page, total = service.list_items(tx, query)
+        items_of_page, total = items.list_items(tx, query)
     return json_answer([item_to_wire(item) for item in items_of_page], headers={"X-Total-Count": str(total)})
 
 
-@router.get("/items/search", response_model=list[ItemOut], responses=READ_ERRORS)
+@router.get("/items/search", response_model=list[ItemOut])
 def search_items(
     call: Viewer, q: Word = "", item_type: Word | None = None, limit: Limit = 20, offset: Offset = 0
 ) -> Response:
@@ -131,7 +129,7 @@ def create_item(call: Editor, body: NewItemBody) -> Response:
 
     409 for a different request with a known ``id``.
     """
-    new = service.NewItem(
+    new = items.NewItem(
         schema=body.schema_name,
         uuid=body.id,
         key=idempotency_key(call.request),
@@ -139,29 +137,29 @@ def create_item(call: Editor, body: NewItemBody) -> Response:
         **body.model_dump(exclude={"schema_name", "id", *_TEXTS}, exclude_none=True),
     )
     with call.write() as tx:
-        item, made = service.create_item(tx, new)
+        item, made = items.create_item(tx, new)
         return _answer(item, 201 if made else 200)
 
 
-@router.get("/items/by-uuid/{uuid}", response_model=ItemOut, responses=READ_ERRORS)
+@router.get("/items/by-uuid/{uuid}", response_model=ItemOut)
 def get_item_by_uuid(call: Viewer, uuid: Uuid) -> Response:
     """Return the item with this UUID; 404 if there is none or it is archived, 400 for no UUID."""
     with call.read() as tx:
-        item = service.get_by_uuid(tx, uuid)
+        item = items.get_by_uuid(tx, uuid)
         last = last_sync(tx, item)
     return _answer(item, last=last)
 
 
-@router.post("/items/by-uuid", response_model=ItemsOut, responses=READ_ERRORS)
+@router.post("/items/by-uuid", response_model=ItemsOut)
 def get_items_by_uuid(call: Viewer, body: UuidsBody) -> Response:
     """Return the items with these UUIDs; unknown ones are absent. Changes nothing, so a viewer may ask."""
     with call.read() as tx:
-        items_found = service.get_by_uuids(tx, body.uuids)
+        items_found = items.get_by_uuids(tx, body.uuids)
         last = last_syncs(tx, [item.id for item in items_found])
     return json_answer({"items": [item_to_wire(item, last.get(item.id, NEVER)) for item in items_found]})
 
 
-@router.post("/items/look-alikes", response_model=LookAlikesOut, responses=READ_ERRORS)
+@router.post("/items/look-alikes", response_model=LookAlikesOut)
 def find_look_alikes(call: Viewer, body: LookAlikesBody) -> Response:
     """Find the items with the name or the very file of a component, for many components. Changes nothing."""
     with call.read() as tx:
@@ -169,11 +167,11 @@ def find_look_alikes(call: Viewer, body: LookAlikesBody) -> Response:
     return json_answer({"look_alikes": [[asdict(like) for like in likes] for likes in matches]})
 
 
-@router.get("/items/{part_number}", response_model=ItemOut, responses=READ_ERRORS)
+@router.get("/items/{part_number}", response_model=ItemOut)
 def get_item(call: Viewer, part_number: str) -> Response:
     """Return one item."""
     with call.read() as tx:
-        item = service.get_item(tx, part_number)
+        item = items.get_item(tx, part_number)
         last = last_sync(tx, item)
     return _answer(item, last=last)
 
@@ -185,9 +183,9 @@ def change_item(call: Editor, part_number: str, body: ItemChangeBody, expected: 
     ``If-Match`` with the item's ``ETag``: 412 if somebody else changed the item first.
     """
     texts = body.model_dump(include=_TEXTS)
-    change = service.ItemChange(texts=texts, **body.model_dump(exclude=_TEXTS))
+    change = items.ItemChange(texts=texts, **body.model_dump(exclude=_TEXTS))
     with call.write() as tx:
-        return _answer(service.change_item(tx, part_number, change, expected))
+        return _answer(items.change_item(tx, part_number, change, expected))
 
 
 @router.patch(
@@ -213,7 +211,7 @@ async def patch_properties(
 
     def work() -> Response:
         with call.write() as tx:
-            return _answer(service.patch_properties(tx, part_number, patch, comment, expected, source))
+            return _answer(items.patch_properties(tx, part_number, patch, comment, expected, source))
 
     return await anyio.to_thread.run_sync(work)
 
@@ -226,8 +224,8 @@ def archive_item(call: Editor, part_number: str, expected: ExpectedVersion) -> R
     (part numbers, encoded as in a path, with commas between them).
     """
     with call.write() as tx:
-        used, uses = where_used(tx, service.get_item(tx, part_number), limit=20)
-        service.archive_item(tx, part_number, expected)
+        used, uses = where_used(tx, items.get_item(tx, part_number), limit=20)
+        items.archive_item(tx, part_number, expected)
     where = ",".join(quote(usage.parent.part_number, safe="") for usage in used)
     return Response(status_code=204, headers={"X-Total-Count": str(uses), "X-Used-In": where})
 
@@ -236,30 +234,30 @@ def archive_item(call: Editor, part_number: str, expected: ExpectedVersion) -> R
 def unarchive_item(call: Editor, part_number: str) -> Response:
     """Bring an archived item back."""
     with call.write() as tx:
-        return _answer(service.unarchive_item(tx, part_number))
+        return _answer(items.unarchive_item(tx, part_number))
 
 
-@router.post("/generate-part-number", response_model=NumberOut, responses=READ_ERRORS)
+@router.post("/generate-part-number", response_model=NumberOut)
 def generate_part_number(call: Editor, body: NumberBody) -> Response:
     """Return the number that the next item of the category would get; the number stays free."""
     with call.read() as tx:
-        number = preview_number(tx, body.schema_name, body.category)
+        number = items.preview_number(tx, body.schema_name, body.category)
     return json_answer({"part_number": number})
 
 
-@router.get("/schemas", responses=READ_ERRORS)
+@router.get("/schemas")
 def list_schemas(call: Viewer) -> list[dict[str, Any]]:
     """Return all part-number schemas."""
     return [describe(schema) for schema in schemas().values()]
 
 
-@router.get("/schemas/{name}", responses=READ_ERRORS)
+@router.get("/schemas/{name}")
 def get_schema(call: Viewer, name: str) -> dict[str, Any]:
     """Return a part-number schema: its segments with their values."""
     return describe(find_schema(name))
 
 
-@router.get("/schemas/{name}/form", responses=READ_ERRORS)
+@router.get("/schemas/{name}/form")
 def get_schema_form(call: Viewer, name: str) -> dict[str, Any]:
     """Return the form descriptor for new items."""
     return describe_form(find_schema(name))
@@ -277,7 +275,7 @@ def _answer(item: Item, status: int = 200, last: LastSync | None = None) -> Resp
     return json_answer(item_to_wire(item, last), status, {"ETag": etag_of(item.version)})
 
 
-revisions_router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"])
+revisions_router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"], responses=READ_ERRORS)
 
 # A file is handed out as a thing to keep, never as something a browser would run or show.
 DOWNLOAD_HEADERS = {
@@ -332,35 +330,49 @@ UPLOAD = {
 }
 
 
-@revisions_router.get("/revisions", response_model=list[RevisionOut], responses=READ_ERRORS)
-def list_revisions(
-    call: Viewer,
-    part_number: str,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-    before: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
-    after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
-    offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
-) -> Response:
+@dataclass(frozen=True)
+class RevisionsAsked:
+    """Which revisions: those above ``after`` and below ``before``, without the newest ``offset`` of them."""
+
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100
+    before: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None
+    after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0
+    offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0
+
+
+Asked = Annotated[RevisionsAsked, Depends()]
+
+
+@revisions_router.get("/revisions", response_model=list[RevisionOut])
+def list_revisions(call: Viewer, part_number: str, asked: Asked) -> Response:
     """Return revisions of an item, newest first: those above ``after`` and below ``before``.
 
     ``X-Total-Count`` is the number of those above ``after``.
     """
+    return _revisions(call, numbered(part_number), asked)
+
+
+def _revisions(call: Call, find: Find, asked: RevisionsAsked) -> Response:
     with call.read() as tx:
-        item = items.get_item(tx, part_number)
+        of = find(tx, False)
         revisions_of_page, total = revisions.list_revisions(
-            tx, item, limit, before=before, after=after, skip=offset
+            tx, of, asked.limit, before=asked.before, after=asked.after, skip=asked.offset
         )
-    rows = [revision_to_wire(item, revision) for revision in revisions_of_page]
+    rows = [revision_to_wire(of, revision) for revision in revisions_of_page]
     return json_answer(rows, headers={"X-Total-Count": str(total)})
 
 
-@revisions_router.get("/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
+@revisions_router.get("/revisions/{number}", response_model=RevisionOut)
 def get_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Response:
     """Return one revision, with the files that its file links to."""
+    return _revision(call, numbered(part_number), number)
+
+
+def _revision(call: Call, find: Find, number: int) -> Response:
     with call.read() as tx:
-        item = items.get_item(tx, part_number)
-        revision = revisions.get_revision(tx, item, number)
-    return json_answer(revision_to_wire(item, revision, links=True))
+        of = find(tx, False)
+        revision = revisions.get_revision(tx, of, number)
+    return json_answer(revision_to_wire(of, revision, links=True))
 
 
 @revisions_router.post("/revisions", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS)
@@ -425,26 +437,22 @@ async def receive(call: Call, find: Find) -> Response:
         return await anyio.to_thread.run_sync(work)
 
 
-@revisions_router.get("/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
+@revisions_router.get("/file", response_class=Response, responses=BINARY)
 def download_newest(call: Viewer, part_number: str) -> Response:
     """Send the newest file."""
-    with call.read() as tx:
-        revision = revisions.newest_file(tx, items.get_item(tx, part_number))
-    return download(call, revision)
+    return _download(call, numbered(part_number))
 
 
-@revisions_router.get("/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
+@revisions_router.get("/file/{number}", response_class=Response, responses=BINARY)
 def download_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Response:
     """Send the file of one revision."""
-    with call.read() as tx:
-        revision = revisions.get_revision(tx, items.get_item(tx, part_number), number)
-    return download(call, revision)
+    return _download(call, numbered(part_number), number)
 
 
 @revisions_router.get(
     "/thumbnail",
     response_class=Response,
-    responses={**READ_ERRORS, 200: {"content": {"image/png": {}}, "description": "The picture"}},
+    responses={200: {"content": {"image/png": {}}, "description": "The picture"}},
 )
 def thumbnail(call: Viewer, part_number: str, key: Annotated[str, Query(max_length=64)] = "") -> Response:
     """Send the picture of the newest file that has one.
@@ -525,9 +533,10 @@ def store_file(
 def _base_revision(raw: object) -> int | None:
     if raw is None or raw == "":
         return None
-    if not (isinstance(raw, str) and re.fullmatch("[0-9]{1,7}", raw) and int(raw) <= 1_000_000):
+    number = whole_number(raw, 7) if isinstance(raw, str) else None
+    if number is None or number > 1_000_000:
         raise RejectedError("base_revision: wanted the number of a revision, or 0 where there was none")
-    return int(raw)
+    return number
 
 
 def _path(raw: object) -> str | None:
@@ -566,8 +575,11 @@ def _properties(raw: str | None) -> dict[str, Any] | None:
     return value
 
 
-def download(call: Call, revision: Revision) -> Response:
-    """Send the file of a revision. Raises NotFoundError."""
+def _download(call: Call, find: Find, number: int | None = None) -> Response:
+    """Send the file of a revision, or the newest file. Raises NotFoundError."""
+    with call.read() as tx:
+        of = find(tx, False)
+        revision = revisions.newest_file(tx, of) if number is None else revisions.get_revision(tx, of, number)
     if revision.file_checksum is None or revision.file_name is None:
         raise NotFoundError(f"revision {revision.revision_number} has no file")
     etag = f'"{revision.file_checksum}"'
@@ -583,7 +595,7 @@ def download(call: Call, revision: Revision) -> Response:
     )
 
 
-by_uuid = APIRouter(prefix="/api", tags=["documents"])
+by_uuid = APIRouter(prefix="/api", tags=["documents"], responses=READ_ERRORS)
 
 
 def document_at(uuid: str) -> Find:
@@ -607,7 +619,7 @@ def document_at(uuid: str) -> Find:
     return find
 
 
-@by_uuid.post("/documents/by-uuid", response_model=DocumentsOut, responses=READ_ERRORS)
+@by_uuid.post("/documents/by-uuid", response_model=DocumentsOut)
 def get_documents(call: Viewer, body: UuidsBody) -> Response:
     """Return the documents with these UUIDs; unknown ones are absent. Changes nothing: a viewer may ask."""
     with call.read() as tx:
@@ -615,7 +627,7 @@ def get_documents(call: Viewer, body: UuidsBody) -> Response:
     return json_answer({"documents": [to_wire(document) for document in documents]})
 
 
-@by_uuid.get("/items/{part_number}/documents", response_model=DocumentsOut, responses=READ_ERRORS)
+@by_uuid.get("/items/{part_number}/documents", response_model=DocumentsOut)
 def documents_of(call: Viewer, part_number: str) -> Response:
     """Return the documents that hold an item: its own file, and files of several parts that contain it."""
     with call.read() as tx:
@@ -623,7 +635,7 @@ def documents_of(call: Viewer, part_number: str) -> Response:
     return json_answer({"documents": [to_wire(document) for document in documents]})
 
 
-@by_uuid.get("/documents/{uuid}", response_model=wire.Document, responses=READ_ERRORS)
+@by_uuid.get("/documents/{uuid}", response_model=wire.Document)
 def get_document(call: Viewer, uuid: Uuid) -> Response:
     """Return one document, the documents that it links to, and those that link to it."""
     with call.read() as tx:
@@ -646,32 +658,20 @@ def told_of(tx: Tx, uuid: str) -> dict[str, Any]:
     return {**to_wire(now[0]), "links": newest.links, **others}
 
 
-@by_uuid.get("/documents/{uuid}/revisions", response_model=list[RevisionOut], responses=READ_ERRORS)
-def list_document_revisions(
-    call: Viewer,
-    uuid: Uuid,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-    before: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
-    after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
-    offset: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
-) -> Response:
+def _document(uuid: str) -> Find:
+    return lambda tx, _lock: revisions.get_document(tx, items.normal_uuid(uuid))
+
+
+@by_uuid.get("/documents/{uuid}/revisions", response_model=list[RevisionOut])
+def list_document_revisions(call: Viewer, uuid: Uuid, asked: Asked) -> Response:
     """Return the revisions of a document, newest first; the parameters are those of an item's revisions."""
-    with call.read() as tx:
-        of = revisions.get_document(tx, items.normal_uuid(uuid))
-        found_revisions, total = revisions.list_revisions(
-            tx, of, limit, before=before, after=after, skip=offset
-        )
-    rows = [revision_to_wire(of, revision) for revision in found_revisions]
-    return json_answer(rows, headers={"X-Total-Count": str(total)})
+    return _revisions(call, _document(uuid), asked)
 
 
-@by_uuid.get("/documents/{uuid}/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
+@by_uuid.get("/documents/{uuid}/revisions/{number}", response_model=RevisionOut)
 def get_document_revision(call: Viewer, uuid: Uuid, number: RevisionNumber) -> Response:
     """Return one revision, with the files that its file links to."""
-    with call.read() as tx:
-        of = revisions.get_document(tx, items.normal_uuid(uuid))
-        revision = revisions.get_revision(tx, of, number)
-    return json_answer(revision_to_wire(of, revision, links=True))
+    return _revision(call, _document(uuid), number)
 
 
 @by_uuid.post(
@@ -689,17 +689,13 @@ async def upload_document_file(call: Editor, uuid: Uuid) -> Response:
     return await receive(call, document_at(uuid))
 
 
-@by_uuid.get("/documents/{uuid}/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
+@by_uuid.get("/documents/{uuid}/file", response_class=Response, responses=BINARY)
 def download_newest_of_document(call: Viewer, uuid: Uuid) -> Response:
     """Send the newest file."""
-    with call.read() as tx:
-        revision = revisions.newest_file(tx, revisions.get_document(tx, items.normal_uuid(uuid)))
-    return download(call, revision)
+    return _download(call, _document(uuid))
 
 
-@by_uuid.get("/documents/{uuid}/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
+@by_uuid.get("/documents/{uuid}/file/{number}", response_class=Response, responses=BINARY)
 def download_revision_of_document(call: Viewer, uuid: Uuid, number: RevisionNumber) -> Response:
     """Send the file of one revision."""
-    with call.read() as tx:
-        revision = revisions.get_revision(tx, revisions.get_document(tx, items.normal_uuid(uuid)), number)
-    return download(call, revision)
+    return _download(call, _document(uuid), number)

@@ -17,7 +17,7 @@ from silo.bom.errors import RejectedError
 from silo.bom.numbers import LONGEST, as_decimal, read_number
 from silo_server.db.engine import Tx
 from silo_server.routes import context
-from silo_server.routes.bom import IMPORT_BODY, XLSX, content_of, file_of, uploaded
+from silo_server.routes.bom import CSV, IMPORT_BODY, XLSX, content_of, file_of, uploaded
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
@@ -37,7 +37,7 @@ from silo_server.services.orders import NewOrder, OrderRequest, OrderRow, Record
 from silo_server.services.suppliers import decimal_text
 from silo_server.values import to_wire
 
-router = APIRouter(prefix="/api", tags=["orders"])
+router = APIRouter(prefix="/api", tags=["orders"], responses=READ_ERRORS)
 
 
 def _exact(value: object) -> object:
@@ -113,7 +113,7 @@ class RatesBody(RequestBody):
     )
 
 
-@router.get("/items/{part_number}/suppliers", responses=READ_ERRORS)
+@router.get("/items/{part_number}/suppliers")
 def get_suppliers(call: Viewer, part_number: str) -> Response:
     """Return the supplier parts of an item; ``ETag`` is the version of the list, for ``If-Match``."""
     with call.read() as tx:
@@ -157,10 +157,7 @@ async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = Fal
     data, _ = await uploaded(call.request)
 
     def work() -> Response:
-        table = imports.as_csv(data, suppliers.TABLE)
-        records = imports.read_csv(table, call.server.settings.max_merge_entries, of=suppliers.TABLE)
-        layout = imports.guess_of(table, suppliers.TABLE)
-        assert layout is not None  # the rows were read with it
+        records, layout = records_of(call, imports.as_csv(data, suppliers.TABLE))
         with call.read() if dry_run else call.write() as tx:
             plan = (suppliers.plan_suppliers if dry_run else suppliers.apply_suppliers)(tx, records, layout)
             rows = [
@@ -176,6 +173,16 @@ async def import_suppliers(call: Editor, dry_run: Annotated[bool, Query()] = Fal
             return json_answer({"dry_run": dry_run, "items": rows})
 
     return await anyio.to_thread.run_sync(work)
+
+
+def records_of(
+    call: Call, table: bytes, layout: imports.Layout | None = None
+) -> tuple[list[imports.Record], imports.Layout]:
+    """Read a table of supplier parts; return its rows, and the layout that they were read with."""
+    records = imports.read_csv(table, call.server.settings.max_merge_entries, layout, suppliers.TABLE)
+    read_as = layout or imports.guess_of(table, suppliers.TABLE)
+    assert read_as is not None  # the rows were read with it
+    return records, read_as
 
 
 def asked_of(
@@ -201,7 +208,7 @@ Supplier = Annotated[str | None, Query(max_length=200)]
 Kind = Annotated[str, Query(pattern="^(bought|made|unsaid)$")]
 
 
-@router.get("/items/{part_number}/order", responses=READ_ERRORS)
+@router.get("/items/{part_number}/order")
 def get_order(call: Viewer, part_number: str, asked: AskedFor) -> dict[str, Any]:
     """Return what to order for so many pieces: bought parts with prices, made parts, and undecided ones.
 
@@ -258,9 +265,7 @@ def order_csv(
 ) -> Response:
     """Return the parts of one kind as CSV; with ``supplier`` only those from this supplier."""
     write = partial(transfer.to_csv, semicolons=semicolons)
-    return _exported(
-        call, part_number, asked, kind, supplier, write, "text/csv; charset=utf-8; header=present"
-    )
+    return _exported(call, part_number, asked, kind, supplier, write, CSV)
 
 
 @router.get("/items/{part_number}/order.xlsx", response_class=Response, responses=content_of(XLSX))
@@ -282,7 +287,7 @@ def _exported(
     return file_of(call, make, write, media, f"order-{name}.{end}")
 
 
-@router.get("/items/{part_number}/orders", responses=READ_ERRORS)
+@router.get("/items/{part_number}/orders")
 def get_orders(call: Viewer, part_number: str) -> dict[str, Any]:
     """Return what was ordered for a product, newest first."""
     with call.read() as tx:
@@ -318,7 +323,7 @@ def _recorded_to_wire(recorded: Recorded, part_number: str) -> dict[str, Any]:
     return {"part_number": part_number, **to_wire(recorded, "product_id", "item_id")}
 
 
-@router.get("/rates", responses=READ_ERRORS)
+@router.get("/rates")
 def get_rates(call: Viewer) -> dict[str, Any]:
     """Return the site's currency, and how much of it one unit of each other currency is worth."""
     with call.read() as tx:

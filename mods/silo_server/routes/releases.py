@@ -19,7 +19,7 @@ from silo_server.services.items import get_item
 from silo_server.services.releases import Release
 from silo_server.values import to_wire
 
-router = APIRouter(prefix="/api/items/{part_number}/releases", tags=["releases"])
+router = APIRouter(prefix="/api/items/{part_number}/releases", tags=["releases"], responses=READ_ERRORS)
 
 
 class SubmitBody(RequestBody):
@@ -66,7 +66,7 @@ def release_to_wire(tx: Tx, release: Release, *, whole: bool = False) -> dict[st
     return release_json
 
 
-@router.get("", response_model=ReleasesOut, responses=READ_ERRORS)
+@router.get("", response_model=ReleasesOut)
 def list_releases(call: Viewer, part_number: str) -> Response:
     """Return all revisions of a product: in review, released, obsolete, rejected or withdrawn."""
     with call.read() as tx:
@@ -91,7 +91,7 @@ def frozen_now(call: Call, part_number: str) -> releases.FrozenProduct:
         return frozen.freeze(tx, get_item(tx, part_number))
 
 
-@router.get("/{label}", response_model=wire.Release, responses=READ_ERRORS)
+@router.get("/{label}", response_model=wire.Release)
 def get_release(call: Viewer, part_number: str, label: str) -> Response:
     """Return one revision, with all files of the product as they were frozen."""
     with call.read() as tx:

@@ -17,7 +17,7 @@ from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Call, Editor, 
 from silo_server.routes.models import RequestBody
 from silo_server.services import items, scene
 
-router = APIRouter(prefix="/api", tags=["models"])
+router = APIRouter(prefix="/api", tags=["models"], responses=READ_ERRORS)
 
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Checksum = Annotated[str, Path(pattern="^[0-9a-f]{64}$")]
@@ -31,7 +31,7 @@ class ContentsBody(RequestBody):
 
 def _binary(kind: str) -> dict[int | str, dict[str, Any]]:
     media = {"content": {kind: {}}, "description": "As it was sent, packed with gzip"}
-    return {**READ_ERRORS, 200: media, 304: {"description": "Still what If-None-Match names"}}
+    return {200: media, 304: {"description": "Still what If-None-Match names"}}
 
 
 def _sent(kind: str, schema: context.Schema) -> context.Schema:
@@ -46,7 +46,7 @@ GLB, JSON = "model/gltf-binary", "application/json"
 _BYTES = {"type": "string", "format": "binary"}
 
 
-@router.post("/models/missing", response_model=ContentsBody, responses=READ_ERRORS)
+@router.post("/models/missing", response_model=ContentsBody)
 def missing(call: Viewer, body: ContentsBody) -> Response:
     """Return which of these files of revisions have no geometry or no structure yet."""
     with call.read() as tx:

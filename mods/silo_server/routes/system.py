@@ -34,6 +34,7 @@ from silo_server.routes.context import (
     SESSION_COOKIE,
     WRITE_ERRORS,
     Admin,
+    Call,
     PageFrom,
     ServerDep,
     Viewer,
@@ -305,11 +306,16 @@ def create_token(call: Viewer, body: TokenBody) -> dict[str, Any]:
 @auth_router.delete("/auth/tokens/{token_id}", status_code=204, responses=WRITE_ERRORS)
 def revoke_token(call: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]) -> Response:
     """Revoke a token: one's own, or anybody's for an admin."""
+    revoke(call, token_id)
+    return Response(status_code=204)
+
+
+def revoke(call: Call, token_id: int) -> None:
+    """Revoke a token of the caller's own, or anybody's for an admin."""
     access.check_may_change(call.actor)
     owner = None if call.actor.role is Role.ADMIN else call.actor.own_id
     with call.write(even_when_read_only=True) as tx:
         access.revoke_token(tx, token_id, owner)
-    return Response(status_code=204)
 
 
 @auth_router.get("/users", responses=READ_ERRORS)
@@ -340,12 +346,16 @@ def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, A
 @auth_router.post("/users/{username}/login-link", status_code=201, responses=WRITE_ERRORS)
 def create_login_link(call: Admin, username: str) -> dict[str, Any]:
     """Make a link that lets this user in once; for a new colleague or a forgotten password."""
+    path, public = login_path(call, username), call.server.settings.public_url
+    return {"path": path, "url": f"{public}{path}" if public else None}
+
+
+def login_path(call: Call, username: str) -> str:
+    """Make a login link for a user; return its path."""
     with call.write(even_when_read_only=True) as tx:
         secret = access.create_login_link(tx, username)
         access.note(tx, "login_link.created", username)
-        path = f"/login/link/{secret}"
-        public = call.server.settings.public_url
-        return {"path": path, "url": f"{public}{path}" if public else None}
+    return f"/login/link/{secret}"
 
 
 @auth_router.get("/admin/audit", responses=READ_ERRORS)

@@ -36,7 +36,7 @@ from silo_server.routes.context import (
     form_of,
     server_of,
 )
-from silo_server.routes.system import set_session_cookie
+from silo_server.routes.system import login_path, revoke, set_session_cookie
 from silo_server.services import access
 from silo_server.settings import TooManyAttemptsError
 from silo_server.values import Actor, Role, Scope
@@ -330,11 +330,8 @@ def change_user(call: Administrator, username: str, form: Form) -> Response:
 @router.post("/users/{username}/login-link")
 def create_login_link(call: Administrator, username: str) -> Response:
     """Make a link that lets this user in once; the page that follows shows it once."""
-    with call.write(even_when_read_only=True) as tx:
-        secret = access.create_login_link(tx, username)
-        access.note(tx, "login_link.created", username)
     # Not by the Host header, which the caller chooses: the link is sent on, and lets its holder in.
-    link = f"{call.server.settings.public_url or ''}/login/link/{secret}"
+    link = f"{call.server.settings.public_url or ''}{login_path(call, username)}"
     return back_with_secret(call.request, "/users", username, link)
 
 
@@ -448,10 +445,7 @@ def create_token(call: Reader, form: Form) -> Response:
 @router.post("/account/tokens/{token_id}/revoke")
 def revoke_token(call: Reader, token_id: TokenId, form: Form) -> Response:
     """Revoke a token: one's own, or anybody's for an admin."""
-    access.check_may_change(call.actor)
-    owner = None if call.actor.role is Role.ADMIN else call.actor.own_id
-    with call.write(even_when_read_only=True) as tx:
-        access.revoke_token(tx, token_id, owner)
+    revoke(call, token_id)
     return back("/users" if text(form, "from") == "users" else "/account", _("The token is revoked."))
 
 

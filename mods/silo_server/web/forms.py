@@ -18,7 +18,7 @@ from fastapi import Depends, Request
 from starlette.datastructures import FormData
 from starlette.responses import RedirectResponse, Response
 
-from silo.bom.errors import RejectedError
+from silo.bom.errors import RejectedError, SiloError
 from silo.bom.numbers import parse_number, plain, read_quantity, whole_number
 from silo.bom.resolve import character_problem
 from silo_server.routes.context import form_of, server_of
@@ -193,6 +193,11 @@ def amount(typed: str, name: str = "quantity") -> float:
         readings = [str(plain(number.other)), str(plain(number.exact))]
         raise AmbiguousError(f"{name}: {reading.problem}", readings)
     raise RejectedError(f"{name}: {reading.problem}")
+
+
+def problems_of(error: SiloError) -> Sequence[str]:
+    """List what is wrong with a form: the problems of an error, or else its message."""
+    return (error.problems if isinstance(error, RejectedError) else ()) or [str(error)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin
 from silo_server.values import Document, Item, Revision
 from silo_server.web.accounts import Writer
-from silo_server.web.forms import Form, UnsentForm, back, compared, same_text, text, whole
+from silo_server.web.forms import Form, UnsentForm, back, compared, problems_of, same_text, text, whole
 from silo_server.web.render import N_, _, isolate, page, segment
 
 router = APIRouter(include_in_schema=False)
@@ -103,7 +103,7 @@ def make(call: Writer, form: Form) -> Response:
         with call.write() as tx:
             item, made = service.create_item(tx, new)
     except SiloError as error:
-        return _page(call, None, FormState(typed, {}, _problems(error), {}, error.status_hint))
+        return _page(call, None, FormState(typed, {}, problems_of(error), {}, error.status_hint))
     notice = _(
         "%(number)s made." if made else "%(number)s was made already.", number=isolate(item.part_number)
     )
@@ -138,7 +138,7 @@ def change(call: Writer, part_number: str, form: Form) -> Response:
                 else _change(tx, item, {**typed, "weighed": weighed}, set(edit.mine), text(form, "comment"))
             )
     except SiloError as error:
-        return _again(call, part_number, FormState(typed, was, _problems(error), {}, error.status_hint))
+        return _again(call, part_number, FormState(typed, was, problems_of(error), {}, error.status_hint))
     if clashes:
         # What others changed and this person did not is taken over; the rest is asked about.
         merged = {**now, **{name: typed.get(name, "") for name in [*edit.mine, *clashes]}}
@@ -399,7 +399,3 @@ def _page(call: Call, item: Item | None, shown: FormState, uses: int = 0) -> Res
         labels=labels,
         uses=uses,
     )
-
-
-def _problems(error: SiloError) -> list[str]:
-    return list(error.problems) if isinstance(error, RejectedError) and error.problems else [str(error)]

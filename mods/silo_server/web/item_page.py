@@ -11,11 +11,11 @@ from __future__ import annotations
 import hashlib
 import secrets
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from decimal import Decimal
 from functools import cache, cached_property
 from itertools import accumulate, islice
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
@@ -94,10 +94,8 @@ class Look:
 
     def address(self, path: str) -> Address:
         """Return the address of the page with this view."""
-        usual = {"view": "tree", "page": 1, "depth": 0, "pieces": 1}
-        names = ("view", "q", "type", "sort", "page", "depth", "flip", "pieces", "beside")
-        values = {name: getattr(self, name) for name in names}
-        return Address(path, {n: str(v) for n, v in values.items() if v not in ("", usual.get(n))})
+        values = {field.name: (getattr(self, field.name), field.default) for field in fields(self)}
+        return Address(path, {name: str(value) for name, (value, usual) in values.items() if value != usual})
 
     def flipped(self, key: str) -> str:
         """Return ``flip`` with this branch the other way round."""
@@ -293,25 +291,37 @@ def _walk(shown: ShownStructure) -> Iterator[StructureRow]:
             stack.pop()
 
 
-def _tree_keys(shown: ShownStructure) -> Mapping[str, Callable[[Line], Any]]:
-    def times(line: Line, value: Decimal | None) -> Decimal | None:
-        return None if value is None else value * as_decimal(line.state.quantity)
+R = TypeVar("R")
+
+
+def _keys(
+    line: Callable[[R], Line], total: Callable[[R], Any], worth: Callable[[R], MassAndCost]
+) -> dict[str, Callable[[R], Any]]:
+    """Make the keys that rows are sorted by: the columns that the tree and the flat list both have."""
+
+    def cost(row: R) -> Decimal | None:
+        # Currencies cannot be compared; if there are several, the amounts are.
+        return max(worth(row).costs.values(), default=None)
+
+    def times(row: R, value: Decimal | None) -> Decimal | None:
+        return None if value is None else value * as_decimal(total(row))
 
     return {
-        "number": lambda line: line.child_part_number.casefold(),
-        "name": lambda line: line.child_name.casefold(),
-        "quantity": lambda line: line.state.quantity,
-        "total": lambda line: line.state.quantity,
-        "unit_mass": lambda line: shown.worth(line).mass,
-        "mass": lambda line: times(line, shown.worth(line).mass),
-        "unit_cost": lambda line: _cost_key(shown.worth(line).costs),
-        "cost": lambda line: times(line, _cost_key(shown.worth(line).costs)),
+        "number": lambda row: line(row).child_part_number.casefold(),
+        "name": lambda row: line(row).child_name.casefold(),
+        "total": total,
+        "unit_mass": lambda row: worth(row).mass,
+        "mass": lambda row: times(row, worth(row).mass),
+        "unit_cost": cost,
+        "cost": lambda row: times(row, cost(row)),
     }
 
 
-def _cost_key(costs: Mapping[str, Decimal]) -> Decimal | None:
-    # Currencies cannot be compared; if there are several, the amounts are.
-    return max(costs.values(), default=None)
+def _tree_keys(shown: ShownStructure) -> Mapping[str, Callable[[Line], Any]]:
+    keys: dict[str, Callable[[Line], Any]] = _keys(
+        lambda line: line, lambda line: line.state.quantity, shown.worth
+    )
+    return keys | {"quantity": keys["total"]}
 
 
 def flat_page(shown: ShownStructure) -> Page[Branch]:
@@ -326,24 +336,15 @@ def flat_page(shown: ShownStructure) -> Page[Branch]:
 
 
 def _flat_keys(shown: ShownStructure) -> Mapping[str, Callable[[tree.FlatRow], Any]]:
-    def worth(row: tree.FlatRow) -> MassAndCost:
-        return own_worth(shown.parts[row.line.child_id].properties)
+    def properties(row: tree.FlatRow) -> Mapping[str, Any]:
+        return shown.parts[row.line.child_id].properties
 
-    def times(row: tree.FlatRow, value: Decimal | None) -> Decimal | None:
-        return None if value is None else value * as_decimal(row.total)
-
-    return {
-        "number": lambda row: row.line.child_part_number.casefold(),
-        "name": lambda row: row.line.child_name.casefold(),
+    keys: dict[str, Callable[[tree.FlatRow], Any]] = _keys(
+        lambda row: row.line, lambda row: row.total, lambda row: own_worth(properties(row))
+    )
+    return keys | {
         "type": lambda row: row.line.child_item_type,
-        "total": lambda row: row.total,
-        "unit_mass": lambda row: worth(row).mass,
-        "mass": lambda row: times(row, worth(row).mass),
-        "unit_cost": lambda row: _cost_key(worth(row).costs),
-        "cost": lambda row: times(row, _cost_key(worth(row).costs)),
-        "supplier": lambda row: str(
-            shown.parts[row.line.child_id].properties.get("supplier") or ""
-        ).casefold(),
+        "supplier": lambda row: str(properties(row).get("supplier") or "").casefold(),
     }
 
 

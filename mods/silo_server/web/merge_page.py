@@ -28,7 +28,6 @@ from silo_server.db.engine import Tx
 from silo_server.routes.context import Call
 from silo_server.schema import text_hints
 from silo_server.services.bom import history, review
-from silo_server.services.bom import review as service
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
 from silo_server.services.bom.merge import in_sentences, last_sync
 from silo_server.services.bom.review import Decision
@@ -130,7 +129,7 @@ def decide(call: Writer, part_number: str, form: Form) -> Response:
         if not decisions:
             return _("No line was chosen, so nothing was changed."), 0
         try:
-            change, _lines = service.resolve(tx, part_number, decisions)
+            change, _lines = review.resolve(tx, part_number, decisions)
         except LinesChangedError as error:
             story = line_form.meanwhile(tx, parent, error.line_ids, whole(form, "at") or 0)
             gone = [names.get(line_id, _("a line that is gone")) for line_id in error.line_ids]
@@ -299,7 +298,7 @@ def _do(
 
 def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> Response:
     with call.read() as tx:
-        review_of = service.review(tx, part_number)
+        review_of = review.review(tx, part_number)
         item, lines = review_of.parent, review_of.lines
         last = last_sync(tx, item)
         merge = review_of.last_merge
@@ -341,7 +340,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
         now=now,
         kept=line_form.still_typed(asked.typed, asked.seen, now),
         mark=mark_of(editing.state) if editing else "",
-        marks=service.marks_of([*review_of.unreferenced, *(c.line for c in review_of.conflicts)], conflicts),
+        marks=review.marks_of([*review_of.unreferenced, *(c.line for c in review_of.conflicts)], conflicts),
         asked=replace(asked, problem=problem),
         labels={name: _(label) for name, label in FIELDS.items()},
         texts={name: text_hints(field) for name, field in line_form.TEXTS.items()},

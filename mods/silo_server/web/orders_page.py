@@ -16,7 +16,7 @@ from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
 from silo_server.routes.context import Call
-from silo_server.routes.orders import OrderedBody, asked_of, record_all
+from silo_server.routes.orders import OrderedBody, asked_of, record_all, records_of
 from silo_server.services import items as item_service
 from silo_server.services import orders, releases, suppliers
 from silo_server.services.bom import imports
@@ -24,7 +24,7 @@ from silo_server.services.items import ItemChange, get_item
 from silo_server.services.orders import OrderRequest, OrderRow
 from silo_server.services.suppliers import COLUMNS, EXAMPLES, MOST_PARTS, TABLE, decimal_text, typed_text
 from silo_server.web.accounts import Administrator, Reader, Writer
-from silo_server.web.forms import Form, amount, back, back_to, text, texts, whole
+from silo_server.web.forms import Form, amount, back, back_to, problems_of, text, texts, whole
 from silo_server.web.import_page import Problem, Upload, carried, checked, layout_of, reading
 from silo_server.web.render import N_, PAGE_ROWS, Address, _, isolate, page, page_of, segment
 
@@ -50,7 +50,6 @@ def _suppliers(
         changes = suppliers.supplier_changes_of(tx, item)
     rows = typed or [suppliers.texts_of(part) for part in suppliers.supplier_parts_of(item)]
     empty = [dict.fromkeys(COLUMNS, "")] * min(EMPTY_ROWS, MOST_PARTS - len(rows))
-    problems = (error.problems if isinstance(error, RejectedError) else ()) or ([str(error)] if error else [])
     return page(
         call,
         "suppliers.html",
@@ -61,7 +60,7 @@ def _suppliers(
         rows=[*rows, *empty],
         version=changes[0].id if changes else 0,
         changes=changes,
-        problems=problems,
+        problems=problems_of(error) if error else [],
         most=MOST_PARTS,
     )
 
@@ -236,7 +235,7 @@ def _prices(
     layout_read = layout or problem.layout
     plan = None
     if upload:
-        records, read_as = _records(call, upload, layout)
+        records, read_as = records_of(call, upload.data, layout)
         with call.read() as tx:
             plan = suppliers.plan_suppliers(tx, records, read_as)
         order = {"error": 0, "change": 1, "same": 2}
@@ -260,15 +259,6 @@ def _prices(
     )
 
 
-def _records(
-    call: Call, upload: Upload, layout: imports.Layout | None
-) -> tuple[list[imports.Record], imports.Layout]:
-    records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout, TABLE)
-    read_as = layout or imports.guess_of(upload.data, TABLE)
-    assert read_as is not None  # the rows were read with it
-    return records, read_as
-
-
 @router.post("/suppliers/check")
 def check(call: Writer, form: Form) -> Response:
     """Show what a table would change; write nothing."""
@@ -280,7 +270,7 @@ def apply(call: Writer, form: Form) -> Response:
     """Import a table that was checked."""
     upload, layout = carried(form), layout_of(form, TABLE)
     try:
-        records, read_as = _records(call, upload, layout)
+        records, read_as = records_of(call, upload.data, layout)
         with call.write() as tx:
             plan = suppliers.apply_suppliers(tx, records, read_as)
     except SiloError as error:

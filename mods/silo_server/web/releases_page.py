@@ -60,7 +60,7 @@ def _show(
             "wanted": tx.settings.release_approvals,
             "may_override": tx.settings.release_override,
         }
-        waiting = next((release for release in list_of_releases if release.status == "review"), None)
+        waiting = _newest(list_of_releases, "review")
         values |= {"in_review": waiting, "blocks": releases.blocks_of(tx, waiting) if waiting else []}
     return page(call, "releases.html", status=status, item=item, problem=problem, typed=typed or {}, **values)
 
@@ -68,14 +68,17 @@ def _show(
 def state_of(tx: Tx, item: Item, list_of_releases: list[Release] | None = None) -> dict[str, Any]:
     """Find the revision that is released or in review, and whether the product changed since."""
     list_of_releases = releases.list_releases(tx, item) if list_of_releases is None else list_of_releases
-    released = next((release for release in list_of_releases if release.status == "released"), None)
-    waiting = next((release for release in list_of_releases if release.status == "review"), None)
+    released, waiting = (_newest(list_of_releases, status) for status in ("released", "review"))
     newest = waiting or released
     changed = False
     if newest is not None:
         with suppress(ConflictError, TooLargeError):  # a ring of assemblies, which the page itself reports
             changed = summary_of(tx, item).changed.at > newest.frozen_at
     return {"released": released, "review": waiting, "changed": changed}
+
+
+def _newest(list_of_releases: list[Release], status: str) -> Release | None:
+    return next((release for release in list_of_releases if release.status == status), None)
 
 
 @router.post("/items/{part_number}/releases")
