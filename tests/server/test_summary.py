@@ -175,7 +175,7 @@ def check_by_rows(tx: Tx, item: Any, told: Summary) -> None:
 
 
 @settings(
-    max_examples=examples(3), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=examples(2), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(seed_of=st.integers(0, 2**32))
 def test_what_is_kept_is_what_is_counted_anew(prepared: Database, seed_of: int) -> None:
