@@ -35,7 +35,6 @@ from pathlib import Path
 from typing import Any
 
 from prometheus_client import (
-    CONTENT_TYPE_LATEST,
     CollectorRegistry,
     Counter,
     Gauge,
@@ -389,7 +388,6 @@ def has_space(folder: Path, wanted: int) -> bool:
         return True
 
 
-CONTENT_TYPE = CONTENT_TYPE_LATEST
 BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
 SHARED = "PROMETHEUS_MULTIPROC_DIR"
 
@@ -506,4 +504,4 @@ class _Gauges:
         self._gauges = gauges
 
     def collect(self) -> list[Metric]:
-        return [GaugeMetricFamily(name, text, float(value)) for name, text, value in self._gauges]
+        return [GaugeMetricFamily(name, text, value) for name, text, value in self._gauges]

@@ -37,7 +37,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from silo.bom.errors import ConfigError
 from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port, scratch_folder
 from silo_server import http
-from silo_server.db.engine import WRITERS_WAITING, Database, Tx
+from silo_server.db.engine import MIGRATION_LOCK, WRITERS_WAITING, Database, Tx
 from silo_server.db.migrate import upgrade
 from silo_server.db.tables import events, users
 from silo_server.events import Hub
@@ -76,6 +76,7 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
     """
     upgrade(db)
     with db.write(even_when_read_only=True) as tx:
+        tx.lock(MIGRATION_LOCK)  # of two servers that start at once, one makes the first admin
         if tx.conn.scalar(select(func.count()).select_from(users)) == 0:
             settings = tx.settings
             access.create_user(tx, settings.admin_username, Role.ADMIN, password=settings.admin_password)

@@ -436,6 +436,9 @@ def test_a_file_too_large_is_a_page(tmp_path: Path) -> None:
     with running_server(url, token=TOKEN, settings=small) as server, Api(server.base_url, TOKEN) as api:
         parent = api.item()
         visitor = enter(api, ADMIN)
+        body, headers = form_body({"file": ("x.FCStd", b"x" * 12_000)})
+        for of in (f"items/{parent}", f"documents/{uuid4()}"):  # files have a limit of their own
+            assert api.call("POST", f"/api/{of}/file", body=body, headers=headers).status == 201
         body, headers = form_body({"csrf_token": visitor.csrf, "file": ("x.csv", b"x" * 12_000)})
         path = f"/items/{parent}/import/check"
         page = visitor.api.call(

@@ -59,6 +59,7 @@ from sqlalchemy import (
     insert,
     literal,
     select,
+    text,
     update,
 )
 from sqlalchemy.dialects.postgresql import ARRAY
@@ -275,9 +276,9 @@ def get_state(tx: Tx, key: str) -> str | None:
 
 def put_state(tx: Tx, key: str, value: str) -> None:
     """Store ``value`` under ``key``."""
-    done = tx.conn.execute(update(server_state).where(server_state.c.key == key).values(value=value))
-    if done.rowcount == 0:
-        tx.conn.execute(insert(server_state).values(key=key, value=value))
+    # In one statement: another process may store the first value under this key at the same moment.
+    put = "INSERT INTO server_state VALUES (:key, :value) ON CONFLICT (key) DO UPDATE SET value = :value"
+    tx.conn.execute(text(put), {"key": key, "value": value})
 
 
 def _flush_events(tx: Tx) -> None:

@@ -11,6 +11,7 @@ from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Path, Query, Request
+from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, WithJsonSchema
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import Response
@@ -21,7 +22,6 @@ from silo_server import events
 from silo_server.db.engine import mode_of
 from silo_server.events import EventResponse
 from silo_server.housekeeping import (
-    CONTENT_TYPE,
     HEALTH_SECONDS,
     READY_SECONDS,
     ServerStanding,
@@ -111,7 +111,7 @@ async def ready(server: ServerDep) -> Response:
 def metrics(call: Viewer) -> Response:
     """Return the metrics for Prometheus; the role viewer is enough."""
     rendered = call.request.app.state.metrics.render(call.server.db, call.server.hub, call.server.files)
-    return Response(rendered, headers={"Content-Type": CONTENT_TYPE})
+    return Response(rendered, headers={"Content-Type": CONTENT_TYPE_LATEST})
 
 
 @router.get(
