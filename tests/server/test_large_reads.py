@@ -14,9 +14,8 @@ from urllib.parse import quote
 
 import pytest
 from fastapi import Request
-from hunting import over
 from openpyxl import load_workbook
-from server_testing import Answer, Api, wait_until
+from server_testing import Answer, Api, sqlite_database, wait_until
 
 from silo.bom.errors import BusyError
 from silo_server.db.engine import Turnstile, Tx
@@ -27,7 +26,6 @@ from silo_server.services.bom.transfer import Export, Row, View, to_csv, to_json
 from silo_server.services.items import get_item
 from silo_server.values import SYSTEM
 
-pytestmark = over("sqlite")
 ITEM = "/api/items/{number}"
 LARGE = [
     f"{ITEM}/bom/export.{form}?view={view}"
@@ -42,10 +40,10 @@ LARGE += [f"POST {ITEM}/releases", f"{ITEM}/scene"]
 
 
 @pytest.fixture
-def busy(url: str, tmp_path: Path) -> Iterator[tuple[RunningServer, Api, Server]]:
+def busy(tmp_path: Path) -> Iterator[tuple[RunningServer, Api, Server]]:
     """A server that waits for nobody."""
     with (
-        running_server(url, token="silo_busy", files_dir=tmp_path) as running,
+        running_server(sqlite_database(tmp_path / "x.db"), token="silo_busy") as running,
         Api(running.base_url, "silo_busy") as api,
     ):
         parts: Server = running.app.state.server

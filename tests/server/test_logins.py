@@ -10,7 +10,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from hunting import over
+from server_testing import Databases
 from sqlalchemy import func, select
 
 from silo.bom.errors import AuthError, BusyError, ConfigError
@@ -25,8 +25,6 @@ from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings, TooManyAttemptsError
 from silo_server.values import Actor, Role
 
-# Guesses that come at once are counted by locks, which are finer here.
-pytestmark = over("postgres")
 RIGHT, WRONG = "the right password", "a wrong password"
 OFFICE, HOME, STRANGER = "10.0.0.1", "10.0.0.2", "10.6.6.6"
 
@@ -60,9 +58,10 @@ class Door:
         self.now += timedelta(seconds=seconds)
 
 
-@pytest.fixture
-def door(url: str, tmp_path: Path) -> Iterator[Door]:
-    made = Door(url, tmp_path)
+# Guesses that come at once are counted by locks, which are finer in PostgreSQL.
+@pytest.fixture(params=[pytest.param("postgres", marks=pytest.mark.postgres)])
+def door(request: pytest.FixtureRequest, databases: Databases, tmp_path: Path) -> Iterator[Door]:
+    made = Door(databases.new(request.param), tmp_path)
     yield made
     made.db.close()
 

@@ -17,7 +17,6 @@ from silo_server.run import running_server
 from silo_server.services import releases
 from silo_server.settings import Settings
 
-pytestmark = over("sqlite")
 TOKEN = "silo_release"
 # The whole law takes an hour; a sample runs with the tests.
 OPERATIONS = int(os.environ.get("SILO_RELEASE_OPERATIONS", "100"))
@@ -92,6 +91,7 @@ def change_something(api: Api, chance: random.Random, items: list[str]) -> None:
         api.call("POST", f"/api/items/{item}/releases/{label}/{end[0]}", end[1])
 
 
+@over("sqlite")
 def test_a_release_never_changes(url: str, tmp_path: Path) -> None:
     """Whatever is done later to anything in it, its data, its exports and its files are the same bytes."""
     with (
@@ -127,6 +127,7 @@ def test_settings_that_cannot_be(wrong: dict[str, object]) -> None:
         Settings(database_url="sqlite:///x.db", **wrong)  # type: ignore[arg-type]
 
 
+@over("sqlite")
 def test_two_people_approve_where_the_site_asks_for_two(url: str, tmp_path: Path) -> None:
     """One person's second approval does not count; without an override nothing that is blocked goes out."""
     strict = Settings(database_url=url, files_dir=tmp_path, release_approvals=2, release_override=False)
@@ -159,6 +160,7 @@ def page_of(visitor: Visitor, path: str) -> str:
     return answer.body.decode()
 
 
+@over("sqlite")
 def test_the_pages_of_a_release(url: str, tmp_path: Path) -> None:
     """Draft, review with what blocks, the frozen tree and flat list, and the head of the product."""
     with (

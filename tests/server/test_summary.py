@@ -58,11 +58,11 @@ ASSEMBLIES, PARTS = 4, 4
 GAP = {"reason": "missing", "name": "Lid", "file": "Lid.FCStd", "object": "Body", "quantity": 1}
 
 
-@pytest.fixture(scope="module", params=["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)])
-def prepared(request: pytest.FixtureRequest, databases: Databases) -> Any:
-    """A database of each kind, for all examples."""
+@pytest.fixture(scope="module")
+def prepared(kind: str, databases: Databases) -> Any:
+    """A database for all examples."""
     with tempfile.TemporaryDirectory() as folder:
-        made = Database(Settings(database_url=databases.new(str(request.param)), files_dir=Path(folder)))
+        made = Database(Settings(database_url=databases.new(kind), files_dir=Path(folder)))
         prepare(made, "silo_test")
         yield made
         made.close()
