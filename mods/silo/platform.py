@@ -328,9 +328,9 @@ def limit_this_process(
     return tuple(refused)
 
 
-def allow_many_files(resources: Resources | None = None) -> None:
+def allow_many_files() -> None:
     """Raise the limit of open files to what the machine allows, since each listener of a server needs one."""
-    system = resources or _resources()
+    system = _resources()
     if system is None:
         return
     with suppress(OSError, ValueError):  # macOS names no limit as the limit, and then refuses it
@@ -360,6 +360,13 @@ def end(process: subprocess.Popen[Any]) -> None:
         else:
             process.kill()
         process.wait()
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def workers(count: int, begin: Callable[..., None], *arguments: Any) -> ProcessPoolExecutor:

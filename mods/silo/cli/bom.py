@@ -65,7 +65,6 @@ def add_bom(parser: argparse.ArgumentParser) -> None:
     common.only_with(parser, "--resolve", "--server", "--token")
     common.not_with(parser, "--verify", "--flat", "--resolve", "--csv", "--xlsx", "--why", *common.READING)
     common.not_with(parser, "--why", "--flat", "--resolve", "--csv", "--xlsx", "--json", *common.READING)
-    parser.set_defaults(run=run_bom)
 
 
 def run_bom(args: argparse.Namespace) -> int:
@@ -279,7 +278,6 @@ def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> B
 def add_where_used(parser: argparse.ArgumentParser) -> None:
     text = "the file; it need not be there any more"
     common.add_each(parser, "part", metavar="PART.FCStd", help=text)
-    parser.set_defaults(run=run_where_used)
 
 
 def run_where_used(args: argparse.Namespace) -> int:
@@ -354,7 +352,6 @@ def add_relink(parser: argparse.ArgumentParser) -> None:
         help="the file that the links record; relative to TOP's folder, as `silo-mod bom` prints it",
     )
     parser.add_argument("--to", dest="new", metavar="NEW", required=True, help="the file that is meant")
-    parser.set_defaults(run=run_relink)
 
 
 def run_relink(args: argparse.Namespace) -> int:
@@ -429,7 +426,6 @@ def _either(folder: str, path: str) -> str:
 
 def add_diff(parser: argparse.ArgumentParser) -> None:
     common.add_top(parser)
-    parser.set_defaults(run=run_diff)
 
 
 def run_diff(args: argparse.Namespace) -> int:
@@ -572,7 +568,6 @@ def add_bom_diff(parser: argparse.ArgumentParser) -> None:
             )
         },
     )
-    parser.set_defaults(run=run_bom_diff)
 
 
 def run_bom_diff(args: argparse.Namespace) -> int:

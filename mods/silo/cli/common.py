@@ -32,6 +32,7 @@ from silo.bom.findings import respelt_findings
 from silo.bom.links import extract
 from silo.bom.model import Extraction, walk_entries
 from silo.bom.roots import choose_assembly
+from silo.platform import processors
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -243,15 +244,9 @@ def reading_of(args: argparse.Namespace) -> Iterator[VaultReader]:
 
     given = getattr(args, "index", None)
     path = None if getattr(args, "no_cache", False) else given or default_path()
-    count = getattr(args, "jobs", 1) or _processors()  # a command without the option reads one tree
+    count = getattr(args, "jobs", 1) or processors()  # a command without the option reads one tree
     with Index(path, given=given is not None) as index, pool_of(count, getattr(args, "dask", None)) as pool:
         yield VaultReader(index, pool)
-
-
-def _processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @contextmanager
@@ -423,6 +418,19 @@ def refuse_assembly_of(tops: Sequence[str], assembly: str | None) -> None:
     """Refuse --assembly for a folder: the name picks one of the assemblies of a file."""
     if assembly not in (None, EACH) and any(os.path.isdir(top) for top in tops):
         raise InputError("--assembly picks an assembly of one file, and this is a folder; name the file")
+
+
+def account_of(client: SiloClient) -> tuple[str | None, str | None]:
+    """Return the name and the role of the user whose token it is; None where the server does not say.
+
+    Raises SiloError if the server refuses the token.
+    """
+    try:
+        user = client.whoami()
+    except NotFoundError:
+        client.search_items(limit=1)
+        return None, None
+    return user.username, user.role or None
 
 
 def named_item(client: SiloClient, number: str) -> Item:

@@ -53,10 +53,10 @@ def add_demo(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
     common.options(parser, {"--keep": "leave the server running until Ctrl-C"})
     parser.add_argument("--port", type=int, default=0, help="port of the server (default: a free one)")
-    parser.set_defaults(run=run, waits=True)
+    parser.set_defaults(waits=True)
 
 
-def run(args: argparse.Namespace) -> int:
+def run_demo(args: argparse.Namespace) -> int:
     """Run the demo."""
     need_server_extra()
     if not (EXAMPLE / TOP).is_file():

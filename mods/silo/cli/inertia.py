@@ -411,7 +411,6 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
     add_result_options(parser)
     add_push_options(parser)
     common.only_with(parser, "--urdf", "--urdf-out", "--in-place")
-    parser.set_defaults(run=run_inertia)
 
 
 def run_inertia(args: argparse.Namespace) -> int:
@@ -515,7 +514,6 @@ def add_links(parser: argparse.ArgumentParser) -> None:
         },
     )
     add_geometry_options(parser)
-    parser.set_defaults(run=run_links)
 
 
 def run_links(args: argparse.Namespace) -> int:
@@ -581,7 +579,6 @@ def add_mass(parser: argparse.ArgumentParser) -> None:
     add_push_options(parser)
     # The index is asked only for part numbers.
     common.only_with(parser, "--push", "--index")
-    parser.set_defaults(run=run_mass)
 
 
 def run_mass(args: argparse.Namespace) -> int:

@@ -23,7 +23,8 @@ from silo.bom.errors import CancelledError, Exit, InputError, SiloError, did_you
 
 T = TypeVar("T")
 
-# By theme, each command's module, help and example. A module is imported if its command is chosen.
+# By theme, each command's module, help and example. A module is imported if its command is chosen; `add_NAME`
+# in it adds the command's own options, `run_NAME` runs it.
 THEMES = {
     "Look at files": {
         "bom": (
@@ -275,10 +276,11 @@ def build_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
             if chosen in (None, name):
                 from silo.cli.common import add_shared
 
-                add = f"add_{name.replace('-', '_')}"
-                getattr(importlib.import_module(f"silo.cli.{module}"), add)(one)
+                there, word = importlib.import_module(f"silo.cli.{module}"), name.replace("-", "_")
+                if add := getattr(there, f"add_{word}", None):  # options of its own
+                    add(one)
                 add_shared(one, name)
-                one.set_defaults(parser=one)
+                one.set_defaults(run=getattr(there, f"run_{word}"), parser=one)
     parser.epilog = "\n".join([*lines, "", spoken(_EPILOG)])
     return parser
 

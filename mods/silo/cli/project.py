@@ -27,7 +27,6 @@ def _add(parser: argparse.ArgumentParser) -> None:
 def add_status(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
     _add(parser)
-    parser.set_defaults(run=run_status)
 
 
 def add_commit(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +39,6 @@ def add_commit(parser: argparse.ArgumentParser) -> None:
             "--on-top": "send files that a colleague has committed since, on top of the colleague's",
         },
     )
-    parser.set_defaults(run=run_commit)
 
 
 def run_status(args: argparse.Namespace) -> int:

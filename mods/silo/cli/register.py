@@ -273,10 +273,9 @@ def add_register(parser: argparse.ArgumentParser) -> None:
     common.not_with(parser, "--undeclare", "--declare", "--category", "--not-a-part")
     common.not_with(parser, "--not-a-part", "--declare", "--category")
     common.not_with(parser, "--apply", "--category")
-    parser.set_defaults(run=run)
 
 
-def run(args: argparse.Namespace) -> int:
+def run_register(args: argparse.Namespace) -> int:
     """Register what is unregistered; returns 1 if something was skipped or failed."""
     taken = args.undeclare or args.not_a_part
     if args.orphans:

@@ -52,7 +52,7 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
     common.options(parser, {"--database URL": "sqlite:///FILE or postgresql://…; default: your data folder"})
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="server processes (PostgreSQL)")
     common.options(parser, {"--reset-admin NAME": "make this user an active admin, and print a login link"})
-    parser.set_defaults(run=run_serve, waits=True)
+    parser.set_defaults(waits=True)
 
 
 def need_server_extra() -> None:
@@ -86,7 +86,6 @@ def run_serve(args: argparse.Namespace) -> int:
 def add_backup(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("target", metavar="TARGET", type=common.a_path, help="a folder that is not there yet")
     _add_place(parser)
-    parser.set_defaults(run=run_backup)
 
 
 def add_restore(parser: argparse.ArgumentParser) -> None:
@@ -100,12 +99,10 @@ def add_restore(parser: argparse.ArgumentParser) -> None:
     )
     _add_place(parser)
     common.not_with(parser, "--verify", "--replace", "--database", "--files")
-    parser.set_defaults(run=run_restore)
 
 
 def add_summaries(parser: argparse.ArgumentParser) -> None:
     _add_place(parser)
-    parser.set_defaults(run=run_summaries)
 
 
 def run_summaries(args: argparse.Namespace) -> int:
@@ -181,7 +178,7 @@ _CTRL_C_S = 0.5
 
 def add_watch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--count", type=common.above_zero, metavar="N", help="end after N events")
-    parser.set_defaults(run=run_watch, ends_with_its_reader=True, waits=True)
+    parser.set_defaults(ends_with_its_reader=True, waits=True)
 
 
 def run_watch(args: argparse.Namespace) -> int:
@@ -266,7 +263,7 @@ def add_login(parser: argparse.ArgumentParser) -> None:
             "--ca FILE": "certificate authorities to trust",
         },
     )
-    parser.set_defaults(run=run_login, waits=True)
+    parser.set_defaults(waits=True)
 
 
 def run_login(args: argparse.Namespace) -> int:
@@ -279,12 +276,7 @@ def run_login(args: argparse.Namespace) -> int:
     where = resolve_server(args.url, token, args.ca, env={}, path=config_path())
     with SiloClient(where.url, where.token, verify=where.verify) as client:
         client.ready()
-        name, role = None, None
-        try:
-            user = client.whoami()
-            name, role = user.username, user.role or None
-        except NotFoundError:
-            client.search_items(limit=1)
+        name, role = common.account_of(client)
     path = save_config(where.url, where.token, where.verify)
     if (store := Store()).path.exists():
         store.resume(where.url, told=False)  # the pause of a wrong token
@@ -339,10 +331,6 @@ NOBODY = "00000000-0000-4000-8000-000000000000"
 _EXTRAS = {"server": ("fastapi", "serve, demo"), "inertia": ("OCP", "inertia, mass, links")}
 Rows = dict[str, "str | SiloError"]
 T = TypeVar("T")
-
-
-def add_doctor(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=run_doctor)
 
 
 def run_doctor(args: argparse.Namespace) -> int:
@@ -519,7 +507,6 @@ def add_install_addon(parser: argparse.ArgumentParser) -> None:
             "--copy": "copy the add-on, do not link to this checkout",
         },
     )
-    parser.set_defaults(run=run_install_addon)
 
 
 def run_install_addon(args: argparse.Namespace) -> int:
@@ -542,7 +529,6 @@ def run_install_addon(args: argparse.Namespace) -> int:
 
 def add_schema(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="COMMAND", nargs="?", help="the command (default: list them)")
-    parser.set_defaults(run=run_schema)
 
 
 def run_schema(args: argparse.Namespace) -> int:

@@ -18,7 +18,7 @@ from rich.tree import Tree
 
 from silo import spoken
 from silo.bom.document import relative
-from silo.bom.errors import ConfigError, Exit, NotFoundError, counted
+from silo.bom.errors import ConfigError, Exit, counted
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.report import MOST_LINES, base_of, check_tree_size, diff_rows, shorten
@@ -125,11 +125,17 @@ def bom_tree(extraction: Extraction, base: str = "") -> Tree:
     return tree
 
 
+def table_of(*titles: str) -> Table:
+    """Begin a table without lines that has these headings."""
+    table = Table(box=None, pad_edge=False)
+    for title in titles:
+        table.add_column(spoken(title), justify="right" if title == "Quantity" else "left", overflow="fold")
+    return table
+
+
 def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Draw the flat BOM: a purchaser's table of totals."""
-    table = Table(box=None, pad_edge=False)
-    for title in ("Part number", "Name", "Quantity", "Unit", "Standard or file", ""):
-        table.add_column(spoken(title), justify="right" if title == "Quantity" else "left", overflow="fold")
+    table = table_of("Part number", "Name", "Quantity", "Unit", "Standard or file", "")
     for row in rows:
         file = f"{row['doc_path']}#{row['object']}"
         table.add_row(
@@ -173,16 +179,7 @@ def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -
     whole
         False if components are missing or have no number: then it is not known that nothing differs.
     """
-    table = Table(box=None, pad_edge=False)
-    for title, justify in (
-        ("", "left"),
-        ("Part number", "left"),
-        ("Name", "left"),
-        ("Quantity", "right"),
-        ("", "left"),
-    ):
-        table.add_column(spoken(title), justify=justify)  # type: ignore[arg-type]
-
+    table = table_of("", "Part number", "Name", "Quantity", "")
     for kind, number, quantity in diff_rows(diff):
         mark, style, note = _DIFFERENCE[kind]
         name = Text(plain(names.get(number, "")))
@@ -340,12 +337,10 @@ def registrations(
 
 def add_search(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("words", metavar="WORD", nargs="+")
-    parser.set_defaults(run=run_search)
 
 
 def add_show(parser: argparse.ArgumentParser) -> None:
     common.add_each(parser, "part_number", metavar="PART_NUMBER", help="the item")
-    parser.set_defaults(run=run_show)
 
 
 def add_order(parser: argparse.ArgumentParser) -> None:
@@ -369,20 +364,10 @@ def add_order(parser: argparse.ArgumentParser) -> None:
     kinds = ("bought", "made", "unsaid")
     parser.add_argument("--kind", choices=kinds, default="bought", help="only these parts (bought)")
     common.only_with(parser, "--csv --xlsx", "--kind", "--supplier")
-    parser.set_defaults(run=run_order)
-
-
-def add_whoami(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=run_whoami)
-
-
-def add_logout(parser: argparse.ArgumentParser) -> None:
-    parser.set_defaults(run=run_logout)
 
 
 def add_completion(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("shell", choices=("bash", "zsh", "tcsh"))
-    parser.set_defaults(run=run_completion)
 
 
 def run_search(args: argparse.Namespace) -> int:
@@ -457,10 +442,8 @@ def _print_order(order: OrderList) -> None:
     out.print(Text(plain(spoken(head)), "bold"))
     for warning in order.warnings:
         out.print(Text(f"⚠ {plain(spoken(warning))}", "yellow"))
-    table = Table(box=None, pad_edge=False)
     titles = ("Part number", "Name", "Needed", "Ordered", "Quantity", "Supplier", "Its number", "Cost")
-    for title in ("", *titles, ""):
-        table.add_column(spoken(title), overflow="fold")
+    table = table_of("", *titles, "")
     empty = SupplierPart(supplier="", currency="")
     for part in sorted(order.parts, key=lambda part: (part.kind, (part.supplier_part or empty).supplier)):
         of = part.supplier_part or empty
@@ -486,21 +469,12 @@ def run_whoami(args: argparse.Namespace) -> int:
 
     where = resolve_server(args.server, args.token)
     with common.client_of(args) as client:
-        account: dict[str, Any] = {
-            "url": client.base_url,
-            "from": where.url_from,
-            "username": None,
-            "role": None,
-        }
-        try:
-            user = client.whoami()
-            account |= {"username": user.username, "role": user.role or None}
-        except NotFoundError:
-            client.search_items(limit=1)
+        name, role = common.account_of(client)
+        account = {"url": client.base_url, "from": where.url_from, "username": name, "role": role}
     if args.json:
         common.print_json(account)
     else:
-        who = ", ".join(filter(None, (account["username"], account["role"])))
+        who = ", ".join(filter(None, (name, role)))
         text = f"{account['url']} (from {account['from']}): {who or 'this server does not say who you are'}"
         print(plain(spoken(text)))
     return Exit.DONE
@@ -538,9 +512,6 @@ def run_completion(args: argparse.Namespace) -> int:
 
 
 def _print(rows: list[dict[str, Any]]) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
     table = Table(box=None, pad_edge=False, show_header=False)
     for row in rows:
         table.add_row(*(Text(plain("" if value is None else str(value))) for value in row.values()))

@@ -45,10 +45,9 @@ def add_sync(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "tops", metavar="TOP", nargs="+", help="assembly files, or folders: all assemblies below them"
     )
-    parser.set_defaults(run=run)
 
 
-def run(args: argparse.Namespace) -> int:
+def run_sync(args: argparse.Namespace) -> int:
     """Sync each file; one failure does not stop the rest. Returns 1 or 3 if anything was left undone."""
     from silo.batch import ReportFile, RunSummary
     from silo.vault.plan import only_job
@@ -250,7 +249,6 @@ def add_pull(parser: argparse.ArgumentParser) -> None:
     common.options(
         parser, {"--replace": "replace files with edits that are not in Silo; a copy of each is kept"}
     )
-    parser.set_defaults(run=run_pull)
 
 
 def add_log(parser: argparse.ArgumentParser) -> None:
@@ -268,7 +266,6 @@ def add_log(parser: argparse.ArgumentParser) -> None:
     common.options(parser, points)
     common.only_with(parser, "--since", "--until")
     common.options(parser, {"--changes": "what each revision changed in the BOM"})
-    parser.set_defaults(run=run_log)
 
 
 def add_queue(parser: argparse.ArgumentParser) -> None:
@@ -284,7 +281,6 @@ def add_queue(parser: argparse.ArgumentParser) -> None:
         "numbers", metavar="NUMBER", nargs="*", type=common.above_zero, help="commits, as list shows them"
     )
     common.options(parser, {"--here": "retry: send them to the server in use instead"})
-    parser.set_defaults(run=run_queue)
 
 
 def run_queue(args: argparse.Namespace) -> int:
@@ -342,7 +338,6 @@ def _retry(args: argparse.Namespace, store: Store, here: str) -> SiloError | Non
 def _show_queue(
     args: argparse.Namespace, left: Sequence[Entry], here: str, pause: Pause | None, now: float
 ) -> None:
-    from rich.table import Table
     from rich.text import Text
 
     from silo.cli import show
@@ -374,7 +369,7 @@ def _show_queue(
     if not left:
         out.print("Nothing waits: every commit of this computer is in Silo.", markup=False)
         return
-    table = Table(*map(spoken, ("", "Commit", "What", "Since", "State", "Why")), box=None, pad_edge=False)
+    table = show.table_of("", "Commit", "What", "Since", "State", "Why")
     for entry, said in queue_rows:
         name = " ".join(filter(None, (entry.part_number, entry.label or entry.file_name)))
         since = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.taken_at))
@@ -506,7 +501,6 @@ def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
     if args.json:
         common.print_json(changes.model_dump(mode="json"))
         return
-    from rich.table import Table
     from rich.text import Text
 
     from silo.cli import show
@@ -518,9 +512,7 @@ def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
         out.print(f"{show.plain(head)}: nothing on any level", markup=False)
         return
     out.print(Text(show.plain(spoken(head)), "bold"))
-    table = Table(box=None, pad_edge=False)
-    for title in ("", "Part number", "Name", "In", "Before", "After", "By"):
-        table.add_column(spoken(title), overflow="fold")
+    table = show.table_of("", "Part number", "Name", "In", "Before", "After", "By")
     styles = {"added": "green", "removed": "red"}
     for change in changes.changes:
         when = f", {change.at:%Y-%m-%d %H:%M}" if change.at else ""

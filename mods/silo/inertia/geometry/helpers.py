@@ -25,7 +25,7 @@ from types import TracebackType
 from typing import IO, Any, Self, TypeAlias, TypeVar
 
 from silo import platform
-from silo.platform import remove_patiently, scratch_folder
+from silo.platform import processors, remove_patiently, scratch_folder
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -45,13 +45,6 @@ MOST = 7
 AHEAD = 2
 """Tasks that a helper has at once: the kernel keeps the interpreter while it works here, and a helper that
 waits for its next task would wait as long. The last task of all is for who is free first."""
-
-
-def processors() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def helpers_for(processes: int, memory_mb: int) -> Helpers:
