@@ -230,11 +230,16 @@ def source_document(entry: BomEntry, top: str = "") -> SourceDocument:
 # --- for machines ---------------------------------------------------------------------------------------
 
 
+def error_json(error: SiloError) -> dict[str, str]:
+    """Return an error as JSON values."""
+    return {"code": error.code, "message": str(error)}
+
+
 def result_json(result: TopResult) -> dict[str, Any]:
     """Return one file's result as JSON values."""
     data: dict[str, Any] = {"top": result.top, "ok": result.fine}
     if result.error is not None:
-        data["error"] = {"code": result.error.code, "message": str(result.error)}
+        data["error"] = error_json(result.error)
     if result.skipped:
         data["skipped"] = result.skipped
     data["assemblies"] = [outcome_json(outcome, result.base) for outcome in result.outcomes]
@@ -258,7 +263,7 @@ def outcome_json(outcome: Outcome, base: str) -> dict[str, Any]:
     if outcome.result is not None:
         data["result"] = outcome.result.model_dump(mode="json", exclude_none=True)
     if outcome.error is not None:
-        data["error"] = {"code": outcome.error.code, "message": str(outcome.error)}
+        data["error"] = error_json(outcome.error)
     if outcome.status is Status.BLOCKED:
         data["blocked_by"] = [finding_json(f, base) for f in blocking(outcome.resolved)]
     return data

@@ -138,10 +138,8 @@ def material_folders(
     yield from _matching(env, root, *(f"{folder}/{part}Material" for folder in own for part in ("", "v*/")))
 
 
-def cache_folders(
-    env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT
-) -> Iterator[Path]:
-    """Yield the cache folders of this user's FreeCADs. ``root``: the root of the disk."""
+def cache_folders(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Iterator[Path]:
+    """Yield the cache folders of this user's FreeCADs."""
     # Both are used as they are; the others get a folder for the program (App/ApplicationDirectories).
     moved = [Path(env[name], part) for name, part in _MOVED_CACHES if env.get(name)]
     yield from (folder for folder in moved if folder.is_dir())
@@ -152,7 +150,7 @@ def cache_folders(
     else:
         bases = ["{XDG_CACHE_HOME}"] if env.get("XDG_CACHE_HOME") else []
         bases += ["~/.cache", f"~/.var/app/{_FLATPAK}/cache", "~/snap/freecad/common/.cache"]
-    yield from _matching(env, root, *(f"{base}/FreeCAD/Cache" for base in bases))
+    yield from _matching(env, _ROOT, *(f"{base}/FreeCAD/Cache" for base in bases))
 
 
 def exchange_folder(command: str, env: Mapping[str, str] = os.environ) -> str | None:

@@ -81,6 +81,11 @@ class Stored:
     held: list[HeldItem] = field(default_factory=list)  # what is in its newest file
     lines: list[dict[str, Any]] = field(default_factory=list)
 
+    @property
+    def newest(self) -> Revision | None:
+        """Return the newest revision with a file; None if it has none."""
+        return next((revision for revision in reversed(self.revisions) if revision.file_checksum), None)
+
     def search_text(self) -> str:
         """Return the text in which a search looks: number, name, and the hashes of its files."""
         return "\n".join((self.item.part_number, self.item.name, *self.hashes())).casefold()
@@ -93,7 +98,7 @@ class Stored:
 
 def check_base(stored: Stored, base: int | None, checksum: str | None) -> None:
     """Raise :class:`NewerRevisionError` for a file that would undo the newest one."""
-    newest = next((r for r in reversed(stored.revisions) if r.file_checksum), None)
+    newest = stored.newest
     if newest is None or not would_undo(newest, base, checksum):
         return
     raise NewerRevisionError(
@@ -175,8 +180,7 @@ class FakeStore:
         return self.documents[uuid]
 
     def _document_of(self, stored: Stored) -> Document | None:
-        newest = next((revision for revision in reversed(stored.revisions) if revision.file_checksum), None)
-        if newest is None:
+        if (newest := stored.newest) is None:
             return None
         own = stored.item.id not in self.documents
         numbers = {item.item.id: item.item.part_number for item in self.items.values()}
@@ -194,6 +198,10 @@ class FakeStore:
 
     def _files(self) -> dict[str, Stored]:
         return {stored.item.id: stored for stored in (*self.items.values(), *self.documents.values())}
+
+    def _checksums(self) -> set[str]:
+        revisions = (revision for stored in self._files().values() for revision in stored.revisions)
+        return {revision.file_checksum for revision in revisions if revision.file_checksum}
 
     def _next_number(self, category: str) -> str:
         if category not in CATEGORIES:
@@ -629,19 +637,14 @@ class FakeSilo(FakeStore):
     # -- files ------------------------------------------------------------------------------------------
 
     def lacking_models(self, sha256: Iterable[str], /) -> set[str]:
-        file_checksums = {
-            checksum.file_checksum for stored in self._files().values() for checksum in stored.revisions
-        }
         return {
             checksum
-            for checksum in sha256
-            if checksum in file_checksums and len(self.models.get(checksum, {})) < 2
+            for checksum in self._checksums().intersection(sha256)
+            if len(self.models.get(checksum, {})) < 2
         }
 
     def put_model(self, sha256: str, part: str, body: bytes, /) -> None:
-        if not any(
-            sha256 == revision.file_checksum for each in self._files().values() for revision in each.revisions
-        ):
+        if sha256 not in self._checksums():
             raise NotFoundError(f"no revision has a file with the SHA-256 {sha256}; commit the file first")
         self.models.setdefault(sha256, {})[part] = body
 
@@ -652,14 +655,13 @@ class FakeSilo(FakeStore):
 
     def get_document(self, uuid: str, /) -> Document:
         stored = self._document(uuid.lower(), make=False)
-        now = self._document_of(stored)
-        if now is None:
+        now, newest = self._document_of(stored), stored.newest
+        if now is None or newest is None:
             raise NotFoundError(f"{self.base_url} has no document {uuid}")
         files = self._files()
         links = {key: self._targets(other) for key, other in files.items()}
         linked = [self._document_of(files[link]) for link in links[stored.item.id] if link in files]
         users = [self._document_of(files[key]) for key, targets in links.items() if stored.item.id in targets]
-        newest = next(revision for revision in reversed(stored.revisions) if revision.file_checksum)
         return now.model_copy(
             update={
                 "links": newest.links,
@@ -669,7 +671,7 @@ class FakeSilo(FakeStore):
         )
 
     def _targets(self, stored: Stored) -> set[str]:
-        newest = next((revision for revision in reversed(stored.revisions) if revision.file_checksum), None)
+        newest = stored.newest
         return {link.document or link.item for link in newest.links} if newest else set()
 
     def documents_of(self, part_number: str, /) -> list[Document]:
