@@ -55,37 +55,51 @@ def test_every_command_is_in_the_tables() -> None:
 
 
 @pytest.mark.parametrize("command", WITH_PATHS)
-@pytest.mark.parametrize("path", ["nowhere.FCStd", "no/where", "-", ""])
 def test_a_path_that_is_nowhere_is_bad_input_everywhere(
-    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, path: str
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
-    """One code for all, before a server is asked; a sentence with the name; nothing on standard output."""
+    """One code for all, before a server is asked; a sentence with the name; nothing on standard output, but
+    with --json an object.
+    """
     monkeypatch.chdir(tmp_path)
-    done = run(*(path if word == "@" else word for word in WITH_PATHS[command].split()))
-    assert (done.code, done.out) == (Exit.BAD_INPUT, ""), done
-    assert (path or "''") in done.err
+    for path in ("nowhere.FCStd", "no/where", "-", ""):
+        words = [path if word == "@" else word for word in WITH_PATHS[command].split()]
+        done = run(*words)
+        assert (done.code, done.out) == (Exit.BAD_INPUT, ""), done
+        assert (path or "''") in done.err
+    if "--json" in parsers()[command]._option_string_actions:
+        refused_as_json(run(*words, "--json"))
 
 
-IDLE = [
-    (name, option, needed)
-    for name, parser in parsers().items()
-    for option, needed in parser.get_default("needs") or ()
-]
+def refused_as_json(ran: Any) -> None:
+    """The error is an object on standard output, where a program reads; its sentence is on standard error."""
+    assert ran.code == Exit.BAD_INPUT
+    told = json.loads(ran.out)["error"]
+    assert told["code"] == "bad_input"
+    assert told["message"] in ran.err
 
 
-@pytest.mark.parametrize(("command", "option", "needed"), IDLE)
-def test_an_option_that_would_do_nothing_is_refused(run: Any, command: str, option: str, needed: str) -> None:
-    """Who wrote --dry-run, and got a run that sends nothing anyway, learns it the next time with --push."""
-    done = run(command, "x.FCStd", *_words(command, option))
-    assert (done.code, done.out) == (Exit.BAD_INPUT, "")
-    assert f"{option} does nothing without {needed.replace(' ', ' or ')}" in done.err
+def declared(how: str) -> list[tuple[str, str, str]]:
+    """Return (command, option, the others) of each ``needs`` or ``excludes``."""
+    return [(name, *pair) for name, parser in parsers().items() for pair in parser.get_default(how) or ()]
 
 
-BESIDE = [
-    (name, option, other)
-    for name, parser in parsers().items()
-    for option, other in parser.get_default("excludes") or ()
-]
+IDLE, BESIDE = declared("needs"), declared("excludes")
+
+
+def test_an_option_that_would_do_nothing_is_refused(run: Any) -> None:
+    """Who wrote --dry-run, and got a run that sends nothing anyway, learns it the next time with --push; a
+    flat list was asked for, and --verify printed the tree.
+    """
+    for command, option, needed in IDLE:
+        done = run(command, "x.FCStd", *_words(command, option))
+        assert (done.code, done.out) == (Exit.BAD_INPUT, "")
+        assert f"{option} does nothing without {needed.replace(' ', ' or ')}" in done.err
+    for command, option, other in BESIDE:
+        done = run(command, "x.FCStd", *_words(command, option), *_words(command, other))
+        assert done.code == Exit.BAD_INPUT
+        assert f"{option} does nothing with {other}" in done.out + done.err
+        assert "--json" in (option, other) or done.out == ""
 
 
 def _words(command: str, option: str) -> list[str]:
@@ -93,17 +107,6 @@ def _words(command: str, option: str) -> list[str]:
     if action.nargs == 0:
         return [option]
     return [option, next((choice for choice in action.choices or () if choice != action.default), "1")]
-
-
-@pytest.mark.parametrize(("command", "option", "other"), BESIDE)
-def test_an_option_that_another_one_makes_useless_is_refused(
-    run: Any, command: str, option: str, other: str
-) -> None:
-    """A flat list was asked for, and --verify printed the tree."""
-    done = run(command, "x.FCStd", *_words(command, option), *_words(command, other))
-    assert done.code == Exit.BAD_INPUT
-    assert f"{option} does nothing with {other}" in done.out + done.err
-    assert "--json" in (option, other) or done.out == ""
 
 
 def test_which_options_exclude_another() -> None:
@@ -116,13 +119,6 @@ def test_which_options_exclude_another() -> None:
         ("register", "--apply", "--category"),
         *(("restore", "--verify", option) for option in ("--replace", "--database", "--files")),
     }
-
-
-def test_the_witness_is_for_one_file(run: Any, tmp_path: Path) -> None:
-    """A folder ended in a stack trace."""
-    done = run("bom", tmp_path, "--verify")
-    assert (done.code, done.out) == (Exit.BAD_INPUT, "")
-    assert "name the file" in done.err
 
 
 def test_which_options_need_another() -> None:
@@ -169,21 +165,25 @@ def test_no_option_can_be_shortened() -> None:
     assert not [name for name, parser in parsers().items() if parser.allow_abbrev]
 
 
-@pytest.mark.parametrize("words", ["bom @", "diff @", "sync @", "register @ --yes"])
-def test_an_assembly_is_picked_of_a_file_not_of_a_folder(
-    run: Any, silo: Any, tmp_path: Path, words: str
-) -> None:
-    done = run(*(tmp_path if word == "@" else word for word in words.split()), "--assembly", "Top")
-    assert (done.code, done.out) == (Exit.BAD_INPUT, "")
-    assert "name the file" in done.err
+REFUSED = {
+    **{
+        f"{words} --assembly Top": "name the file"
+        for words in ("bom FOLDER", "diff FOLDER", "sync FOLDER", "register FOLDER --yes")
+    },
+    "bom FOLDER --verify": "name the file",
+    "register FOLDER --plan - --json": "leave out --json",
+    "pull A01-4711": "there is no item A01-4711 on http",
+    "watch --item A01-4711": "there is no item A01-4711 on http",  # it would wait for its events forever
+}
 
 
-@pytest.mark.parametrize("words", ["pull A01-4711", "watch --item A01-4711"])
-def test_an_item_that_is_not_there_is_bad_input(run: Any, silo: Any, words: str) -> None:
-    """``watch`` would wait for its events forever."""
-    done = run(*words.split())
-    assert (done.code, done.out) == (Exit.BAD_INPUT, "")
-    assert "there is no item A01-4711 on http" in done.err
+def test_what_contradicts_itself_or_means_nothing_is_refused(run: Any, silo: Any, tmp_path: Path) -> None:
+    """With a sentence, and nothing on standard output, where a program may read."""
+    for words, why in REFUSED.items():
+        done = run(*(tmp_path if word == "FOLDER" else word for word in words.split()))
+        assert done.code == Exit.BAD_INPUT
+        assert why in done.out + done.err
+        assert "--json" in words or done.out == ""
 
 
 def test_a_misspelt_file_is_used_by_nobody_and_that_is_no_answer(run: Any, gearbox: Path) -> None:
@@ -202,15 +202,9 @@ def test_an_assembly_without_a_number_cannot_be_compared(run: Any, silo: Any, ge
         assert run("diff", *words).code == Exit.UNDONE
 
 
-@pytest.mark.parametrize("words", ["--plan - --json", "--apply plan.csv --category F01"])
-def test_register_refuses_what_contradicts_itself(run: Any, silo: Any, gearbox: Path, words: str) -> None:
-    done = run("register", gearbox, *words.split())
-    assert done.code == Exit.BAD_INPUT
-
-
+@pytest.mark.usefixtures("registered")
 def test_sync_does_nothing_where_one_of_its_files_is_not_there(run: Any, silo: Any, gearbox: Path) -> None:
     """A typing mistake is found before the first merge, all of them at once."""
-    assert run("register", gearbox, "--yes").code == 0
     done = run("sync", gearbox, "nowhere.FCStd", "nirgends.FCStd")
     assert done.code == Exit.BAD_INPUT
     assert "nowhere" in done.err
@@ -225,10 +219,9 @@ def test_the_codes_stand_in_one_table() -> None:
     assert codes == [str(int(code)) for code in Exit]
 
 
+@pytest.mark.usefixtures("synced")
 def test_diff_says_nothing_of_agreement_where_a_file_is_missing(run: Any, silo: Any, gearbox: Path) -> None:
     """Nobody knows what the missing file holds: 1, with --check and without, for a file and for a folder."""
-    assert run("register", gearbox, "--yes").code == 0
-    assert run("sync", gearbox, "--recursive").code == 0
     shutil.move(next(gearbox.parent.rglob("*Cover*.FCStd")), gearbox.parent.parent)
     for words in ([gearbox], [gearbox.parent]):
         for command in (["bom"], ["diff"], ["diff", "--check"]):
@@ -246,8 +239,8 @@ def test_every_command_that_prints_data_prints_json_by_a_schema() -> None:
     with_json = {name for name, one in parsers().items() if "--json" in one._option_string_actions}
     assert with_json == set(NAMES)
     assert set(parsers()) - with_json == {"demo", "completion"}
-    for name in NAMES:
-        jsonschema_rs.validator_for(schema_of(name))
+    for name in NAMES:  # a key more is an error, so that no key comes in without its description
+        assert not jsonschema_rs.validator_for(schema_of(name)).is_valid({"surprise": 1}), name
 
 
 def test_schemas_are_printed(run: Any) -> None:
@@ -255,13 +248,6 @@ def test_schemas_are_printed(run: Any) -> None:
     assert run("schema", "--json").json() == list(NAMES)
     assert '"$schema"' in run("schema", "inertia").out
     assert run("schema", "bmo").code == Exit.BAD_INPUT
-
-
-@pytest.mark.parametrize("command", NAMES)
-def test_a_schema_refuses_what_is_not_documented(command: str) -> None:
-    """A key more is an error, so that no key comes in without its description."""
-    known = schema_of(command)
-    assert not jsonschema_rs.is_valid(known, {"surprise": 1})
 
 
 @pytest.mark.usefixtures("needs_symlinks")
@@ -278,21 +264,18 @@ def test_a_file_named_in_several_ways_is_one(tmp_path: Path, monkeypatch: pytest
         "v/w/../A.FCStd",
         str(tmp_path / "v" / "A.FCStd"),
         "link.FCStd",
-        "u",
-        "v",
+        *("u", "v", "v/."),
     ]
     assert documents_in(ways) == ["v/A.FCStd"]
 
 
-@pytest.mark.parametrize(
-    "words", ["watch --count", "log a.FCStd --limit", "pull A01-0001 --revision", "bom a --jobs"]
-)
-@pytest.mark.parametrize("count", ["0", "-1", "1,000", "1e3", "", "9" * 5000])
-def test_a_count_is_a_number_above_zero(run: Any, words: str, count: str) -> None:
+def test_a_count_is_a_number_above_zero(run: Any) -> None:
     """Nothing is done, and the sentence names the option."""
-    done = run(*words.split(), count)
-    assert done.code == Exit.BAD_INPUT
-    assert f"argument {words.split()[-1]}" in done.err
+    for words in ("watch --count", "log a.FCStd --limit", "pull A01-0001 --revision", "bom a --jobs"):
+        for count in ("0", "-1", "1,000", "1e3", "", "9" * 5000):
+            done = run(*words.split(), count)
+            assert done.code == Exit.BAD_INPUT
+            assert f"argument {words.split()[-1]}" in done.err
 
 
 def test_silo_mod_alone_lists_every_command_by_theme(run: Any) -> None:
@@ -312,42 +295,18 @@ def test_a_wrong_word_is_answered_with_the_right_one(
     assert f"did you mean {meant}" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", [*WITH_PATHS])
-def test_with_json_an_error_is_an_object(run: Any, tmp_path: Path, command: str) -> None:
-    """On standard output, where a program reads; the sentence stays on standard error."""
-    if "--json" not in parsers()[command]._option_string_actions:
-        return
-    words = [str(tmp_path / "no.FCStd") if word == "@" else word for word in WITH_PATHS[command].split()]
-    ran = run(*words, "--json")
-    assert ran.code == Exit.BAD_INPUT
-    told = json.loads(ran.out)["error"]
-    assert told["code"]
-    assert told["message"] in ran.err
-
-
-@pytest.mark.parametrize("command", NAMES)
-@pytest.mark.parametrize("wrong", ["--no-such-option", "--assembly"])
-def test_with_json_a_wrong_option_is_an_object_too(run: Any, command: str, wrong: str) -> None:
+def test_with_json_a_wrong_option_or_a_disk_that_says_no_is_an_object_too(
+    run: Any, gearbox: Path, tmp_path: Path
+) -> None:
     """A program that reads standard output learns what was wrong with its words."""
-    ran = run(command, "x.FCStd", "--json", wrong)
-    assert ran.code == Exit.BAD_INPUT
-    told = json.loads(ran.out)["error"]
-    assert told["code"] == "bad_input"
-    assert told["message"] in ran.err
-    assert "usage: silo-mod" in ran.err
-
-
-def test_with_json_a_disk_that_says_no_is_an_object_too(run: Any, gearbox: Path, tmp_path: Path) -> None:
+    for command in NAMES:
+        for wrong in ("--no-such-option", "--assembly"):
+            ran = run(command, "x.FCStd", "--json", wrong)
+            refused_as_json(ran)
+            assert "usage: silo-mod" in ran.err
+    arm = Path(__file__).parents[2] / "examples" / "arm" / "arm.step"
     (tmp_path / "taken").mkdir()
-    ran = run(
-        "links",
-        Path(__file__).parents[2] / "examples" / "arm" / "arm.step",
-        "--json",
-        "--out",
-        tmp_path / "taken",
-    )
-    assert ran.code == Exit.BAD_INPUT
-    assert "taken" in json.loads(ran.out)["error"]["message"]
+    refused_as_json(run("links", arm, "--json", "--out", tmp_path / "taken"))
 
 
 # Commands that ask no server.
@@ -376,13 +335,12 @@ FAULTY = {
 }
 
 
+@pytest.mark.usefixtures("synced")
 def test_exit_codes_are_those_of_the_table(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Commands by faults; no fault is a stack trace."""
     assert {line.split()[0] for line in FAULTY.values()} | ELSEWHERE == set(parsers())
-    assert run("register", gearbox, "--yes").code == Exit.DONE
-    assert run("sync", gearbox, "--recursive").code == Exit.DONE
     url = silo.client.base_url
     damaged = tmp_path / "damaged.FCStd"
     damaged.write_bytes(gearbox.read_bytes()[:2000])
@@ -424,11 +382,11 @@ def test_exit_codes_are_those_of_the_table(
     assert "\n".join(rows) in page, "\n".join(rows)
 
 
+@pytest.mark.usefixtures("registered")
 def test_several_files_are_taken_one_after_the_other(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path
 ) -> None:
     """The worst exit code; with --json a list; a file that is not there stops all."""
-    assert run("register", gearbox, "--yes").code == Exit.DONE
     inner = gearbox.with_name("Gearbox.FCStd")
     ran = run("bom", gearbox, inner, "--json")
     told = json.loads(ran.out)

@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -38,46 +37,38 @@ def changes(data: Any) -> dict[str, dict[str, tuple[Any, Any]]]:
 WANTED = {"TopAssembly.FCStd": {"M8x20Bolt": (12, 16), "Cover": (1, None)}}
 
 
-def test_two_folders(run: Any, changed: tuple[Path, Path]) -> None:
+def test_two_folders(run: Any, changed: tuple[Path, Path], tmp_path: Path) -> None:
+    """As text, as JSON, and in the reports for a pull request."""
     assert changes(run("bom-diff", *changed, "--json").json()) == WANTED
-    shown = run("bom-diff", *changed)
+    reports = [tmp_path / "diff.md", tmp_path / "diff.json"]
+    shown = run("bom-diff", *changed, *(word for path in reports for word in ("--report", path)))
     assert shown.code == 0
     assert "12 → 16" in shown.out
     assert "Cover" in shown.out
+    assert changes(json.loads(reports[1].read_text("utf-8"))) == WANTED
+    out = reports[0].read_text("utf-8")
+    assert "### TopAssembly.FCStd" in out
+    assert "| quantity changed | M8x20 Bolt | 12 → 16 | parts/M8x20Bolt.FCStd |" in out
     assert run("bom-diff", *changed, "--check").code == 1
     same = run("bom-diff", changed[0], changed[0], "--check")
     assert (same.code, "No BOM changed; assemblies compared: 2." in same.out) == (0, True)
 
 
-def test_markdown_for_a_pull_request(run: Any, changed: tuple[Path, Path], tmp_path: Path) -> None:
-    """And JSON as printed, beside what a person sees."""
-    reports = [tmp_path / "diff.md", tmp_path / "diff.json"]
-    shown = run("bom-diff", *changed, *(word for path in reports for word in ("--report", path)))
-    assert shown.out == run("bom-diff", *changed).out
-    assert changes(json.loads(reports[1].read_text("utf-8"))) == WANTED
-    out = reports[0].read_text("utf-8")
-    assert "### TopAssembly.FCStd" in out
-    assert "| quantity changed | M8x20 Bolt | 12 → 16 | parts/M8x20Bolt.FCStd |" in out
-
-
-@pytest.mark.usefixtures("needs_git")
-def test_two_revisions_and_the_work_tree(run: Any, changed: tuple[Path, Path], tmp_path: Path) -> None:
+def test_two_revisions_and_the_work_tree(
+    run: Any, git: Any, changed: tuple[Path, Path], tmp_path: Path
+) -> None:
     old, new = changed
     repository = tmp_path / "repo"
     models = repository / "cad"
     shutil.copytree(old, models)
 
-    def git(*words: str) -> None:
-        who = ("-c", "user.name=t", "-c", "user.email=t", "-c", "commit.gpgsign=false")
-        subprocess.run(["git", *who, *words], cwd=repository, capture_output=True, check=True)
-
-    git("init", "-q", "-b", "main")
-    git("add", "-A")
-    git("commit", "-qm", "first")
+    git(repository, "init", "-q", "-b", "main")
+    git(repository, "add", "-A")
+    git(repository, "commit", "-qm", "first")
     shutil.copytree(new, models, dirs_exist_ok=True)
     in_repository = {f"cad/{path}": lines for path, lines in WANTED.items()}
     assert changes(run("bom-diff", "--git", "HEAD", repository, "--json").json()) == in_repository
-    git("commit", "-qam", "second")
+    git(repository, "commit", "-qam", "second")
     assert changes(run("bom-diff", "--git", "HEAD~1..HEAD", repository, "--json").json()) == in_repository
     # Of one folder, its own files; the work tree stays as it is.
     assert changes(run("bom-diff", "--git", "HEAD~1..HEAD", models, "--json").json()) == WANTED
@@ -112,29 +103,19 @@ def test_an_unreadable_file_and_a_missing_one_are_reported(run: Any, tmp_path: P
     assert run("bom-diff", tmp_path / "new", tmp_path / "old").code == 0
 
 
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [((), "two folders"), (("a",), "two folders"), (("--git", "A..B", "a", "b"), "at most one folder")],
-)
-def test_wrong_words_are_explained(run: Any, words: tuple[str, ...], named: str) -> None:
-    ran = run("bom-diff", *words)
-    assert ran.code == 2
-    assert named in ran.err
+def test_wrong_words_are_explained(run: Any, tmp_path: Path) -> None:
+    for words, named in (
+        ((), "two folders"),
+        (("a",), "two folders"),
+        (("--git", "A..B", "a", "b"), "at most one folder"),
+        ((tmp_path, tmp_path / "nowhere"), "nowhere"),
+    ):
+        ran = run("bom-diff", *words)
+        assert (ran.code, named in ran.err) == (2, True)
 
 
-def test_a_folder_that_is_not_there_is_an_error(run: Any, tmp_path: Path) -> None:
-    ran = run("bom-diff", tmp_path, tmp_path / "nowhere")
-    assert ran.code == 2
-    assert "nowhere" in ran.err
-
-
-@pytest.mark.usefixtures("needs_git")
-def test_a_folder_that_uses_what_lies_beside_it(run: Any, tmp_path: Path) -> None:
+def test_a_folder_that_uses_what_lies_beside_it(run: Any, git: Any, tmp_path: Path) -> None:
     """Its parts are read, though only its own BOMs are compared; also where it is gone by now."""
-
-    def git(*words: str) -> None:
-        who = ("-c", "user.name=t", "-c", "user.email=t", "-c", "commit.gpgsign=false")
-        subprocess.run(["git", *who, *words], cwd=tmp_path, capture_output=True, check=True)
 
     def assembly(*files: str) -> Doc:
         doc = Doc("asm")
@@ -148,9 +129,9 @@ def test_a_folder_that_uses_what_lies_beside_it(run: Any, tmp_path: Path) -> Non
     assembly("../parts/P.FCStd").save(tmp_path / "asm/A.FCStd")
     assembly("../parts/P.FCStd").save(tmp_path / "old/O.FCStd")
     (tmp_path / ".siloignore").write_text("old/\n")
-    git("init", "-q", "-b", "main")
-    git("add", "-A")
-    git("commit", "-qm", "first")
+    git(tmp_path, "init", "-q", "-b", "main")
+    git(tmp_path, "add", "-A")
+    git(tmp_path, "commit", "-qm", "first")
     # What is ignored is ignored on both sides.
     assert run("bom-diff", "--git", "HEAD", tmp_path, "--check").code == 0
     assembly("../parts/P.FCStd", "../parts/P.FCStd").save(tmp_path / "asm/A.FCStd")
@@ -165,7 +146,7 @@ def test_a_folder_that_uses_what_lies_beside_it(run: Any, tmp_path: Path) -> Non
 
 
 @pytest.fixture
-def beside(tmp_path: Path) -> Path:
+def beside(git: Any, tmp_path: Path) -> Path:
     """A repository whose assembly uses a library beside its folder, and a part of it that is not there."""
     repository = tmp_path / "repo"
     (repository / "cad").mkdir(parents=True)
@@ -188,34 +169,23 @@ def beside(tmp_path: Path) -> Path:
     return repository
 
 
-def git(repository: Path, *words: str) -> str:
-    who = ("-c", "user.name=x", "-c", "user.email=x@example.com")
-    done = subprocess.run(["git", *who, *words], cwd=repository, check=True, capture_output=True, text=True)
-    return done.stdout.strip()
-
-
-@pytest.mark.usefixtures("needs_git")
-@pytest.mark.parametrize("form", [(), ("--json",), ("--report", "diff.md")])
-def test_no_path_is_a_temporary_one(run: Any, beside: Path, form: tuple[str, ...], tmp_path: Path) -> None:
-    """Revisions are laid out somewhere; people know the paths of the repository."""
+def test_no_path_is_a_temporary_one_and_objects_are_told_apart(
+    run: Any, beside: Path, tmp_path: Path
+) -> None:
+    """Revisions are laid out somewhere; people know the paths of the repository. Two objects of one file have
+    one label.
+    """
     report = tmp_path / "diff.md"
-    form = tuple(str(report) if word == "diff.md" else word for word in form)
-    ran = run("bom-diff", "--git", "main~1..main", beside / "cad", *form)
-    out = report.read_text("utf-8") if report.exists() else ran.out
-    assert "../lib/gone.FCStd is missing" in out
-    assert "silo-bom-diff" not in out + ran.err
+    ran = run("bom-diff", "--git", "main~1..main", beside / "cad", "--report", report)
+    assert ran.out.count("two.FCStd#Left") == ran.out.count("two.FCStd#Right") == 1
+    data = run("bom-diff", "--git", "main~1..main", beside / "cad", "--json")
+    for out in (ran.out, report.read_text("utf-8"), data.out):
+        assert "../lib/gone.FCStd is missing" in out
+        assert "silo-bom-diff" not in out + ran.err + data.err
 
 
-@pytest.mark.usefixtures("needs_git")
-def test_objects_of_one_file_are_told_apart(run: Any, beside: Path) -> None:
-    """They have one label."""
-    out = run("bom-diff", "--git", "main~1..main", beside / "cad").out
-    assert out.count("two.FCStd#Left") == out.count("two.FCStd#Right") == 1
-
-
-@pytest.mark.usefixtures("needs_git")
 @pytest.mark.parametrize("lost", ["cad/top.FCStd", "lib/part.FCStd", "cad/two.FCStd"])
-def test_a_blob_that_is_not_there_is_a_finding(run: Any, beside: Path, lost: str) -> None:
+def test_a_blob_that_is_not_there_is_a_finding(run: Any, git: Any, beside: Path, lost: str) -> None:
     """As in a partial clone. The rest is compared, and what was not read has not lost its assembly."""
     blob = git(beside, "rev-parse", f"main:{lost}")
     os.remove(beside / ".git" / "objects" / blob[:2] / blob[2:])

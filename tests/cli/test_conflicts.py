@@ -11,12 +11,13 @@ import requests
 
 from silo.cli.demo import remove_from_assembly, set_element_count
 
+pytestmark = pytest.mark.usefixtures("synced")
+
 
 @pytest.fixture
-def top(run: Any, silo: Any, gearbox: Path) -> str:
-    """The part number of the synced top assembly."""
-    run("register", gearbox, "--yes")
-    return str(run("sync", gearbox, "--json").json()["results"][0]["assemblies"][0]["part_number"])
+def top(silo: Any) -> str:
+    """The part number of the top assembly."""
+    return str(silo.client.search_items("Top Assembly")[0].part_number)
 
 
 def status(run: Any, gearbox: Path) -> str:
@@ -35,45 +36,31 @@ def ask(silo: Any, method: str, path: str, body: Any = None) -> Any:
     return answer.json()
 
 
-def bolt_of(silo: Any, top: str) -> str:
-    return next(line.child_part_number for line in silo.client.get_bom(top) if line.quantity == 12)
+def conflicts(silo: Any, top: str) -> list[tuple[float, float]]:
+    """Return (CAD's quantity, Silo's quantity) of each."""
+    rows = ask(silo, "GET", f"/api/items/{top}/bom/review")["conflicts"]
+    return [(row["assembly_quantity"], row["server_quantity"]) for row in rows]
 
 
-def test_a_conflict_alone_is_reported_once(run: Any, silo: Any, gearbox: Path, top: str) -> None:
-    """A person sets 14, CAD says 12: the server learns of it, and the same again sends nothing."""
-    bolt = bolt_of(silo, top)
-    silo.client.update_bom_line(top, bolt, quantity=14)
-    assert status(run, gearbox) == "merged"
-    [conflict] = ask(silo, "GET", f"/api/items/{top}/bom/review")["conflicts"]
-    assert (conflict["assembly_quantity"], conflict["server_quantity"]) == (12, 14)
-    assert status(run, gearbox) == "unchanged"
-
-
-def test_what_a_person_kept_stays_quiet_until_cad_says_something_else(
-    run: Any, silo: Any, gearbox: Path, top: str
+@pytest.mark.parametrize("settled_by", ["a person", "CAD"])
+def test_a_conflict_alone_is_reported_once(
+    run: Any, silo: Any, gearbox: Path, top: str, settled_by: str
 ) -> None:
-    """Keep 14: no more questions; four more bolts in CAD: asked again."""
-    bolt = bolt_of(silo, top)
-    silo.client.update_bom_line(top, bolt, quantity=14)
-    status(run, gearbox)
-    decision = {"decisions": [{"child_part_number": bolt, "action": "keep_silo"}]}
-    ask(silo, "POST", f"/api/items/{top}/bom/resolve", decision)
-    assert status(run, gearbox) == "unchanged"
-    set_element_count(gearbox, "CoverBolts", added=4)
-    assert status(run, gearbox) == "merged"
-    [conflict] = ask(silo, "GET", f"/api/items/{top}/bom/review")["conflicts"]
-    assert conflict["assembly_quantity"] == 16
+    """A person sets 14, CAD says 12: the server learns of it, and the same again sends nothing.
 
-
-def test_a_conflict_that_cad_settles_is_over(run: Any, silo: Any, gearbox: Path, top: str) -> None:
-    """CAD comes to the person's number: the server hears of it, and asks no more."""
-    bolt = bolt_of(silo, top)
+    A person who keeps 14 is asked again when CAD says something else; CAD that comes to 14 ends it.
+    """
+    bolt = next(line.child_part_number for line in silo.client.get_bom(top) if line.quantity == 12)
     silo.client.update_bom_line(top, bolt, quantity=14)
-    status(run, gearbox)
-    set_element_count(gearbox, "CoverBolts", added=2)
-    assert status(run, gearbox) == "merged"
-    assert ask(silo, "GET", f"/api/items/{top}/bom/review")["conflicts"] == []
-    assert status(run, gearbox) == "unchanged"
+    assert [status(run, gearbox) for _ in range(2)] == ["merged", "unchanged"]
+    assert conflicts(silo, top) == [(12, 14)]
+    if settled_by == "a person":
+        decision = {"decisions": [{"child_part_number": bolt, "action": "keep_silo"}]}
+        ask(silo, "POST", f"/api/items/{top}/bom/resolve", decision)
+        assert status(run, gearbox) == "unchanged"
+    set_element_count(gearbox, "CoverBolts", added=4 if settled_by == "a person" else 2)
+    assert [status(run, gearbox) for _ in range(2)] == ["merged", "unchanged"]
+    assert conflicts(silo, top) == ([(16, 14)] if settled_by == "a person" else [])
 
 
 def test_an_override_whose_component_goes_is_reported(run: Any, silo: Any, gearbox: Path, top: str) -> None:
@@ -82,7 +69,5 @@ def test_an_override_whose_component_goes_is_reported(run: Any, silo: Any, gearb
     silo.client.update_bom_line(top, lines["Cover"].child_part_number, quantity=3)
     status(run, gearbox)
     remove_from_assembly(gearbox, "Cover")
-    assert status(run, gearbox) == "merged"
-    [conflict] = ask(silo, "GET", f"/api/items/{top}/bom/review")["conflicts"]
-    assert (conflict["assembly_quantity"], conflict["server_quantity"]) == (0, 3)
-    assert status(run, gearbox) == "unchanged"
+    assert [status(run, gearbox) for _ in range(2)] == ["merged", "unchanged"]
+    assert conflicts(silo, top) == [(0, 3)]

@@ -31,6 +31,8 @@ def test_register_lists_what_is_modelled_in_the_file(run: Any, silo: Any, machin
     assert "--declare" in done.out
     rows = run("register", machine, "--yes", "--json").json()["modelled"]
     assert [(row["objects"], row["quantity"]) for row in rows] == [(["Motor", "Motor001"], 2), (["Jig"], 1)]
+    wrong = run("register", machine, "--yes", "--declare", "Moter")
+    assert (wrong.code, "there is: Motor, Jig" in wrong.err) == (2, True)
     assert run("bom", machine, "--flat", "--json").json() == []
 
 
@@ -104,9 +106,3 @@ def test_what_a2plus_imported_joins_the_item_of_its_file(run: Any, silo: Any, tm
     registered = {one["silo_uuid"]: one["part_number"] for one in done["registered"]}
     identity = open_document(source).Meta["SiloUUID"]
     assert (row["quantity"], row["part_number"]) == (2, registered[identity])
-
-
-def test_a_name_that_means_nothing_says_what_there_is(run: Any, silo: Any, machine: Path) -> None:
-    done = run("register", machine, "--yes", "--declare", "Moter")
-    assert done.code == 2
-    assert "there is: Motor, Jig" in done.err

@@ -94,7 +94,7 @@ def test_the_add_on_and_its_packages(
 def test_a_freecad_that_crashes_is_named_as_the_culprit(
     dies: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """By the signal, or as FreeCAD itself reports it; nothing is installed then."""
+    """By the signal, or as FreeCAD itself reports it; nothing is installed then, nor if there is none."""
     data = freecad(tmp_path, monkeypatch)
     Path(os.environ["SILO_FREECADCMD"]).write_text(f"#!/bin/sh\necho 'Illegal storage access'\n{dies}\n")
     words = "it crashed (SIGSEGV). It said: Illegal storage access"
@@ -102,11 +102,6 @@ def test_a_freecad_that_crashes_is_named_as_the_culprit(
     assert main(["install-addon"]) == 2
     assert capsys.readouterr().err.strip().endswith(words)
     assert not data.exists()
-
-
-def test_a_freecad_that_does_not_start_is_a_trouble(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
     monkeypatch.setenv("SILO_FREECADCMD", str(tmp_path / "nowhere"))
     assert "cannot be run" in seen(capsys)["FreeCAD"]
 

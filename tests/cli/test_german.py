@@ -20,7 +20,6 @@ from silo.bom.findings import FindingCode
 from silo.cli.main import THEMES, build_parser
 
 CLI = Path(silo.__file__).parent / "cli"
-COMMANDS = [command for commands in THEMES.values() for command in commands]
 WORDS = re.compile(r"[A-Za-z]{2}\b")
 
 
@@ -37,16 +36,16 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     return dict(commands.choices)
 
 
-@pytest.mark.parametrize("command", ["", *COMMANDS])
-def test_help_is_german_and_80_columns_wide(german: None, run: Any, command: str) -> None:
+def test_help_is_german_and_80_columns_wide(german: None, run: Any) -> None:
     """But for examples, which are copied, and groups of options, which argparse never breaks."""
-    ran = run(*filter(None, (command, "--help")))
-    assert ran.code == 0
-    assert ran.out.startswith("Aufruf: silo-mod")
-    assert "diese Hilfe zeigen" in ran.out
-    assert "Beispiel:" in ran.out or not command
-    for line in ran.out.splitlines():
-        assert len(line) <= 80 or line.startswith(("  silo-mod ", " " * len("Aufruf: silo-mod"))), line
+    for command in ("", *(command for commands in THEMES.values() for command in commands)):
+        ran = run(*filter(None, (command, "--help")))
+        assert ran.code == 0
+        assert ran.out.startswith("Aufruf: silo-mod")
+        assert "diese Hilfe zeigen" in ran.out
+        assert f"Beispiel:\n  silo-mod {command}" in ran.out or not command
+        for line in ran.out.splitlines():
+            assert len(line) <= 80 or line.startswith(("  silo-mod ", " " * len("Aufruf: silo-mod"))), line
 
 
 def test_each_help_is_translated(german: None) -> None:
@@ -82,10 +81,9 @@ def test_tables_and_findings_are_german(german: None, run: Any, gearbox: Path) -
     assert any("is missing; used by" in finding["message"] for finding in found)
 
 
+@pytest.mark.usefixtures("synced")
 def test_the_order_list_is_german(german: None, run: Any, silo: Any, gearbox: Path) -> None:
     """Headings, kinds, remarks and the end, where one is no plural; names stay."""
-    run("register", gearbox, "--yes")
-    run("sync", gearbox, "--recursive")
     number = run("bom", gearbox, "--resolve", "--json").json()["assembly"]["part_number"]
     first, other = [row["part_number"] for row in run("order", number, "--json").json()["parts"][:2]]
     terms = {"supplier": "Needed", "standard_cost": 0.5, "lead_time_days": 1}

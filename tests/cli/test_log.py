@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 
 from silo.cli.demo import remove_from_assembly, set_element_count
+from silo.files import sha256_of
 from silo.outbox.store import Store
 
 
 @pytest.fixture(name="history")
-def _history(run: Any, silo: Any, gearbox: Path) -> str:
+def _history(registered: Path, silo: Any, gearbox: Path) -> str:
     """Three files of the top assembly are in Silo: as registered, without the cover, with other bolts."""
-    assert run("register", gearbox, "--yes").code == 0
     (top,) = (i for i in silo.client.search_items("Top Assembly") if i.item_type == "assembly")
     number = str(top.part_number)
     silo.client.upload_file(number, gearbox, "first")
@@ -24,10 +24,6 @@ def _history(run: Any, silo: Any, gearbox: Path) -> str:
     set_element_count(gearbox, "CoverBolts", added=4)
     silo.client.upload_file(number, gearbox, "more [bold]bolts")
     return number
-
-
-def of_files(told: dict[str, Any]) -> list[dict[str, Any]]:
-    return [row for row in told["revisions"] if row["file_name"]]
 
 
 def test_the_revisions_newest_first_and_which_one_the_file_is(run: Any, history: str, gearbox: Path) -> None:
@@ -43,30 +39,22 @@ def test_the_revisions_newest_first_and_which_one_the_file_is(run: Any, history:
     assert (told["part_number"], told["edited"]) == (history, False)
     newest = told["revisions"][0]
     assert told["file_is"] == newest["revision_number"]
-    assert set(newest) == {
-        "revision_number",
-        "comment",
-        "created_by",
-        "created_at",
-        "file_name",
-        "file_size",
-        "base_revision",
-    }
+    count = len(told["revisions"])
+    ran = run("log", gearbox, "--limit", 1)
+    assert "without the cover" not in ran.out
+    assert f"… and {count - 1} older; --limit shows more" in ran.out
 
 
 def test_what_each_revision_changed_in_the_bom(run: Any, history: str, gearbox: Path) -> None:
     """Against the file before it, read from both files."""
-    told = of_files(run("log", gearbox, "--changes", "--json").json())
-    assert told[0]["bom"] == "M8x20 Bolt 12 → 16"
-    assert told[1]["bom"] == "- Cover 1"
+    told = run("log", gearbox, "--changes", "--json").json()["revisions"]
+    assert [row["bom"] for row in told if row["file_name"]][:2] == ["M8x20 Bolt 12 → 16", "- Cover 1"]
     text = run("log", gearbox, "--changes").out
     assert "- Cover 1" in text
 
 
 def test_an_edited_file_says_what_it_was_made_from(run: Any, history: str, gearbox: Path) -> None:
     """Where the add-on has seen it being saved; otherwise nobody knows, and that is what it says."""
-    from silo.files import sha256_of
-
     told = run("log", gearbox, "--json").json()
     before = sha256_of(gearbox)
     set_element_count(gearbox, "CoverBolts", added=1)
@@ -77,14 +65,6 @@ def test_an_edited_file_says_what_it_was_made_from(run: Any, history: str, gearb
     edited = run("log", gearbox, "--json").json()
     assert (edited["file_is"], edited["edited"]) == (told["file_is"], True)
     assert "← this file, edited since" in run("log", gearbox).out
-
-
-def test_a_limit_names_the_others(run: Any, history: str, gearbox: Path) -> None:
-    """None is left out in silence."""
-    count = len(run("log", gearbox, "--json").json()["revisions"])
-    ran = run("log", gearbox, "--limit", 1)
-    assert "without the cover" not in ran.out
-    assert f"… and {count - 1} older; --limit shows more" in ran.out
 
 
 def test_what_changed_in_the_product_since(run: Any, silo: Any, history: str, gearbox: Path) -> None:

@@ -74,66 +74,45 @@ def test_at_a_terminal_the_browser_lets_the_program_in(silo: Any, tmp_path: Path
     assert kept not in page + out + err
 
 
-@pytest.mark.parametrize("token", ["silo_wrong", ""])
 def test_what_does_not_work_is_not_kept(
-    run: Any, silo: Any, monkeypatch: pytest.MonkeyPatch, token: str
+    run: Any, silo: Any, gearbox: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sys.stdin", io.StringIO(f"{token}\n"))
-    ran = run("login", silo.client.base_url)
-    assert ran.code == (3 if token else 2)
-    assert ran.err
-    assert not config_path().exists()
+    """A script whose variable is not set must not reach another server than it thinks."""
+    for token in ("silo_wrong", ""):
+        monkeypatch.setattr("sys.stdin", io.StringIO(f"{token}\n"))
+        ran = run("login", silo.client.base_url)
+        assert (ran.code, bool(ran.err)) == (3 if token else 2, True)
+        assert not config_path().exists()
+    for option in ("--server", "--token"):
+        ran = run("diff", gearbox, option, "")
+        assert (ran.code, f"{option} is empty" in ran.err) == (2, True)
+    monkeypatch.delenv("SILO_API_TOKEN", raising=False)
+    ran = run("sync", gearbox, "--server", silo.client.base_url)
+    assert (ran.code, "wants a token, and none was given" in ran.err) == (3, True)
 
 
-def test_what_else_is_configured_stays(run: Any, silo: Any) -> None:
+def test_logout_forgets_what_login_kept(run: Any, silo: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And says that nothing was there, or that the environment still has a token. A file of others stays."""
     path = config_path()
     path.parent.mkdir(parents=True)
     path.write_text('[server]\nurl = "http://old.example"\ntoken = "silo_old"\n')
     path.chmod(0o600)
     assert run("login", silo.client.base_url, "--token", silo.token).code == 0
     assert load_config(path)["server"]["url"] == silo.client.base_url
-
-
-def test_without_a_token_the_message_says_so(
-    run: Any, silo: Any, gearbox: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("SILO_API_TOKEN", raising=False)
-    ran = run("sync", gearbox, "--server", silo.client.base_url)
-    assert ran.code == 3
-    assert "wants a token, and none was given" in ran.err
-
-
-@pytest.mark.parametrize("option", ["--server", "--token"])
-def test_an_empty_option_is_an_error(run: Any, silo: Any, gearbox: Path, option: str) -> None:
-    """A script whose variable is not set must not reach another server than it thinks."""
-    ran = run("diff", gearbox, option, "")
-    assert ran.code == 2
-    assert f"{option} is empty" in ran.err
-
-
-def test_logout_forgets_what_login_kept(run: Any, silo: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And says that nothing was there, or that the environment still has a token."""
-    assert run("login", silo.client.base_url, "--token", silo.token).code == 0
     assert "SILO_API_TOKEN still" in run("logout").out
-    assert not config_path().exists()
+    assert not path.exists()
     for name in ("SILO_API_URL", "SILO_API_TOKEN"):
         monkeypatch.delenv(name, raising=False)
     assert "nothing is remembered" in run("logout").out
     assert run("whoami").code == 2
-
-
-def test_logout_leaves_a_file_that_is_not_ours(run: Any, silo: Any) -> None:
-    path = config_path()
-    path.parent.mkdir(parents=True)
     path.write_text("[other]\nkey = 1\n")
     path.chmod(0o600)
     assert run("logout").code == 2
     assert path.exists()
 
 
+@pytest.mark.usefixtures("synced")
 def test_search_show_and_whoami(run: Any, silo: Any, gearbox: Path) -> None:
-    run("register", gearbox, "--yes")
-    run("sync", gearbox, "--recursive")
     (found,) = run("search", "base", "plate", "--json").json()
     assert found["name"] == "Base Plate"
     assert run("search", "no-such-words").code == 1

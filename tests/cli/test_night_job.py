@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,32 +21,19 @@ from silo.cli.common import ProgressPrinter
 from silo.fcstd import Library
 from silo.vault.plan import NAME, only_job
 
-BUSY = b'{"error": "busy", "message": "later"}'
-
 
 def busy(status: int, after: str) -> Fault:
     """A server that puts its client off."""
-    return Fault(status, BUSY, "application/json", headers={"Retry-After": after})
+    body = b'{"error": "busy", "message": "later"}'
+    return Fault(status, body, "application/json", headers={"Retry-After": after})
 
 
 @pytest.fixture
-def proxy(silo: Any, run: Any, gearbox: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Proxy]:
+def proxy(registered: Path, silo: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Proxy]:
     """Between the job and the server, which knows the parts of the example."""
-    assert run("register", gearbox, "--yes").code == 0
     with fault_proxy(os.environ["SILO_API_URL"]) as proxy:
         monkeypatch.setenv("SILO_API_URL", proxy.url)
         yield proxy
-
-
-@contextmanager
-def job(folder: Path, report: Path) -> Iterator[subprocess.Popen[str]]:
-    """The job as a process of its own."""
-    command = [sys.executable, "-m", "silo.cli.main", "sync", str(folder), "--report", str(report)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
 
 
 @pytest.mark.parametrize(("status", "path"), [(429, "/merge"), (503, "/api/items")])
@@ -65,11 +51,15 @@ def test_a_job_that_is_stopped_while_it_waits_ends_at_once_and_the_next_one_cont
     """SIGTERM, by which a service is stopped: the report is written, and says that the run did not end."""
     proxy.item, proxy.fault = "/merge", busy(503, "100")
     report = tmp_path / "night.json"
-    with job(gearbox.parent, report) as process:
-        assert proxy.met.wait(60)
-        process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=30)
-        assert process.returncode not in (0, -signal.SIGKILL)
+    command = [sys.executable, "-m", "silo.cli.main", "sync", gearbox.parent, "--report", report]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        try:
+            assert proxy.met.wait(60)
+            process.send_signal(signal.SIGTERM)
+            process.communicate(timeout=30)
+        finally:
+            process.kill()
+    assert process.returncode not in (0, -signal.SIGKILL)
     assert json.loads(report.read_text(encoding="utf-8"))["ended"] is False
     assert not (gearbox.parent / NAME).exists()
     proxy.fault = None
@@ -222,6 +212,8 @@ def test_a_renamed_file_is_reported_once_by_the_run_that_syncs(run: Any, parts: 
     (parts / "p/a.FCStd").rename(parts / "c.FCStd")
     top(parts, identity, "c.FCStd", "p/b.FCStd")
     wanted = [("p/a.FCStd", "c.FCStd")]
+    summary = run("sync", parts, "--json", "--dry-run").json()["summary"]
+    assert (summary["moved"][0]["name"], summary["lines_changed"]) == ("c", 0), "it is the same part"
     assert moves(run, parts, "--dry-run") == wanted
     assert [moves(run, parts), moves(run, parts)] == [wanted, []]
 

@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 from silo.batch import Html, RunSummary, TopResult
 from silo.bom.errors import DocumentError, Exit, SiloError, UnreachableError
 
-POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:{}\nsize 12345\n"
 TAGS = set("html head meta title style body h1 h2 h3 p ul li table tr th td".split())  # noqa: SIM905
 
 
@@ -40,13 +39,12 @@ class Visible(HTMLParser):
 
 
 def pointer(path: Path) -> None:
-    path.write_text(POINTER.format("0" * 64))
+    path.write_text(f"version https://git-lfs.github.com/spec/v1\noid sha256:{'0' * 64}\nsize 12345\n")
 
 
 @pytest.fixture
-def night(run: Any, silo: Any, gearbox: Path, tmp_path: Path) -> Any:
+def night(run: Any, registered: Path, silo: Any, gearbox: Path, tmp_path: Path) -> Any:
     """Run a night; return its exit code and its report in each form."""
-    assert run("register", gearbox, "--yes").code == 0
 
     def _night(*words: str) -> tuple[int, dict[str, str]]:
         paths = [tmp_path / f"night.{form}" for form in ("md", "html", "json", "xml")]
@@ -75,8 +73,11 @@ def test_the_second_night_says_what_is_new(night: Any, gearbox: Path) -> None:
     assert "new.FCStd" in third["md"]
 
 
-def test_files_with_one_cause_are_one_line(night: Any, gearbox: Path) -> None:
-    """Fifteen pointers are one thing to do."""
+def test_all_forms_say_the_same(night: Any, gearbox: Path) -> None:
+    """The counts on top, every sentence, every change; files with one cause are one line: one thing to do.
+
+    Files that cannot be read are reported first, and the others are synced; parts are passed over.
+    """
     for number in range(15):
         pointer(gearbox.parent / f"p{number}.FCStd")
     code, told = night()
@@ -84,54 +85,32 @@ def test_files_with_one_cause_are_one_line(night: Any, gearbox: Path) -> None:
     assert re.search(r"^- 15 × it is a Git LFS pointer", told["md"], re.MULTILINE)
     assert told["md"].count("git lfs pull") == 1
     assert "15 × it is a Git LFS pointer" in told["html"]
-    causes = [one["cause"] for one in json.loads(told["json"])["summary"]["errors"]]
-    assert len(causes) == 15
-    assert len(set(causes)) == 1
-
-
-def test_all_forms_say_the_same(night: Any, gearbox: Path) -> None:
-    """The counts on top, every sentence, every change."""
-    pointer(gearbox.parent / "p.FCStd")
-    _, told = night()
-    summary = json.loads(told["json"])["summary"]
+    places = [told["md"].index(words) for words in ("## Errors", "p0.FCStd", "TopAssembly.FCStd")]
+    assert places == sorted(places)
+    assert "| added |" in told["md"]
+    data = json.loads(told["json"])
+    summary = data["summary"]
+    assert (data["ended"], len(data["results"])) == (True, 17)
+    assert (summary["files"], summary["in_order"], summary["parts"]) == (24, 9, 7)
+    causes = [one["cause"] for one in summary["errors"]]
+    assert (len(causes), len(set(causes))) == (15, 1)
     page = Visible(told["html"])
     shown = " ".join(page.text)
     assert told["md"].splitlines()[2].startswith(told["html"].split("<p>")[1].split(" files")[0])
-    for words in (one["message"] for one in (*summary["errors"], *summary["warnings"])):
+    for words in (one["message"] for one in summary["warnings"]):
         assert words in shown
     assert "M8x20 Bolt" in shown
-    assert page.tags <= {
-        *[
-            "html",
-            "head",
-            "meta",
-            "title",
-            "style",
-            "body",
-            "h1",
-            "h2",
-            "h3",
-            "p",
-            "ul",
-            "li",
-            "table",
-            "tr",
-            "th",
-            "td",
-        ]
-    }
+    assert page.tags <= TAGS
     suite = ElementTree.fromstring(told["xml"]).find("testsuite")  # noqa: S314
     assert suite is not None
-    assert [suite.get("tests"), suite.get("errors")] == ["3", "1"]
+    assert [suite.get("tests"), suite.get("errors")] == ["17", "15"]
 
 
 @given(st.text(st.sampled_from("ab<>&\"'\n\x00\x1b\u202e\ud800"), max_size=20))
 def test_text_of_others_does_nothing_in_html(text: str) -> None:
     summary = RunSummary(warnings={text: []}, notes=[text])
     page = Visible(Html().head(summary) + Html().end(summary))
-    assert page.tags <= {
-        *["html", "head", "meta", "title", "style", "body", "h1", "h2", "h3", "p", "ul", "li"]
-    }
+    assert page.tags <= TAGS
     assert not re.search("[\x00\x1b\u202e]", "".join(page.text))
 
 
@@ -178,11 +157,11 @@ def test_own_parts_that_are_no_items_leave_a_file_undone(run: Any, silo: Any, tm
     assert "1 own part is no item yet" in night.out
 
 
+@pytest.mark.usefixtures("registered")
 def test_a_dead_server_wins_over_bad_files(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And the first line says how many assemblies were not sent, and why."""
-    run("register", gearbox, "--yes")
     pointer(gearbox.parent / "p.FCStd")
     report = tmp_path / "night.md"
     with fault_proxy(silo.client.base_url) as proxy:

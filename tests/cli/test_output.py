@@ -3,64 +3,94 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import random
 import shlex
 import subprocess
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import pytest
 from fcstd_writer import Doc, locals_, part
 
+from silo.cli.main import main
+
 SILO_MOD = shlex.join([sys.executable, "-m", "silo.cli.main"])
-ASCII = {"PYTHONIOENCODING": "ascii"}
 
 
-def shell(line: str, **env: str) -> subprocess.CompletedProcess[bytes]:
-    """Run a line of shell; ``silo-mod`` in it is ours. ``pipefail`` shows the exit code of the first."""
-    known = {name: value for name, value in os.environ.items() if name not in ("PYTHONUNBUFFERED", *ASCII)}
-    return subprocess.run(
-        ["bash", "-c", f'set -o pipefail; silo-mod() {{ {SILO_MOD} "$@"; }}; {line}'],
-        capture_output=True,
-        env={**known, **env},
-        timeout=120,
-        check=False,
-    )
+def into(stream: IO[Any] | None, *words: object) -> int:
+    """Run a command whose standard output is this stream; return its exit code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "stdout", stream)
+        code = main([str(word) for word in words])
+        if stream is None:  # it was replaced by one that takes anything
+            sys.stdout.close()
+        return code
 
 
-@pytest.mark.parametrize("option", ["", "--json", "--flat"])
-def test_a_reader_that_has_seen_enough_is_no_failure(gearbox: Path, option: str) -> None:
-    """``silo-mod bom … | head -1``."""
-    ran = shell(f"silo-mod bom '{gearbox}' {option} | head -1")
-    assert (ran.returncode, ran.stderr) == (0, b"")
-    assert len(ran.stdout.splitlines()) == 1
+def bytes_in(encoding: str, *words: object) -> bytes:
+    """Return what a command prints on a terminal of that encoding."""
+    raw = io.BytesIO()
+    stream = io.TextIOWrapper(raw, encoding)
+    assert into(stream, *words) == 0
+    stream.flush()
+    return raw.getvalue()
 
 
-FULL = pytest.mark.usefixtures("needs_dev_full")
+def sentences(errors: str) -> list[str]:
+    """Return the lines of standard error, but for those that a slow machine gets about the progress."""
+    return [line for line in errors.splitlines() if not line.startswith("silo-mod bom: ")]
 
 
-@FULL
-@pytest.mark.parametrize("option", ["", "--json", "--help"])
-def test_a_full_disk_is_one_sentence(gearbox: Path, option: str) -> None:
-    """And not exit code 0: the answer did not arrive."""
-    ran = shell(f"silo-mod bom '{gearbox}' {option} > /dev/full")
-    assert ran.returncode == 2
-    assert len(ran.stderr.splitlines()) == 1
+@contextmanager
+def closed_pipe() -> Iterator[IO[str]]:
+    """Open the output of a program whose reader is gone, as after ``| head -1``."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, "w", encoding="utf-8") as stream:
+        yield stream
 
 
-@FULL
-@pytest.mark.parametrize("ending", ["| head -1", "> /dev/full"])
-def test_a_sync_that_nobody_reads_is_done_to_its_end(silo: Any, run: Any, gearbox: Path, ending: str) -> None:
+@pytest.mark.usefixtures("needs_dev_full")
+def test_output_that_arrives_nowhere_in_a_shell(gearbox: Path) -> None:
+    """``silo-mod bom … | head -1`` is no failure, a full disk is one sentence: the answer did not arrive.
+
+    Python itself writes nothing at the end of the process that would fail again.
+    """
+    for line, code, out, err in (
+        (f"{SILO_MOD} bom '{gearbox}' --json | head -1", 0, 1, 0),
+        (f"{SILO_MOD} bom '{gearbox}' > /dev/full", 2, 0, 1),
+    ):
+        command = ["bash", "-c", f"set -o pipefail; {line}"]
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        assert ran.returncode == code
+        assert (len(ran.stdout.splitlines()), len(sentences(ran.stderr))) == (out, err)
+
+
+@pytest.mark.usefixtures("needs_dev_full")
+@pytest.mark.parametrize("option", ["--flat", "--json", "--help"])
+def test_output_that_arrives_nowhere(gearbox: Path, option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with closed_pipe() as stream:
+        assert into(stream, "bom", gearbox, option) == 0
+    assert sentences(capsys.readouterr().err) == []
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        assert into(full, "bom", gearbox, option) == 2
+    assert len(sentences(capsys.readouterr().err)) == 1
+
+
+@pytest.mark.usefixtures("needs_dev_full", "registered")
+@pytest.mark.parametrize("full", [False, True])
+def test_a_sync_that_nobody_reads_is_done_to_its_end(silo: Any, gearbox: Path, full: bool) -> None:
     """With its report: the output is for people, the work is what was asked for."""
-    run("register", gearbox, "--yes")
     report = gearbox.parent / "report.md"
-    options = f"--recursive --report '{report}' --server {silo.client.base_url} --token {silo.token}"
-    ran = shell(f"silo-mod sync '{gearbox.parent}' {options} {ending}")
-    assert ran.returncode == (0 if "head" in ending else 2), ran.stderr
+    with open("/dev/full", "w", encoding="utf-8") if full else closed_pipe() as stream:
+        code = into(stream, "sync", gearbox.parent, "--recursive", "--report", report)
+    assert code == (2 if full else 0)
     assert "files in order" in report.read_text()
     made = silo.client.search_items(item_type="assembly")
     assert made
@@ -101,42 +131,40 @@ def test_a_term_signal_ends_a_command_as_ctrl_c_does(tmp_path: Path) -> None:
     assert job.returncode == 130
 
 
-def test_a_job_may_have_no_streams(gearbox: Path) -> None:
+def test_a_job_may_have_no_streams(
+    gearbox: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Nothing to print to, nobody to ask."""
-    assert shell(f"silo-mod bom '{gearbox}' >&-").returncode == 0
-    assert shell(f"silo-mod bom '{gearbox}' --json >&- 2>&-").returncode == 0
-    ran = shell(f"silo-mod register '{gearbox}' <&-")
-    assert ran.returncode == 2
-    assert b"--yes" in ran.stderr
+    monkeypatch.setattr(sys, "stdin", None)
+    assert main(["register", str(gearbox)]) == 2
+    assert "--yes" in capsys.readouterr().err
+    sys.stdin.close()
+    monkeypatch.setattr(sys, "stderr", None)
+    assert into(None, "bom", gearbox) == into(None, "bom", gearbox, "--json") == 0
+    sys.stderr.close()
 
 
 def test_a_terminal_without_utf_8(gearbox: Path, tmp_path: Path) -> None:
     """Text is shown as well as can be; JSON says the same everywhere."""
     folder = gearbox.parent.rename(tmp_path / "Getriebe ü &")
-    ran = shell(f"silo-mod bom '{folder}/TopAssembly.FCStd'", **ASCII)
-    assert ran.returncode == 0, ran.stderr
-    assert b"1 ? Base Plate" in ran.stdout
-    top = folder / "Größe.FCStd"
-    (folder / "TopAssembly.FCStd").rename(top)
-    plain = shell(f"silo-mod bom '{top}' --json")
-    escaped = shell(f"silo-mod bom '{top}' --json", **ASCII)
-    assert json.loads(plain.stdout) == json.loads(escaped.stdout)
-    assert json.loads(plain.stdout)["assembly"]["doc_path"] == "Größe.FCStd"
-    assert "Größe".encode() in plain.stdout
-    assert escaped.stdout.isascii()
+    assert b"1 ? Base Plate" in bytes_in("ascii", "bom", folder / gearbox.name)
+    top = (folder / gearbox.name).rename(folder / "Größe.FCStd")
+    plain, escaped = (bytes_in(encoding, "bom", top, "--json") for encoding in ("utf-8", "ascii"))
+    assert json.loads(plain) == json.loads(escaped)
+    assert json.loads(plain)["assembly"]["doc_path"] == "Größe.FCStd"
+    assert "Größe".encode() in plain
+    assert escaped.isascii()
 
 
 def test_a_file_name_that_is_no_text(gearbox: Path) -> None:
     """Names are bytes on Linux; JSON gives them as Python does, escaped."""
-    strange = os.fsencode(gearbox.parent) + b"/caf\xe9.FCStd"
+    strange = Path(os.fsdecode(os.fsencode(gearbox.parent) + b"/caf\xe9.FCStd"))
     try:
-        os.rename(gearbox, strange)
+        gearbox.rename(strange)
     except OSError:
         pytest.skip("this file system wants names to be text")
-    for option in ("--json", ""):
-        words = [sys.executable, "-m", "silo.cli.main", "bom", strange, *([option] if option else [])]
-        ran = subprocess.run(words, capture_output=True, timeout=120, check=False)
-        assert ran.returncode == 0, ran.stderr
+    assert json.loads(bytes_in("utf-8", "bom", strange, "--json"))["assembly"]["doc_path"] == strange.name
+    assert b"Top Assembly" in bytes_in("utf-8", "bom", strange)
 
 
 def test_a_report_that_cannot_be_written_is_one_sentence(run: Any, silo: Any, gearbox: Path) -> None:
@@ -169,16 +197,15 @@ def test_a_part_has_an_empty_bom_and_nothing_beside(run: Any, gearbox: Path) -> 
     assert [finding["code"] for finding in found["findings"]] == ["empty_bom"]
 
 
-@pytest.mark.parametrize("words", [["bom"], ["sync", "--dry-run"], ["diff"], ["register", "--yes"]])
-def test_a_name_of_a_megabyte_does_not_fill_the_terminal(
-    run: Any, silo: Any, tmp_path: Path, words: list[str]
-) -> None:
+def test_a_name_of_a_megabyte_does_not_fill_the_terminal(run: Any, silo: Any, tmp_path: Path) -> None:
     """A hostile file's name may have 60 MB: the beginning of it says enough."""
     name = random.Random(1).randbytes(500_000).hex()
     part("part", "Box", Label=name).save(tmp_path / "part.FCStd")
     top = Doc(label=name).link("L1", f"{name}.FCStd", "Box").link("L2", "part.FCStd", "Box")
     top.add("App::Part", "Top", Label=name, Group=locals_("L1", "L2"), Type="Assembly")
-    done = run(words[0], top.save(tmp_path / "top.FCStd"), *words[1:])
-    assert done.code == 1
-    assert "there is no" not in done.err
-    assert len(done.out) + len(done.err) < 50_000
+    path = top.save(tmp_path / "top.FCStd")
+    for words in (["bom"], ["sync", "--dry-run"], ["diff"], ["register", "--yes"]):
+        done = run(words[0], path, *words[1:])
+        assert done.code == 1
+        assert "there is no" not in done.err
+        assert len(done.out) + len(done.err) < 50_000

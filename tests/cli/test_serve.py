@@ -19,99 +19,71 @@ import requests
 
 from silo.cli.main import main
 
-LINES = 4  # address, token, login link, database
-
-
-class Served:
-    """A running ``silo-mod serve`` and the lines that it printed."""
-
-    def __init__(self, process: subprocess.Popen[str], lines: list[str]) -> None:
-        self.process = process
-        self.lines = lines
-        self.url, self.token = (line.partition(":")[2].strip() for line in lines[:2])
-
-    def get(self, path: str, token: str | None = None) -> requests.Response:
-        headers = {"Authorization": f"Bearer {token or self.token}"}
-        return requests.get(self.url + path, headers=headers, timeout=30)
-
-    def stop(self, how: signal.Signals) -> int:
-        self.process.send_signal(how)
-        return self.process.wait(60)
-
 
 @contextmanager
-def serving(
-    database: Path, *options: str, lines: int = LINES, token: str | None = None
-) -> Iterator[list[str] | Served]:
+def serving(database: Path, *options: str, token: str | None = None) -> Iterator[subprocess.Popen[str]]:
     """Start one; its output is a pipe, and nothing turns buffering off for it."""
     env = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "SILO_"))}
-    if token:
-        env["SILO_API_TOKEN"] = token
     words = ["serve", "--port", "0", "--database", f"sqlite:///{database}", *options]
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-m", "silo.cli.main", *words],
-        env=env,
+        env=env | ({"SILO_API_TOKEN": token} if token else {}),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
         text=True,
-    )
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+    assert process.returncode == 0, "stopping a server is no failure"
+
+
+def get(url: str, token: str, **how: Any) -> requests.Response:
+    return requests.get(url, headers={"Authorization": f"Bearer {token}"}, timeout=30, **how)
+
+
+def first_lines(process: subprocess.Popen[str], count: int) -> list[str]:
     assert process.stdout is not None
-    assert process.stderr is not None
-    try:
-        told = [process.stdout.readline().rstrip("\n") for _ in range(lines)]
-        yield told if "--json" in options else Served(process, told)
-    finally:
-        process.terminate()
-        assert process.wait(60) == 0, process.stderr.read()
-        process.stdout.close()
-        process.stderr.close()
+    return [process.stdout.readline().rstrip("\n") for _ in range(count)]
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
-def test_it_says_its_address_at_once_and_ends_cleanly(tmp_path: Path, how: signal.Signals) -> None:
-    """Also while somebody listens to its events; stopping a server is no failure."""
-    with serving(tmp_path / "silo.db") as server:
-        assert isinstance(server, Served)
-        assert server.url.startswith("http://127.0.0.1:")
-        assert server.get("/api/items").json() == []
-        headers = {"Authorization": f"Bearer {server.token}"}
-        with requests.get(server.url + "/api/events", headers=headers, stream=True, timeout=30) as events:
+def test_it_says_its_address_at_once_and_ends_cleanly(tmp_path: Path) -> None:
+    """Also while somebody listens to its events. The database, with its password hashes, is its owner's."""
+    database = tmp_path / "silo.db"
+    database.touch(mode=0o644)  # as an older release left it
+    with serving(database) as server:
+        url, token = (line.partition(":")[2].strip() for line in first_lines(server, 2))
+        assert url.startswith("http://127.0.0.1:")
+        assert get(f"{url}/api/items", token).json() == []
+        if os.name != "nt":  # Windows keeps rights in lists, not in modes
+            assert [path for path in tmp_path.rglob("*") if path.stat().st_mode & 0o077] == []
+        with get(f"{url}/api/events", token, stream=True) as events:
             assert events.status_code == 200
-            assert server.stop(how) == 0
+            server.send_signal(signal.SIGINT)
+            assert server.wait(60) == 0
 
 
 def test_the_token_of_the_environment_is_taken_and_shown(tmp_path: Path) -> None:
-    """Whatever it looks like; it is good after a restart, also one that makes a token of its own."""
-    database = tmp_path / "silo.db"
-    with serving(database, token="our-own-token-of-some-length") as server:
-        assert isinstance(server, Served)
-        assert server.token == "our-own… (the one you gave)"
-        assert "our-own-token-of-some-length" not in "".join(server.lines)
-        assert server.get("/api/items", token="our-own-token-of-some-length").status_code == 200
-        assert server.get("/api/items", token="another").status_code == 401
-    with serving(database) as server:
-        assert isinstance(server, Served)
-        assert server.token != "our-own-token-of-some-length"
-        assert server.get("/api/items").status_code == 200
-        assert server.get("/api/items", token="our-own-token-of-some-length").status_code == 200
-
-
-def test_machines_get_one_line_of_json(tmp_path: Path) -> None:
-    """``--json``: address, token, login link, database, what to mend."""
-    with serving(tmp_path / "silo.db", "--json", lines=1) as told:
-        assert isinstance(told, list)
-        greeting = json.loads(told[0])
-    assert set(greeting) == {"url", "token", "login_url", "database", "public", "warnings"}
-    assert greeting["public"] is False
-
-
-def test_a_server_for_other_machines_says_so(tmp_path: Path) -> None:
-    """Only on request, and with a warning that it speaks without TLS."""
-    with serving(tmp_path / "silo.db", "--host", "0.0.0.0", lines=LINES + 1) as server:
-        assert isinstance(server, Served)
-        assert server.url.startswith("http://127.0.0.1:"), "an address that can be opened here"
-        assert "other machines" in server.lines[-1]
+    """Whatever it looks like; it is good after a restart, also one that makes a token of its own. A server
+    for other machines says that it is; machines get one line of JSON.
+    """
+    database, ours = tmp_path / "silo.db", "our-own-token-of-some-length"
+    with serving(database, "--host", "0.0.0.0", token=ours) as server:
+        lines = first_lines(server, 5)  # address, token, login link, database, warning
+        url, shown = (line.partition(":")[2].strip() for line in lines[:2])
+        assert url.startswith("http://127.0.0.1:"), "an address that can be opened here"
+        assert "other machines" in lines[-1]
+        assert shown == "our-own… (the one you gave)"
+        assert ours not in "".join(lines)
+        assert [get(f"{url}/api/items", token).status_code for token in (ours, "another")] == [200, 401]
+    with serving(database, "--json") as server:
+        greeting = json.loads(first_lines(server, 1)[0])
+        assert set(greeting) == {"url", "token", "login_url", "database", "public", "warnings"}
+        assert greeting["public"] is False
+        assert greeting["token"] != ours
+        for token in (greeting["token"], ours):
+            assert get(f"{greeting['url']}/api/items", token).status_code == 200
 
 
 WRONG: dict[str, tuple[list[str], str]] = {
@@ -148,17 +120,3 @@ def test_a_port_that_is_taken_is_one_sentence(tmp_path: Path, capsys: pytest.Cap
         assert main(["serve", "--port", port, "--database", f"sqlite:///{tmp_path / 'silo.db'}"]) == 2
     assert "--port 0" in capsys.readouterr().err
     assert not (tmp_path / "silo.db").exists()  # nor a user or a token that nobody has seen
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows keeps rights in lists, not in modes")
-def test_the_database_is_its_owners(tmp_path: Path) -> None:
-    """It has password hashes in it; one that an older release left open to others is closed."""
-    database = tmp_path / "silo.db"
-    database.touch(mode=0o644)
-    database.chmod(0o644)
-    with serving(database) as server:
-        assert isinstance(server, Served)
-        open_to_others = [
-            path.name for path in [database, *tmp_path.rglob("*")] if path.stat().st_mode & 0o077
-        ]
-        assert open_to_others == []

@@ -13,7 +13,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -108,12 +108,6 @@ def service() -> Iterator[Service]:
         server.shutdown()
 
 
-def git(folder: Path, *words: str) -> str:
-    who = ("-c", "user.name=t", "-c", "user.email=t", "-c", "commit.gpgsign=false")
-    done = subprocess.run(["git", *who, *words], cwd=folder, capture_output=True, text=True, check=True)
-    return done.stdout.strip()
-
-
 @dataclass
 class Runner:
     """Runs the steps of a workflow in a checkout, as its service's runner does."""
@@ -122,11 +116,12 @@ class Runner:
     checkout: Path
     tools: Path
     service: Service
+    git: Callable[..., str]
 
     def run(self) -> int:
         """The exit code of the first step that fails, else 0."""
         (job,) = self.workflow["jobs"].values()
-        base, head = git(self.checkout, "rev-parse", "origin/main"), git(self.checkout, "rev-parse", "HEAD")
+        base, head = (self.git(self.checkout, "rev-parse", name) for name in ("origin/main", "HEAD"))
         values = {
             "github.event.pull_request.base.sha": base,
             "github.event.pull_request.head.sha": head,
@@ -171,7 +166,9 @@ class Runner:
 
 
 @pytest.fixture(params=["github", "forgejo"])
-def runner(request: pytest.FixtureRequest, gearbox: Path, tmp_path: Path, service: Service) -> Runner:
+def runner(
+    request: pytest.FixtureRequest, git: Any, gearbox: Path, tmp_path: Path, service: Service
+) -> Runner:
     """A clone of a repository whose branch has four bolts more than main, which went on meanwhile."""
     text = (EXAMPLES / "ci" / f"{request.param}-bom-diff.yml").read_text("utf-8")
     folder = gearbox.parent
@@ -198,38 +195,33 @@ def runner(request: pytest.FixtureRequest, gearbox: Path, tmp_path: Path, servic
     for name, program in programs.items():
         (tools / "bin" / name).write_text(program)
         (tools / "bin" / name).chmod(0o755)
-    return Runner(yaml.safe_load(text), tmp_path / "checkout", tools, service)
+    return Runner(yaml.safe_load(text), tmp_path / "checkout", tools, service, git)
 
 
 def test_a_pull_request_has_one_comment_that_follows_its_pushes(runner: Runner) -> None:
+    """A state that is not whole is commented too, and fails; what cannot be compared is no comment."""
+    comments, branch = runner.service.comments, runner.checkout
     assert runner.run() == 0
-    assert list(runner.service.comments) == [1, 2]
-    assert "| quantity changed | M8x20 Bolt | 12 → 16 |" in runner.service.comments[2]
-    set_element_count(runner.checkout / "TopAssembly.FCStd", "CoverBolts", added=2)
-    git(runner.checkout, "commit", "-qam", "still more")
-    assert runner.run() == 0
-    assert list(runner.service.comments) == [1, 2], "replaced, and nobody else's"
-    assert "12 → 18" in runner.service.comments[2]
-    assert runner.service.comments[1] == "coverage: 81 %"
-
-
-def test_a_state_that_is_not_whole_is_commented_and_fails(runner: Runner) -> None:
-    (runner.checkout / "parts" / "Cover.FCStd").unlink()
-    git(runner.checkout, "commit", "-qam", "without the cover")
+    assert list(comments) == [1, 2]
+    assert "| quantity changed | M8x20 Bolt | 12 → 16 |" in comments[2]
+    set_element_count(branch / "TopAssembly.FCStd", "CoverBolts", added=2)
+    (branch / "parts" / "Cover.FCStd").unlink()
+    runner.git(branch, "commit", "-qam", "still more, without the cover")
     assert runner.run() == 1
-    assert "parts/Cover.FCStd is missing" in runner.service.comments[2]
-
-
-def test_what_cannot_be_compared_is_no_comment(runner: Runner) -> None:
-    """A shallow clone has no commit where the branch began."""
-    git(runner.checkout.parent, "clone", "-q", "--depth", "1", "--no-single-branch", "-b", "more-bolts",
-        f"file://{runner.checkout.parent / 'gearbox'}", "shallow")  # fmt: skip
-    runner.checkout = runner.checkout.parent / "shallow"
+    assert "12 → 18" in comments[2]
+    assert "parts/Cover.FCStd is missing" in comments[2]
+    # A shallow clone has no commit where the branch began.
+    origin = f"file://{branch.parent / 'gearbox'}"
+    shallow = ("clone", "-q", "--depth", "1", "--no-single-branch", "-b", "more-bolts", origin, "shallow")
+    runner.git(branch.parent, *shallow)
+    before, runner.checkout = dict(comments), branch.parent / "shallow"
     assert runner.run() == 2
-    assert list(runner.service.comments) == [1]
+    assert comments == before
+    assert list(comments) == [1, 2], "replaced, and nobody else's"
+    assert comments[1] == "coverage: 81 %"
 
 
-def test_the_pre_commit_hook_names_a_command_that_there_is(run: Any, gearbox: Path) -> None:
+def test_the_pre_commit_hook_names_a_command_that_there_is(run: Any, git: Any, gearbox: Path) -> None:
     """Also for the first commit of a repository, and for one that only removes a part."""
     (hook,) = yaml.safe_load((EXAMPLES.parent / ".pre-commit-hooks.yaml").read_text("utf-8"))
     program, *words = hook["entry"].split()
