@@ -29,14 +29,6 @@ from silo.platform import scratch_folder
 from silo.testing import FakeSilo
 
 
-def test_a_file_named_twice_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the spelling that came first."""
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "x.FCStd"
-    path.touch()
-    assert documents_in(["x.FCStd", "./x.FCStd", str(path), "."]) == ["x.FCStd"]
-
-
 def test_a_folder_is_its_documents_without_backups_and_what_is_ignored(tmp_path: Path) -> None:
     """In the syntax of .gitignore: folders, patterns, exceptions, comments."""
     names = ["a.FCStd", "b.fcstd", "a.FCStd1", "a.20260101-101010.FCBak", "old/c.FCStd", "x/old/d.FCStd"]

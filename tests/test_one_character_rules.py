@@ -6,7 +6,6 @@ from __future__ import annotations
 import ntpath
 import posixpath
 import zipfile
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,15 +15,12 @@ from silo.api.config import canonical
 from silo.bom.compare import plan_merge, same_quantity
 from silo.bom.document import relative
 from silo.bom.errors import DocumentError
-from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import from_plain, to_plain
-from silo.bom_sync import Status, blocking, resolve, sync
 from silo.fcstd import open_document, stamp
 from silo.fcstd.container import CENTRAL, LOCAL
 from silo.outbox.entry import Commit
 from silo.outbox.store import Store
-from silo.testing import FakeSilo
 
 
 def test_quantities_differ_by_a_thousandth() -> None:
@@ -118,36 +114,6 @@ def test_meta_is_written_in_the_order_of_its_bytes(tmp_path: Path) -> None:
         text = archive.read("Document.xml").decode()
     places = [text.index(f'key="{key}"') for key in ("SiloUUID", "Z", "a", "b", "é")]
     assert places == sorted(places)
-
-
-# -- syncing ---------------------------------------------------------------------------------------
-
-
-def assembled(silo: FakeSilo, finding: Finding | None) -> Extraction:
-    top, bolt = (silo.create_item("kindred-rd", c, n) for c, n in (("A01", "top"), ("F01", "bolt")))
-    child = BomEntry(doc_path="/v/bolt.FCStd", object_name="B", silo_uuid=bolt.id, quantity=2)
-    head = BomEntry(doc_path="/v/top.FCStd", object_name="T", silo_uuid=top.id, is_assembly=True, level=0)
-    return Extraction(head, (child,), (finding,) if finding else ())
-
-
-@pytest.mark.parametrize("code", [FindingCode.CYCLE, FindingCode.TOO_DEEP])
-def test_loops_and_depth_block_every_assembly(code: FindingCode) -> None:
-    """Wherever they are: what was not walked may be anywhere. Another error blocks its own file only."""
-    silo, far = FakeSilo(), Place("/elsewhere/x.FCStd", "X")
-    found = assembled(silo, Finding(code, Severity.ERROR, "x", (far,)))
-    assert [finding.code for finding in blocking(resolve(found, silo))] == [code]
-    other = replace(found, findings=(Finding(FindingCode.MISSING_FILE, Severity.ERROR, "x", (far,)),))
-    assert blocking(resolve(other, silo)) == ()
-
-
-def test_a_dry_run_of_a_blocked_assembly_says_blocked() -> None:
-    """It shows what a sync would do, and that would be nothing."""
-    silo = FakeSilo()
-    found = assembled(silo, None)
-    assert sync(resolve(found, silo), silo, sync_id="s", dry_run=True).status is Status.DRY_RUN
-    broken = Finding(FindingCode.CYCLE, Severity.ERROR, "x", (Place("/v/top.FCStd", "T"),))
-    blocked = resolve(replace(found, findings=(broken,)), silo)
-    assert sync(blocked, silo, sync_id="s", dry_run=True).status is Status.BLOCKED
 
 
 def test_what_was_seen_of_the_old_server_is_forgotten_on_a_move(tmp_path: Path) -> None:

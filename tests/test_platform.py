@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import ast
-import ntpath
 import os
 import re
 import signal
@@ -16,7 +15,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from silo.bom.document import relative
 from silo.platform import (
     child_options,
     copy_rights,
@@ -52,10 +50,20 @@ class Refusals:
 
 
 def test_a_file_that_a_virus_scanner_has_open_is_waited_for() -> None:
+    """For some seconds."""
     act = Refusals(5, InUse())
     patiently(act, wait=act.waited.append)
     assert len(act.waited) == 5
     assert act.waited == sorted(act.waited)
+    act = Refusals(1000, InUse())
+    with pytest.raises(PermissionError):
+        patiently(act, wait=act.waited.append)
+    assert 2 < sum(act.waited) < 5
+    for error in (PermissionError("no right"), FileNotFoundError("gone"), OSError("full")):
+        act = Refusals(1, error)
+        with pytest.raises(type(error)):
+            patiently(act, wait=act.waited.append)
+        assert act.waited == [], "what no waiting mends is raised at once"
 
 
 def test_no_child_opens_a_console_window_on_windows() -> None:
@@ -81,21 +89,6 @@ def test_every_child_is_started_with_these_options() -> None:
         if not any(word.arg is None and "child_options(" in ast.unparse(word.value) for word in node.keywords)
     ]
     assert not bare
-
-
-def test_patience_ends() -> None:
-    act = Refusals(1000, InUse())
-    with pytest.raises(PermissionError):
-        patiently(act, wait=act.waited.append)
-    assert 2 < sum(act.waited) < 5
-
-
-@pytest.mark.parametrize("error", [PermissionError("no right"), FileNotFoundError("gone"), OSError("full")])
-def test_what_no_waiting_mends_is_raised_at_once(error: OSError) -> None:
-    act = Refusals(1, error)
-    with pytest.raises(type(error)):
-        patiently(act, wait=act.waited.append)
-    assert act.waited == []
 
 
 class MacOS:
@@ -187,11 +180,6 @@ def test_words_for_exit_codes() -> None:
     assert how_it_ended(-250) == "was ended (250)"
     assert how_it_ended(128 + signal.SIGSEGV) == how_it_ended(-signal.SIGSEGV) == "crashed (SIGSEGV)"
     assert how_it_ended(0xC0000005) == "crashed (0xC0000005)"
-
-
-def test_a_file_on_another_drive_keeps_its_whole_path() -> None:
-    assert relative(r"D:\parts\x.step", r"C:\vault", ntpath) == "D:/parts/x.step"
-    assert relative(r"C:\vault\parts\x.step", r"C:\vault", ntpath) == "parts/x.step"
 
 
 # --- one module asks --------------------------------------------------------------------------------------
@@ -309,25 +297,6 @@ def test_tests_say_what_they_need_of_the_system() -> None:
 )
 def test_the_check_sees_what_is_not_said(text: str) -> None:
     assert unsaid(text)
-
-
-def test_children_open_no_console_window() -> None:
-    """Each start of a process takes the options of ``silo.platform.child_options``."""
-    starts = [
-        f"{path.relative_to(MODS)}:{node.lineno}"
-        for path in MODS.rglob("*.py")
-        if path != ASKED_THERE
-        for node in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(node, ast.Call)
-        and isinstance(node.func, ast.Attribute)
-        and isinstance(node.func.value, ast.Name)
-        and (node.func.value.id, node.func.attr) in _STARTS
-        and "child_options" not in ast.dump(node)
-    ]
-    assert starts == []
-
-
-_STARTS = {("subprocess", name) for name in ("run", "Popen", "call", "check_call", "check_output")}
 
 
 def test_a_file_keeps_its_rights_and_tags_on_macos(tmp_path: Path) -> None:

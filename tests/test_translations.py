@@ -227,17 +227,6 @@ def test_what_is_translated_stays_and_what_is_gone_is_marked(script: ModuleType,
     )
 
 
-def test_writing_again_changes_nothing(script: ModuleType, sources: Path) -> None:
-    """And the file is one that Qt's tools read: one context, one source per message."""
-    texts = script.collect(sources)
-    made = sources / "silo.ts"
-    made.write_text(script.ts(texts, "", {}), encoding="utf-8")
-    assert script.ts(texts, *script.read(made)) == made.read_text(encoding="utf-8")
-    text = made.read_text(encoding="utf-8")
-    assert re.findall("<name>(.*)</name>", text) == ["Silo", "Silo_BOM"]
-    assert re.findall("<source>(.*)</source>", text) == ["Sync", "Show &amp; &lt;hide&gt;", "Sync"]
-
-
 @pytest.mark.parametrize(
     "call",
     ['translate("Silo", name)', 'translate(where, "x")', 'translate("x")', 'QT_TRANSLATE_NOOP("Silo", "x")'],

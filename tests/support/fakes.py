@@ -69,7 +69,6 @@ PARENT = {
     "TechDraw::DrawPage": ROOT,
 }
 
-LINK_TYPES = ("App::Link", "App::LinkPython")
 
 # What FreeCAD gives each object of a type by itself.
 DEFAULTS: dict[str, dict[str, Any]] = {
