@@ -389,7 +389,7 @@ def texts_of_sentences(path: Path) -> Iterator[tuple[str, str, Path]]:
                 continue
             lines = _pattern_of(child).split("\n")
             # Many lines are a program, a style or a schema; those of the command line are a help.
-            is_text = len(lines) < 4 or "cli" in path.parts
+            is_text = len(lines) < 4 or path.parent.name == "cli"
             if is_text and not (isinstance(node, ast.Dict) and child in node.keys):
                 found += [(child.lineno, child.col_offset, line) for line in lines]
     for _line, _column, text in sorted(found):
