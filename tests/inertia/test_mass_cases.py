@@ -128,6 +128,11 @@ CASES = {
         "rotor sub_assembly_mass_shared, rotor mass_implausible, case sub_assembly_mass_shared, "
         "case mass_implausible",
     ),
+    "a part of an unknown material below a row with a mass": Case(
+        "arm/motor/rotor; arm/motor/case @ 2",
+        "1,1,,,90.0 g,motor | 1.1,1,,Unobtainium,,rotor | 1.2,1,,,,case",
+        [1, 0], "rotor unknown_material, rotor sub_assembly_mass_differs, case no_mass_no_material",
+    ),
     "the material of a sub-assembly is that of parts that the BOM lacks": Case(
         "arm/print/body a; arm/print/body b; arm/nut", "1,1,,PLA,,print | 2,1,,steel,,nut",
         [1.25, 1.25, 7.85],
