@@ -14,7 +14,6 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
-from hunting import over
 from hypothesis import given
 from hypothesis import strategies as st
 from openpyxl import load_workbook
@@ -51,7 +50,7 @@ def _upload(api: Api, **parts: Any) -> Answer:
 def _import(api: Api, note: str) -> Answer:
     parent, child = api.items(2)
     cells = f'Part number,Quantity,Notes\r\n{child},1,"{note}"\r\n'
-    return api.call("POST", bom(parent, "import"), body=cells.encode(), headers={"Content-Type": "text/csv"})
+    return api.call("POST", bom(parent, "import"), body=cells.encode())
 
 
 def _merge(api: Api, **fields: Any) -> Answer:
@@ -83,16 +82,15 @@ WAYS: dict[str, Way] = {
 }
 
 
-@over("postgres")  # it refuses more
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("code", [0x01, 0x7F, 0xFDD0, 0xFFFE, 0xFFFF, 0x10FFFF])
-def test_every_way_in_refuses_them_with_one_sentence(api: Api, way: str, code: int) -> None:
+def test_every_way_in_refuses_them_with_one_sentence(api: Api, way: str) -> None:
     """400, which character it is, and what to do."""
-    answer = WAYS[way](api, f"a{chr(code)}b")
-    assert answer.status == 400, answer.body[:300]
-    said = json.dumps(answer.json(), ensure_ascii=False)
-    assert "without control characters and non-characters" in said
-    assert f"U+{code:04X}" in said
+    for code in (0x01, 0x10FFFF):
+        answer = WAYS[way](api, f"a{chr(code)}b")
+        assert answer.status == 400, answer.body[:300]
+        said = json.dumps(answer.json(), ensure_ascii=False)
+        assert "without control characters and non-characters" in said
+        assert f"U+{code:04X}" in said
 
 
 def test_the_rule_is_unicodes() -> None:
@@ -123,7 +121,7 @@ def test_exports_can_be_read_whatever_is_in_them(api: Api, server: RunningServer
     kept = "a\tb é 螺栓 🔩 \u200f\u2028 <b>&amp; ]]> \ufffd \ue000 =1+1"
     parent, child = api.items(2)
     api.good("PUT", f"/api/items/{child}", {"name": kept})
-    api.good("POST", bom(parent), {"child_part_number": child, "notes": "old"})
+    api.add_line(parent, child, notes="old")
     db = Database(server.settings)
     old = "".join(c for c in REFUSED if c not in "\x00\ud800\udfff")
     with db.write() as tx:

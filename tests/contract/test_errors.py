@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from server_testing import Api, Databases, bom, form_body, merge_body
@@ -14,9 +13,9 @@ from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
 
 
-@pytest.mark.parametrize(
-    ("method", "path", "status"),
-    [
+def test_every_error_has_the_one_shape(api: Api) -> None:
+    """Also those of the framework: machine code, plain message, nothing of our insides."""
+    for method, path, status in (
         ("GET", "/nothing", 404),
         ("GET", "/api/nothing", 404),
         ("GET", "/api/items/NO-SUCH", 404),
@@ -27,14 +26,11 @@ from silo_server.settings import Settings
         ("GET", "/api/items/" + "x" * 3000, 404),
         ("POST", "/api/items", 400),
         ("DELETE", "/api/items/NO-SUCH", 404),
-    ],
-)
-def test_every_error_has_the_one_shape(api: Api, method: str, path: str, status: int) -> None:
-    """Also those of the framework: machine code, plain message, nothing of our insides."""
-    error = ErrorBody.model_validate(api.bad(status, method, path))
-    assert error.message
-    for inside in ("Traceback", "sqlalchemy", "psycopg", "sqlite", 'File "'):
-        assert inside not in error.message
+    ):
+        error = ErrorBody.model_validate(api.bad(status, method, path))
+        assert error.message
+        for inside in ("Traceback", "sqlalchemy", "psycopg", "sqlite", 'File "'):
+            assert inside not in error.message
 
 
 def test_a_missing_route_is_kept_apart_from_a_missing_item(api: Api) -> None:
@@ -64,10 +60,12 @@ def test_security_headers_are_on_every_answer(api: Api) -> None:
         assert headers["referrer-policy"] == "same-origin"
 
 
-@pytest.fixture
-def small(kind: str, databases: Databases, tmp_path: Path) -> Iterator[RunningServer]:
+@pytest.fixture(scope="module")
+def small(
+    kind: str, databases: Databases, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[RunningServer]:
     """A server with narrow limits."""
-    url = databases.new(kind)
+    url, tmp_path = databases.new(kind), tmp_path_factory.mktemp("small")
     settings = Settings(
         database_url=url,
         max_body_bytes=2000,
@@ -118,12 +116,12 @@ def test_a_body_without_a_declared_length_is_counted(small: RunningServer) -> No
     connection.close()
 
 
-def test_nobody_without_a_role_fills_the_disk(small: RunningServer, tmp_path: Path) -> None:
+def test_nobody_without_a_role_fills_the_disk(small: RunningServer) -> None:
     """An upload without a token is refused and leaves nothing behind."""
     with Api(small.base_url, None) as api:
         body, headers = form_body({"file": ("a", b"x" * 50_000)})
         assert api.call("POST", "/api/items/X/file", body=body, headers=headers).status == 401
-    assert [p for p in tmp_path.rglob("*") if p.is_file() and p.stat().st_size == 50_000] == []
+    assert [p for p in small.settings.storage.rglob("*") if p.is_file() and p.stat().st_size == 50_000] == []
 
 
 def test_modules_and_health(api: Api) -> None:

@@ -10,11 +10,18 @@ import uuid
 import zipfile
 from typing import Any
 
-from server_testing import Answer, Api, form_body
+from hunting import BOTH
+from server_testing import Answer, Api, bom, form_body, merge_body
 
 from silo.api.client import SiloClient
 
+SHOUTED = hashlib.sha256(b"two").hexdigest().upper()
 PNG = b"\x89PNG\r\n\x1a\n" + b"picture"
+
+
+def document(content: bytes, **more: Any) -> dict[str, Any]:
+    """The file that a merge names, by its content."""
+    return {"file": "Top.FCStd", "sha256": hashlib.sha256(content).hexdigest(), **more}
 
 
 def upload(api: Api, number: str, content: bytes, name: str = "Part.FCStd", **more: Any) -> Answer:
@@ -79,17 +86,6 @@ def test_the_same_content_is_kept_once(api: Api, server: Any) -> None:
     upload(api, b, content)
     assert len(list(server.settings.storage.rglob(checksum))) == 1
     assert api.call("GET", f"/api/items/{b}/file").body == content
-
-
-def test_a_repeated_upload_makes_one_revision(api: Api) -> None:
-    """``Idempotency-Key``: sending twice does no harm; another file under the same key is refused."""
-    number = api.item()
-    key = {"Idempotency-Key": "commit-1"}
-    first = upload(api, number, b"x", headers=key)
-    again = upload(api, number, b"x", headers=key)
-    assert first.json() == again.json()
-    assert upload(api, number, b"y", headers=key).status == 409
-    assert len(api.get(f"/api/items/{number}/revisions")) == 1
 
 
 def test_a_file_that_arrives_otherwise_is_no_revision(api: Api) -> None:
@@ -180,6 +176,7 @@ def test_what_is_no_upload_is_refused(api: Api) -> None:
     api.bad(404, "GET", f"/api/items/{number}/file/1")
 
 
+@BOTH
 def test_a_file_is_found_by_its_content(api: Api) -> None:
     """Searching for a SHA-256 finds the items that have, or had, this very file, whatever their name."""
     content = uuid.uuid4().bytes
@@ -217,6 +214,7 @@ def test_revisions_come_in_pages(api: Api) -> None:
         assert [r.revision_number for r in client.revisions(number, after=4)] == [7, 6, 5]
 
 
+@BOTH
 def test_a_file_that_was_made_from_an_older_revision_is_refused(api: Api) -> None:
     """409 with the newer one; nothing is added. With the newest as its base it passes, and that is kept."""
     number = api.item()
@@ -234,6 +232,7 @@ def test_a_file_that_was_made_from_an_older_revision_is_refused(api: Api) -> Non
     assert upload(api, number, b"who knows").status == 201  # a client that does not say it
 
 
+@BOTH
 def test_what_is_no_other_file_is_no_newer_one(api: Api) -> None:
     """The same content, a repeat with its key, and a revision of properties alone."""
     number = api.item()
@@ -249,54 +248,37 @@ def test_what_is_no_other_file_is_no_newer_one(api: Api) -> None:
     assert upload(api, number, b"five", base_revision="4").json()["revision_number"] == 6
 
 
+@BOTH
 def test_a_bom_that_comes_late_does_not_undo_that_of_a_newer_file(api: Api) -> None:
     """``document.revision``: the revision whose BOM it is; by its SHA-256 it may be the newest by another
     number."""
     number, bolt, nut = api.items(3)
     upload(api, number, b"one")
     upload(api, number, b"two")
-
-    def document(revision: int, content: bytes) -> dict[str, Any]:
-        checksum = hashlib.sha256(content).hexdigest()
-        return {"file": "Top.FCStd", "sha256": checksum, "revision": revision}
-
-    api.merge(number, {bolt: 2}, document=document(2, b"two"))
-    shouted = {**document(2, b"two"), "sha256": document(2, b"two")["sha256"].upper()}
-    api.merge(number, {bolt: 2}, document=shouted)
-    late = {
-        "entries": [{"child_part_number": nut, "quantity": 9}],
-        "document": document(1, b"one"),
-    }
-    error = api.bad(409, "POST", f"/api/items/{number}/bom/merge", late)
+    api.merge(number, {bolt: 2}, document=document(b"two", revision=2))
+    api.merge(number, {bolt: 2}, document=document(b"two", revision=2, sha256=SHOUTED))
+    late = merge_body({nut: 9}, document=document(b"one", revision=1))
+    error = api.bad(409, "POST", bom(number, "merge"), late)
     assert (error["error"], error["revision"]["revision_number"]) == ("newer_revision", 2)
     assert api.quantities(number) == {bolt: 2}
-    api.merge(number, {bolt: 3}, document=document(1, b"two"))
+    api.merge(number, {bolt: 3}, document=document(b"two", revision=1))
     assert api.quantities(number) == {bolt: 3}
 
 
 def test_the_bom_of_an_older_file_is_known_by_its_content(api: Api) -> None:
     """A file that was not fetched again, in a vault that is synced at night, says no revision."""
     number, bolt, nut = api.items(3)
-    for content in (b"one", b"two"):
+    for content in (b"two", b"three"):
         upload(api, number, content)
-
-    def document(content: bytes) -> dict[str, Any]:
-        return {"file": "Top.FCStd", "sha256": hashlib.sha256(content).hexdigest()}
-
-    api.merge(number, {bolt: 2}, document=document(b"two"))
-    older = document(b"one")
-    for dry_run, sha256 in ((True, older["sha256"]), (False, older["sha256"].upper())):
-        stale = {
-            "entries": [{"child_part_number": nut, "quantity": 9}],
-            "document": {**older, "sha256": sha256},
-            "dry_run": dry_run,
-        }
-        error = api.bad(409, "POST", f"/api/items/{number}/bom/merge", stale)
+    api.merge(number, {bolt: 2}, document=document(b"three"))
+    for dry_run, of in ((True, document(b"two")), (False, document(b"two", sha256=SHOUTED))):
+        stale = merge_body({nut: 9}, document=of, dry_run=dry_run)
+        error = api.bad(409, "POST", bom(number, "merge"), stale)
         assert (error["error"], error["revision"]["revision_number"]) == ("newer_revision", 2)
     assert api.quantities(number) == {bolt: 2}
     api.merge(number, {bolt: 3}, document=document(b"edited, and in no revision"))
-    upload(api, number, b"one", comment="back to it")
-    api.merge(number, {bolt: 4}, document=document(b"one"))
+    upload(api, number, b"two", comment="back to it")
+    api.merge(number, {bolt: 4}, document=document(b"two"))
     assert api.quantities(number) == {bolt: 4}
 
 
@@ -307,15 +289,6 @@ def test_a_bom_does_not_go_without_its_file(api: Api) -> None:
     upload(api, number, b"one")
     for revision in (1, 2):
         for dry_run in (True, False):
-            gone = {
-                "entries": [{"child_part_number": bolt, "quantity": 9}],
-                "document": {
-                    "file": "Top.FCStd",
-                    "sha256": hashlib.sha256(b"gone").hexdigest(),
-                    "revision": revision,
-                },
-                "dry_run": dry_run,
-            }
-            error = api.bad(409, "POST", f"/api/items/{number}/bom/merge", gone)
-            assert error["error"] == "missing_revision"
+            gone = merge_body({bolt: 9}, document=document(b"gone", revision=revision), dry_run=dry_run)
+            assert api.bad(409, "POST", bom(number, "merge"), gone)["error"] == "missing_revision"
     assert api.quantities(number) == {}

@@ -11,10 +11,10 @@ from typing import Any
 from urllib.parse import quote
 
 import pytest
-from hunting import examples
+from hunting import BOTH, examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from server_testing import Api, bom, form_body
+from server_testing import Api, bom
 from web_visitor import enter
 
 from silo.api.wire import ItemTexts
@@ -40,16 +40,6 @@ def test_the_category_says_the_type(api: Api) -> None:
     assert made["item_type"] == "tool"
 
 
-def test_the_preview_consumes_nothing(api: Api) -> None:
-    """``generate-part-number`` may be called often; the number is given by POST /api/items."""
-    ask = {"schema": "kindred-rd", "category": "R27"}
-    first = api.good("POST", "/api/generate-part-number", ask)
-    assert first == api.good("POST", "/api/generate-part-number", ask)
-    made = api.good("POST", "/api/items", {"category": "R27", "name": "Servo"})
-    assert made["part_number"] == first["part_number"]
-    assert api.good("POST", "/api/generate-part-number", ask) != first
-
-
 def test_a_taken_number_is_jumped_over(api: Api) -> None:
     """An explicit number in the way leaves a gap, never an error."""
     api.item("F09-0001")
@@ -57,6 +47,7 @@ def test_a_taken_number_is_jumped_over(api: Api) -> None:
     assert api.good("POST", "/api/items", {"category": "F09", "name": "Rivet"})["part_number"] == "F09-0003"
 
 
+@BOTH
 def test_many_at_once_get_different_numbers(api: Api) -> None:
     """Numbers are unique however many ask at the same moment."""
     numbers: list[str] = []
@@ -82,38 +73,20 @@ def test_numbers_are_unique_whatever_their_case(api: Api) -> None:
     assert error["error"] == "duplicate"
 
 
-@pytest.mark.parametrize("number", ["a/b", "", " ", "a\nb", "x" * 65, "by-uuid", "..", "a?b", "a%2fb"])
-def test_a_number_must_fit_into_a_path(api: Api, number: str) -> None:
-    """What cannot stand in a URL or a cell is no part number."""
-    api.bad(400, "POST", "/api/items", {"part_number": number, "name": "x"})
-
-
-def test_a_number_may_be_anything_else(api: Api) -> None:
-    """Nothing parses numbers by a pattern: blanks, dots and letters of any alphabet are fine."""
-    number = f"Ä 12.5 +x {uuid.uuid4().hex[:6]}"
-    api.item(number)
-    from urllib.parse import quote
-
+def test_a_number_must_fit_into_a_path(api: Api) -> None:
+    """What cannot stand in a URL or a cell is no part number; blanks, dots and any letters may."""
+    for number in ("a/b", "", " ", "a\nb", "x" * 65, "by-uuid", "..", "a?b", "a%2fb"):
+        api.bad(400, "POST", "/api/items", {"part_number": number, "name": "x"})
+    number = api.item(f"Ä 12.5 +x {uuid.uuid4().hex[:6]}")
     assert api.get("/api/items/" + quote(number))["part_number"] == number
 
 
-def test_a_client_s_uuid_makes_a_repeat_harmless(api: Api) -> None:
-    """POST with ``id`` twice makes one item (the retry after a crash)."""
-    identity = str(uuid.uuid4())
-    body = {"id": identity, "category": "M01", "name": "Bracket"}
-    first = api.call("POST", "/api/items", body)
-    again = api.call("POST", "/api/items", body)
-    assert (first.status, again.status) == (201, 200)
-    assert first.json() == again.json()
-    assert first.json()["id"] == identity
-
-
-@pytest.mark.parametrize("nonsense", ["", "M01-0001", 5])
-def test_an_id_that_is_no_uuid_is_refused(api: Api, nonsense: object) -> None:
+def test_an_id_that_is_no_uuid_is_refused(api: Api) -> None:
     """400 that names the field; no item with another identity is made behind the client's back."""
     name = uuid.uuid4().hex
-    error = api.bad(400, "POST", "/api/items", {"id": nonsense, "category": "M01", "name": name})
-    assert "id: " in error["message"]
+    for nonsense in ("", "M01-0001", 5):
+        error = api.bad(400, "POST", "/api/items", {"id": nonsense, "category": "M01", "name": name})
+        assert "id: " in error["message"]
     assert api.get(f"/api/items/search?q={name}") == []
 
 
@@ -138,26 +111,7 @@ def test_an_id_of_an_archived_item_is_a_conflict(api: Api) -> None:
     assert api.call("POST", "/api/items", body).status == 200
 
 
-def test_by_uuid(api: Api) -> None:
-    """The item by its UUID, in any written form; 404 when unknown or archived, 400 for no UUID."""
-    number = api.item()
-    item = api.get(f"/api/items/{number}")
-    assert api.get(f"/api/items/by-uuid/{item['id'].upper()}") == item
-    assert api.bad(404, "GET", f"/api/items/by-uuid/{uuid.uuid4()}")["error"] == "not_found"
-    api.bad(400, "GET", "/api/items/by-uuid/nonsense")
-    api.good("DELETE", f"/api/items/{number}")
-    api.bad(404, "GET", f"/api/items/by-uuid/{item['id']}")
-
-
-def test_many_uuids_in_one_request(api: Api) -> None:
-    """The batch look-up: found ones once each in the order asked, missing ones absent, nonsense no error."""
-    ids = [api.get(f"/api/items/{number}")["id"] for number in api.items(5)]
-    asked = [ids[3], str(uuid.uuid4()), ids[0], ids[3], "nonsense"]
-    found = api.good("POST", "/api/items/by-uuid", {"uuids": asked})["items"]
-    assert [item["id"] for item in found] == [ids[3], ids[0]]
-    assert api.good("POST", "/api/items/by-uuid", {"uuids": []}) == {"items": []}
-
-
+@BOTH
 def test_look_alikes_of_many_components_in_one_request(api: Api) -> None:
     """By name as people read it or by file; each answer at its question's place; archived items are none."""
     word = uuid.uuid4().hex[:8]
@@ -168,8 +122,7 @@ def test_look_alikes_of_many_components_in_one_request(api: Api) -> None:
     )
     registered = api.item(f"{word}-R", name="other", properties={"file_sha256": digest.upper()})
     api.good("DELETE", f"/api/items/{archived}")
-    body, headers = form_body({"file": ("Part.FCStd", word.encode())})
-    api.good("POST", f"/api/items/{uploaded}/file", body=body, headers=headers)
+    api.upload(uploaded, word.encode(), "Part.FCStd")
     wanted = [
         {"name": f"GRÖSSE_{word}.FCStd", "sha256": ""},
         {"name": "nothing like it " + word},
@@ -187,17 +140,7 @@ def test_look_alikes_of_many_components_in_one_request(api: Api) -> None:
     api.bad(400, "POST", "/api/items/look-alikes", {"wanted": wanted * 251})
 
 
-def test_many_boms_in_one_request(api: Api) -> None:
-    """Each as its own request gives it, by the number as it was asked for; unknown items are absent."""
-    top, other, part, empty = api.items(4)
-    api.merge(top, {part: 2})
-    api.merge(other, {part: 3, empty: 1})
-    asked = [top.lower(), other, empty, "no such item"]
-    boms = api.good("POST", "/api/items/boms", {"part_numbers": asked})["boms"]
-    assert boms == {number: api.get(f"/api/items/{number}/bom") for number in (top.lower(), other, empty)}
-    assert [len(boms[number]) for number in (top.lower(), other, empty)] == [1, 2, 0]
-
-
+@BOTH
 def test_search_and_paging(api: Api) -> None:
     """Every word must be somewhere in number, name or description; the total is in a header."""
     word = uuid.uuid4().hex[:8]
@@ -214,14 +157,16 @@ def test_search_and_paging(api: Api) -> None:
     assert api.get("/api/items?search=%25") == []
 
 
-@pytest.mark.parametrize("number", ["~", "+-+", "…", "½", "𦸉", "+="])
-def test_a_part_number_of_signs_alone_can_be_kept_and_found_by_its_name(api: Api, number: str) -> None:
+@BOTH
+def test_a_part_number_of_signs_alone_can_be_kept_and_found_by_its_name(api: Api) -> None:
     """There is no word in it, so the index has none of it."""
-    name = "n" + uuid.uuid4().hex[:8]
-    api.call("POST", "/api/items", {"part_number": f"{number}{number}", "name": name})
-    assert len(api.get(f"/api/items?search={name}")) == 1
+    for sign in ("~", "+-+", "…", "½", "𦸉", "+="):
+        name = "n" + uuid.uuid4().hex[:8]
+        api.call("POST", "/api/items", {"part_number": sign * 2, "name": name})
+        assert len(api.get(f"/api/items?search={name}")) == 1
 
 
+@BOTH
 def test_search_ranks_and_knows_what_people_type(api: Api) -> None:
     """Numbers without dashes, parts of words, accents, supplier and its number, file names; best first."""
     word = "q" + uuid.uuid4().hex[:8]
@@ -235,8 +180,7 @@ def test_search_ranks_and_knows_what_people_type(api: Api) -> None:
     api.item(numbers[2], name=f"x{word}x")
     api.item(numbers[3], description=f"beside {word}")
     api.item(numbers[4] + "-S", properties=supplier)
-    body, headers = form_body({"file": (f"Halter {word}.FCStd", b"x")})
-    api.call("POST", f"/api/items/{api.item(numbers[1])}/file", body=body, headers=headers)
+    api.upload(api.item(numbers[1]), name=f"Halter {word}.FCStd")
 
     def found(query: str) -> list[str]:
         return [item["part_number"] for item in api.get(f"/api/items/search?q={quote(query)}")]
@@ -261,15 +205,15 @@ def test_search_ranks_and_knows_what_people_type(api: Api) -> None:
     assert found(f"{word} mutter") == []
 
 
-@pytest.mark.parametrize(
-    "query", ['"', "'", "' OR 1=1", "a:* & !", "NEAR(", "{number}: x", "*", "\\", "Ａ", "ﬁ", "\u202e"]
-)
-def test_no_query_is_an_error(api: Api, query: str) -> None:
+@BOTH
+def test_no_query_is_an_error(api: Api) -> None:
     """What is syntax to a database is only a text here."""
     api.item()
-    assert isinstance(api.get(f"/api/items/search?q={quote(query)}"), list)
+    for query in ('"', "'", "' OR 1=1", "a:* & !", "NEAR(", "{number}: x", "*", "\\", "Ａ", "ﬁ", "\u202e"):
+        assert isinstance(api.get(f"/api/items/search?q={quote(query)}"), list)
 
 
+@BOTH
 @given(name=st.text(min_size=1, max_size=40))
 @settings(max_examples=examples(20))
 def test_an_item_is_found_by_each_word_of_its_name(api: Api, name: str) -> None:
@@ -286,33 +230,6 @@ def test_an_item_is_found_by_each_word_of_its_name(api: Api, name: str) -> None:
             ]
 
 
-def test_renaming_keeps_the_identity(api: Api) -> None:
-    """A part number may change; the UUID, the lines and the history do not."""
-    parent, child = api.items(2)
-    api.merge(parent, {child: 2})
-    before = api.get(f"/api/items/{child}")
-    renamed = api.good("PUT", f"/api/items/{child}", {"part_number": child + "-B", "name": "Renamed"})
-    assert (renamed["id"], renamed["part_number"], renamed["name"]) == (
-        before["id"],
-        child + "-B",
-        "Renamed",
-    )
-    assert api.quantities(parent) == {child + "-B": 2}
-    api.bad(404, "GET", f"/api/items/{child}")
-    assert api.get(f"/api/items/search?q={child}-b")[0]["name"] == "Renamed"
-
-
-def test_only_properties_make_a_revision(api: Api) -> None:
-    """Changes in place make none; properties make one; the same properties make none."""
-    number = api.item()
-    assert api.good("PUT", f"/api/items/{number}", {"description": "new"})["current_revision"] == 0
-    changed = api.good("PUT", f"/api/items/{number}", {"properties": {"mass_kg": 1}, "comment": "weighed"})
-    assert (changed["current_revision"], changed["properties"]) == (1, {"mass_kg": 1})
-    same = api.good("PUT", f"/api/items/{number}", {"properties": {"mass_kg": 1}})
-    assert same["current_revision"] == 1
-    assert api.get(f"/api/items/{number}/revisions")[0]["comment"] == "weighed"
-
-
 def test_archiving_is_no_deleting(api: Api) -> None:
     """An archived item is not found, keeps its number and its place in BOMs, and can come back."""
     parent, child = api.items(2)
@@ -326,33 +243,16 @@ def test_archiving_is_no_deleting(api: Api) -> None:
     assert api.get(bom(child, "where-used"))[0]["parent_part_number"] == parent
 
 
+@BOTH
 def test_texts_that_no_database_takes_are_refused_or_kept(api: Api) -> None:
     """NUL and lone surrogates are 400 on both databases; every real text comes back as it was."""
-    api.bad(400, "POST", "/api/items", body=b'{"part_number": "N-1", "name": "a\\u0000b"}', headers=JSON)
-    api.bad(400, "POST", "/api/items", body=b'{"part_number": "N-2", "name": "a\\ud800b"}', headers=JSON)
+    for escape in (b"\\u0000", b"\\ud800"):
+        body = b'{"part_number": "N-1", "name": "a' + escape + b'b"}'
+        api.bad(400, "POST", "/api/items", body=body, headers={"Content-Type": "application/json"})
     text = "Ünïcode 螺栓 🔩 <b>&amp;'\"\\"
     number = api.item(name=text, description=text, properties={"note": text})
     item = api.get(f"/api/items/{number}")
     assert (item["name"], item["description"], item["properties"]) == (text, text, {"note": text})
-
-
-@pytest.mark.parametrize(
-    "body",
-    [
-        b'{"part_number": "N-3", "name": "x", "properties": {"mass_kg": NaN}}',
-        b'{"part_number": "N-3", "name": "x", "properties": {"mass_kg": 1e999}}',
-        b'{"part_number": "N-3", "name": "x", "properties": ' + b'{"a":' * 5000 + b"1" + b"}" * 5001,
-        b"[" * 100_000,
-    ],
-    ids=["nan", "infinity", "deep", "endless"],
-)
-def test_hostile_json_is_refused(api: Api, body: bytes) -> None:
-    """What is no JSON, or would break whoever reads it back, is 400, here and in merges."""
-    api.bad(400, "POST", "/api/items", body=body, headers=JSON)
-    api.bad(400, "POST", bom(api.item(), "merge"), body=body, headers=JSON)
-
-
-JSON = {"Content-Type": "application/json"}
 
 
 def test_unknown_schema_and_category(api: Api) -> None:
@@ -363,23 +263,7 @@ def test_unknown_schema_and_category(api: Api) -> None:
     api.bad(400, "POST", "/api/items", {"name": "neither number nor category"})
 
 
-def test_schemas(api: Api) -> None:
-    """The schema with its segments, and its form with the two-stage category picker."""
-    schema = api.get("/api/schemas/kindred-rd")
-    segments = {segment["name"]: segment for segment in schema["segments"]}
-    assert segments["category"]["values"]["F01"] == "Screws and bolts"
-    assert api.get("/api/schemas")[0]["name"] == "kindred-rd"
-    form = api.get("/api/schemas/kindred-rd/form")
-    domains = {domain["code"]: domain for domain in form["category_picker"]["domains"]}
-    assert domains["A"]["categories"][0] == {
-        "code": "A01",
-        "label": "Mechanical assembly",
-        "item_type": "assembly",
-    }
-    assert "mass_kg" in [field["name"] for field in form["field_groups"][0]["fields"]]
-    api.bad(404, "GET", "/api/schemas/nothing")
-
-
+@BOTH
 def test_the_list_is_in_one_order_on_both_databases(api: Api) -> None:
     """By code point: a PostgreSQL would sort by its language else."""
     word = uuid.uuid4().hex[:8]
@@ -389,18 +273,13 @@ def test_the_list_is_in_one_order_on_both_databases(api: Api) -> None:
     assert found == ["-a", "10", "9", "_c", "b", "Z", "ä"]
 
 
-@pytest.mark.parametrize(
-    "hidden", ["\u202e", "\u200b", "\u200d", "\ufeff", "\u00a0", "\u00ad", "\u2066", "\u3164", "\U000e0041"]
-)
-def test_a_part_number_has_no_character_that_nobody_sees(api: Api, hidden: str) -> None:
+def test_a_part_number_has_no_character_that_nobody_sees(api: Api) -> None:
     """Two numbers that look the same are the same; the answer names the character. A rename too."""
     number = api.item()
-    for method, path, body in (
-        ("POST", "/api/items", {"part_number": f"{number}{hidden}1", "name": "x"}),
-        ("PUT", f"/api/items/{number}", {"part_number": f"{number}{hidden}1"}),
-    ):
-        problem = api.bad(400, method, path, body)
-        assert f"U+{ord(hidden):04X}" in problem["message"]
+    for hidden in "\u202e\u200b\u200d\ufeff\u00a0\u00ad\u2066\u3164\U000e0041":
+        body = {"part_number": f"{number}{hidden}1"}
+        for method, path in (("POST", "/api/items"), ("PUT", f"/api/items/{number}")):
+            assert f"U+{ord(hidden):04X}" in api.bad(400, method, path, body)["message"]
     assert api.get(f"/api/items/{number}")["part_number"] == number
 
 

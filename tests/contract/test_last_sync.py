@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
+from hunting import BOTH
 from server_testing import Api, bom
 
 COVER = {"file": "parts/Cover.FCStd", "object": "Body"}
@@ -30,6 +30,7 @@ def test_an_item_that_was_never_synced_says_so(api: Api) -> None:
     assert last_sync(api, item) == {"at": None, "left_out": []}
 
 
+@BOTH
 def test_a_line_of_a_missing_component_stays_as_it_is(api: Api) -> None:
     """Known by file and object from the sync before; a second sync without the file knows it again."""
     parent, cover, bolt = api.items(3)
@@ -70,7 +71,7 @@ def test_a_manual_override_of_a_missing_component_is_no_conflict(api: Api) -> No
     """A person's quantity is compared again when the component is back."""
     parent, cover = api.items(2)
     merge(api, parent, entries((cover, 2, [COVER])))
-    api.good("PUT", bom(parent, cover), {"quantity": 9})
+    api.edit_line(parent, cover, quantity=9)
     answer = merge(api, parent, [], left_out=[MISSING])
     assert answer["warnings"] == []
     answer = merge(api, parent, entries((cover, 2, [COVER])))
@@ -98,25 +99,22 @@ def test_a_dry_run_is_not_remembered(api: Api) -> None:
     assert last_sync(api, parent)["at"] is None
 
 
-@pytest.mark.parametrize(
-    ("given", "where"),
-    [
-        ({"left_out": "x"}, "left_out"),
-        ({"left_out": [{}]}, "left_out[0]"),
-        ({"left_out": [{"reason": "missing", "file": 5}]}, "left_out[0].file"),
-        ({"left_out": [{"reason": "missing", "name": "x" * 2000}]}, "left_out[0].name"),
-        ({"left_out": [{"reason": "missing", "quantity": "2"}]}, "left_out[0].quantity"),
-        (
-            {"entries": [{"child_part_number": "x", "quantity": 1, "components": [{}]}]},
-            "entries[0].components",
-        ),
-    ],
-)
-def test_a_malformed_list_is_refused_and_named(api: Api, given: dict[str, Any], where: str) -> None:
+def test_a_malformed_list_is_refused_and_named(api: Api) -> None:
     """Nothing of a request that cannot be understood is kept."""
     (parent,) = api.items(1)
-    answer = api.bad(400, "POST", bom(parent, "merge"), {"entries": [], **given})
-    assert where in str(answer)
+    lists: list[tuple[Any, str]] = [
+        ("x", "left_out"),
+        ([{}], "left_out[0]"),
+        ([{"reason": "missing", "file": 5}], "left_out[0].file"),
+        ([{"reason": "missing", "name": "x" * 2000}], "left_out[0].name"),
+        ([{"reason": "missing", "quantity": "2"}], "left_out[0].quantity"),
+    ]
+    for left_out, where in lists:
+        answer = api.bad(400, "POST", bom(parent, "merge"), {"entries": [], "left_out": left_out})
+        assert where in str(answer)
+    entry = {"child_part_number": "x", "quantity": 1, "components": [{}]}
+    answer = api.bad(400, "POST", bom(parent, "merge"), {"entries": [entry]})
+    assert "entries[0].components" in str(answer)
 
 
 def export(api: Api, item: str, view: str) -> Any:
@@ -128,7 +126,7 @@ def test_an_assembly_that_was_never_synced_is_no_leaf(api: Api) -> None:
     top, part = api.items(2)
     never, empty, manual = (api.item(item_type="assembly") for _ in range(3))
     merge(api, empty, [])
-    api.good("POST", bom(manual), {"child_part_number": part, "quantity": 1})
+    api.add_line(manual, part, quantity=1)
     merge(api, top, entries((part, 1, []), (never, 2, []), (empty, 1, []), (manual, 1, [])))
     for view in ("single", "indented", "flat"):
         told = {row["part_number"]: row["incomplete"] for row in export(api, top, view)}
@@ -162,5 +160,5 @@ def test_an_export_with_gaps_can_be_imported_again(api: Api) -> None:
         data = api.call("GET", bom(top, f"export.csv{query}")).body
         assert data.decode("utf-8-sig").startswith(f"Incomplete: {top} incomplete: 1 missing")
         assert b"Cover" in data
-        answer = api.good("POST", bom(top, "import"), body=data, headers={"Content-Type": "text/csv"})
+        answer = api.good("POST", bom(top, "import"), body=data)
         assert [(row["part_number"], row["status"]) for row in answer["rows"]] == [(part, "same")]

@@ -9,8 +9,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
+from hunting import BOTH
 from openpyxl import Workbook, load_workbook
-from server_testing import Api, form_body
+from server_testing import Answer, Api, form_body
 
 MISUMI = {
     "supplier": "Misumi",
@@ -31,6 +32,12 @@ def suppliers(number: str) -> str:
 
 def order(number: str, query: str = "") -> str:
     return f"/api/items/{number}/order{query}"
+
+
+def row_of(api: Api, number: str, part: str, query: str = "") -> dict[str, Any]:
+    """The row of a part in the order list of an item."""
+    (row,) = (one for one in api.get(order(number, query))["parts"] if one["part_number"] == part)
+    return row
 
 
 def given(api: Api, number: str, *parts: dict[str, Any]) -> dict[str, Any]:
@@ -54,6 +61,7 @@ def product(api: Api) -> tuple[str, str, str, str]:
     return top, sub, screw, plate
 
 
+@BOTH
 def test_a_list_is_one_value_with_a_version(api: Api) -> None:
     """What is sent comes back, in the item too; a second editor is refused; the search finds it."""
     (screw,) = api.items(1)
@@ -71,26 +79,25 @@ def test_a_list_is_one_value_with_a_version(api: Api) -> None:
     assert api.get("/api/items/search?q=cb8-20") == []
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
+def test_what_is_refused(api: Api) -> None:
+    """With a sentence, and nothing is stored."""
+    (screw,) = api.items(1)
+    two_prices = [{"quantity": "1", "price": "1"}, {"quantity": "1.0", "price": "2"}]
+    changes: list[tuple[dict[str, Any], str]] = [
         ({"supplier": " "}, "Supplier: wanted a name"),
         ({"pack_size": "0"}, ""),
         ({"pack_size": "1,000"}, "can be read as"),
         ({"prices": [{"quantity": "1", "price": "-1"}]}, "wanted a number from 0"),
-        ({"prices": [{"quantity": "1", "price": "1"}, {"quantity": "1.0", "price": "2"}]}, "two prices"),
+        ({"prices": two_prices}, "two prices"),
         ({"prices": [{"price": "NaN"}]}, ""),
         ({"currency": "euro"}, ""),
         ({"link": "javascript:alert(1)"}, "web address"),
         ({"lead_time_days": 99999}, ""),
         ({"supplier": "a\x00"}, ""),
-    ],
-)
-def test_what_is_refused(api: Api, change: dict[str, Any], said: str) -> None:
-    """With a sentence, and nothing is stored."""
-    (screw,) = api.items(1)
-    answer = api.bad(400, "PUT", suppliers(screw), {"supplier_parts": [{**MISUMI, **change}]})
-    assert said in str(answer)
+    ]
+    for change, said in changes:
+        answer = api.bad(400, "PUT", suppliers(screw), {"supplier_parts": [{**MISUMI, **change}]})
+        assert said in str(answer), change
     assert api.get(suppliers(screw)) == {"version": 0, "supplier_parts": []}
 
 
@@ -181,7 +188,7 @@ def test_properties_stand_for_a_list(api: Api, product: tuple[str, ...]) -> None
         "lead_time_days": 14,
     }
     api.good("PATCH", f"/api/items/{screw}/properties", said)
-    (row,) = (one for one in api.get(order(top))["parts"] if one["part_number"] == screw)
+    row = row_of(api, top, screw)
     assert (row["kind"], row["supplier_part"]["number"], row["cost"]) == ("bought", "123", "1.1")
     given(api, screw, MISUMI)
     told = api.get(order(top))
@@ -189,8 +196,7 @@ def test_properties_stand_for_a_list(api: Api, product: tuple[str, ...]) -> None
     assert (row["supplier_part"]["supplier"], row["quantity"]) == ("Misumi", "100")
     assert (told["lead_time_days"], told["without_lead_time"]) == (5, 0)  # none of what is made
     given(api, screw, {**MISUMI, "minimum": "150"})
-    (row,) = (one for one in api.get(order(top))["parts"] if one["part_number"] == screw)
-    assert row["quantity"] == "200"
+    assert row_of(api, top, screw)["quantity"] == "200"
 
 
 def test_what_is_open_stands_on_top(api: Api, product: tuple[str, ...]) -> None:
@@ -204,30 +210,28 @@ def test_what_is_open_stands_on_top(api: Api, product: tuple[str, ...]) -> None:
     assert row["remarks"] == ["8 of 11 unreferenced"]
 
 
+@BOTH
 def test_a_release_keeps_its_suppliers(api: Api, product: tuple[str, ...]) -> None:
     """Prices, sourcing and quantities as they were frozen, whatever comes later."""
     top, sub, screw, plate = product
     given(api, screw, MISUMI)
 
-    def uploaded(name: str) -> None:
-        body, headers = form_body({"file": (name, name.encode())})
-        assert api.call("POST", f"/api/items/{plate}/file", body=body, headers=headers).status == 201
-
     for name in ("old.pdf", "plate.step", "new.pdf"):
-        uploaded(name)
-    (row,) = (one for one in api.get(order(top))["parts"] if one["part_number"] == plate)
-    assert [one["name"] for one in row["files"]] == ["new.pdf", "plate.step"]  # the newest of each kind
+        api.upload(plate, name.encode(), name)
+    newest = [one["name"] for one in row_of(api, top, plate)["files"]]  # of each kind
+    assert newest == ["new.pdf", "plate.step"]
     api.good("POST", f"/api/items/{top}/releases", {})
     before = api.get(order(top, "?release=A&pieces=7"))
     assert before["warnings"][0] == "Revision A is review, not released"
     given(api, screw, {**MISUMI, "supplier": "Other"})
     api.merge(sub, {screw: 1})
-    uploaded("newer.pdf")
+    api.upload(plate, b"newer", "newer.pdf")
     after = api.get(order(top, "?release=A&pieces=7"))
     assert after == before
     assert api.get(order(top, "?pieces=7")) != before
 
 
+@BOTH
 def test_what_was_ordered(api: Api, product: tuple[str, ...]) -> None:
     """Facts with who and when; the rest is without them; taken back they count no more and stay."""
     top, _sub, screw, _plate = product
@@ -244,7 +248,7 @@ def test_what_was_ordered(api: Api, product: tuple[str, ...]) -> None:
     assert made | {**line, "note": "PO 17", "ended_at": None} == made
 
     def row(query: str) -> tuple[str, str, str]:
-        (found,) = (one for one in api.get(order(top, query))["parts"] if one["part_number"] == screw)
+        found = row_of(api, top, screw, query)
         return found["ordered"], found["needed"], found["quantity"]
 
     assert row("") == ("5", "11", "11")
@@ -296,6 +300,11 @@ def test_a_table_for_each_supplier(api: Api, product: tuple[str, ...]) -> None:
     assert plate not in made
 
 
+def imported(api: Api, table: str, query: str = "") -> Answer:
+    headers = {"Content-Type": "text/csv"}
+    return api.call("POST", f"/api/suppliers/import{query}", body=table.encode(), headers=headers)
+
+
 TABLE = (
     "Part number;Vendor;Order number;MOQ;Pack size;From quantity;Price;Currency;Lead time\n"
     "{0};Misumi;CB8;10;1;1;0,50;EUR;7\n"
@@ -308,18 +317,15 @@ def test_import_of_a_table(api: Api) -> None:
     """Headers of each company, prices in several rows, commas; a second import changes nothing."""
     one, two = api.items(2)
     given(api, one, {**MISUMI, "number": "CB8", "minimum": "2"})
-    data = TABLE.format(one, two).encode()
-    dry = api.call(
-        "POST", "/api/suppliers/import?dry_run=true", body=data, headers={"Content-Type": "text/csv"}
-    )
-    assert [(row["part_number"], row["status"]) for row in dry.json()["items"]] == [
+    data = TABLE.format(one, two)
+    dry = imported(api, data, "?dry_run=true").json()
+    assert [(row["part_number"], row["status"]) for row in dry["items"]] == [
         (one, "change"),
         (two, "change"),
     ]
     assert api.get(suppliers(two))["supplier_parts"] == []
     for status in ("change", "same"):
-        done = api.call("POST", "/api/suppliers/import", body=data, headers={"Content-Type": "text/csv"})
-        assert [row["status"] for row in done.json()["items"]] == [status, status]
+        assert [row["status"] for row in imported(api, data).json()["items"]] == [status, status]
     (first,) = api.get(suppliers(one))["supplier_parts"]
     assert (first["minimum"], first["pack_size"], first["prices"]) == (
         "10",
@@ -335,27 +341,20 @@ def test_import_of_a_table(api: Api) -> None:
     )
 
 
-def imported(api: Api, table: str) -> Any:
-    headers = {"Content-Type": "text/csv"}
-    return api.call("POST", "/api/suppliers/import", body=table.encode(), headers=headers)
-
-
-@pytest.mark.parametrize(
-    ("table", "said"),
-    [
+def test_tables_that_are_refused(api: Api) -> None:
+    """With a sentence that has the row, and nothing is stored."""
+    (screw,) = api.items(1)
+    for table, said in (
         ("Part number,Supplier,Price\n{0},Acme,-1\n", "wanted a number from 0"),
         ("Part number,Supplier,Link\n{0},Acme,javascript:alert(1)\n", "web address"),
         ("Part number;Supplier;Price\n{0};Acme;1.000\n", "can be read as"),
         ("Part number,Supplier,Price\n{0},Acme,1\n{0},ACME,2\n", "says 'ACME', row 2 says 'Acme'"),
         # An item has few suppliers, so the work for a table does not grow with the square of its rows.
-        ("Part number,Supplier,Preferred\n" + "".join(f"{{0}},S{n},yes\n" for n in range(9000)), "got 9000"),
-    ],
-)
-def test_tables_that_are_refused(api: Api, table: str, said: str) -> None:
-    """With a sentence that has the row, and nothing is stored."""
-    (screw,) = api.items(1)
-    answer = imported(api, table.format(screw))
-    assert (answer.status, said in str(answer.json()), "row 2" in str(answer.json())) == (400, True, True)
+        ("Part number,Supplier,Preferred\n" + "".join(f"{{0}},S{n},yes\n" for n in range(999)), "got 999"),
+    ):
+        answer = imported(api, table.format(screw))
+        assert (answer.status, "row 2" in str(answer.json())) == (400, True)
+        assert said in str(answer.json())
     assert api.get(suppliers(screw))["supplier_parts"] == []
 
 
@@ -377,6 +376,7 @@ def test_one_preferred_supplier_takes_the_place_of_the_other(api: Api) -> None:
     assert [(one["supplier"], one["preferred"]) for one in parts] == [("Misumi", False), ("Acme", True)]
 
 
+@BOTH
 def test_imports_at_once_lose_nothing(api: Api) -> None:
     """Each table names another supplier of the same two items, in either order; all of them stay."""
     one, two = api.items(2)

@@ -42,20 +42,23 @@ def add_by_api(api: Api, parent: str, child: str, text: str) -> Answer:
 def add_by_csv(api: Api, parent: str, child: str, text: str) -> Answer:
     """In a file."""
     body = f'Part number,Quantity\r\n{child},"{text}"\r\n'.encode()
-    return api.call("POST", bom(parent, "import"), body=body, headers={"Content-Type": "text/csv"})
+    return api.call("POST", bom(parent, "import"), body=body)
 
 
 @pytest.mark.parametrize("add", [add_by_api, add_by_csv])
-@pytest.mark.parametrize("text", TYPED)
-def test_a_quantity_as_text(api: Api, add: Any, text: str) -> None:
+def test_a_quantity_as_text(api: Api, add: Any) -> None:
     """Read as what it says, or refused with a sentence; never guessed."""
-    parent, child = api.items(2)
-    answer = add(api, parent, child, text)
-    wanted = TYPED[text]
-    assert (answer.status < 300) == (wanted is not None), (text, answer.body[:300])
-    assert api.quantities(parent) == ({} if wanted is None else {child: wanted})
-    if text == "1,000":
-        assert all(reading in answer.json()["problems"][0] for reading in ("1000", " 1;", "1.0000"))
+    parent, refused = api.items(2)
+    read = {}
+    for text, wanted in TYPED.items():
+        child = refused if wanted is None else api.item()
+        answer = add(api, parent, child, text)
+        assert (answer.status < 300) == (wanted is not None), (text, answer.body[:300])
+        if wanted is not None:
+            read[child] = wanted
+        if text == "1,000":
+            assert all(reading in answer.json()["problems"][0] for reading in ("1000", " 1;", "1.0000"))
+    assert api.quantities(parent) == read
 
 
 def test_a_comma_file_of_a_german_spreadsheet(api: Api) -> None:
@@ -63,22 +66,10 @@ def test_a_comma_file_of_a_german_spreadsheet(api: Api) -> None:
     parent, *children = api.items(4)
     rows = zip(children, ("1,5", "1.000", "2.000,25"), strict=True)
     body = "Part number;Quantity\r\n" + "".join(f"{c};{q}\r\n" for c, q in rows)
-    api.good("POST", bom(parent, "import"), body=body.encode(), headers={"Content-Type": "text/csv"})
+    api.good("POST", bom(parent, "import"), body=body.encode())
     assert list(api.quantities(parent).values()) == [1.5, 1000, 2000.25]
     lone = f"Part number;Quantity\r\n{children[0]};1.000\r\n".encode()
-    api.bad(400, "POST", bom(parent, "import"), body=lone, headers={"Content-Type": "text/csv"})
-
-
-def test_our_own_export_imported_again_changes_nothing(api: Api) -> None:
-    """Three decimals in a file of ours are three decimals, and no thousands."""
-    parent, *children = api.items(4)
-    quantities = dict(zip(children, (1.125, 1234.567, 1e-7), strict=True))
-    for child, quantity in quantities.items():
-        api.good("POST", bom(parent), {"child_part_number": child, "quantity": quantity})
-    csv = api.call("GET", bom(parent, "export.csv")).body
-    done = api.good("POST", bom(parent, "import"), body=csv, headers={"Content-Type": "text/csv"})
-    assert done["counts"] == {"add": 0, "change": 0, "same": 3, "skip": 0, "error": 0}
-    assert api.quantities(parent) == quantities
+    api.bad(400, "POST", bom(parent, "import"), body=lone)
 
 
 def test_sums_and_products_are_exact(api: Api) -> None:
@@ -87,11 +78,11 @@ def test_sums_and_products_are_exact(api: Api) -> None:
     api.good("PUT", f"/api/items/{leaf}", {"properties": {"standard_cost": "0,1", "mass_kg": 0.1}})
     for sub, quantity in ((left, 0.1), (right, 0.2)):
         api.merge(top, {left: 1, right: 1})
-        api.good("POST", bom(sub), {"child_part_number": leaf, "quantity": quantity})
+        api.add_line(sub, leaf, quantity=quantity)
     assert api.get(bom(top, "flat"))["flat_bom"][0]["total_quantity"] == 0.3
     assert api.get(bom(top, "cost"))["total_cost"] == 0.03
     assert api.get(bom(top, "mass"))["total_mass_kg"] == 0.03
-    api.good("PUT", bom(top, left), {"quantity": 3})
+    api.edit_line(top, left, quantity=3)
     expanded = api.get(bom(top, "expanded"))
     assert [row["total_quantity"] for row in expanded] == [3, 0.3, 1, 0.2]
     body = merge_body({leaf: 0.1})
@@ -103,9 +94,11 @@ def test_sums_and_products_are_exact(api: Api) -> None:
 def test_the_limit_is_the_same_however_a_quantity_comes(api: Api) -> None:
     """1e9 is taken, more is not: by hand, by merge, as the sum of several entries, by import."""
     parent, child = api.items(2)
-    for quantity in (1e9 + 1, 1e300, 0, -1, True):
+    for quantity in (1e9 + 1, 1e300, 0, -1, None, True, []):
         api.bad(400, "POST", bom(parent), {"child_part_number": child, "quantity": quantity})
-        api.bad(400, "POST", bom(parent, "merge"), merge_body({child: quantity}))
+        problems = api.bad(400, "POST", bom(parent, "merge"), merge_body({child: quantity}))["problems"]
+        assert "quantity" in problems[0], quantity
+    assert "quantity" in api.bad(400, "POST", bom(parent, "merge"), merge_body({child: "2"}))["problems"][0]
     halves = merge_body({child: 6e8})
     halves["entries"] *= 2
     problem = api.bad(400, "POST", bom(parent, "merge"), halves)["problems"]

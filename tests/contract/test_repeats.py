@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from hunting import BOTH
 from server_testing import Answer, Api, bom, form_body
 
 Send = Callable[[Api, str, dict[str, Any]], Answer]
@@ -39,7 +40,7 @@ def import_csv(api: Api, item: str, said: dict[str, Any]) -> Answer:
     )
 
 
-# How it is sent, the request, and what another one differs in. LEAF is a part.
+# LEAF is a part.
 MERGE = {
     "sync_id": "KEY",
     "entries": [
@@ -59,34 +60,49 @@ UPLOAD = {
 }
 ITEM = {"id": "UUID", "category": "F01", "name": "Screw", "properties": {"a": 1}}
 IMPORT = {"key": "KEY", "csv": "Part number,Quantity\nLEAF,3\n"}
-ROWS: list[tuple[Send, dict[str, Any], dict[str, Any]]] = [
-    (merge, MERGE, {"entries": [{"child_part_number": "LEAF", "quantity": 3}]}),
-    (merge, MERGE, {"entries": [{"child_part_number": "LEAF", "quantity": 2}]}),
-    (merge, MERGE, {"left_out": []}),
-    (merge, MERGE, {"document": {"file": "Other.FCStd", "folder": "robot"}}),
-    (merge, MERGE, {"document": {"file": "Top.FCStd", "folder": "arm"}}),
-    (upload, UPLOAD, {"file": ("a.FCStd", b"two")}),
-    (upload, UPLOAD, {"file": ("b.FCStd", b"one")}),
-    (upload, UPLOAD, {"comment": "second"}),
-    (upload, UPLOAD, {"properties": '{"mass_kg": 2}'}),
-    (upload, UPLOAD, {"path": "a.FCStd"}),
-    (upload, UPLOAD, {"base_revision": "1"}),
-    (upload, UPLOAD, {"links": '[{"path": "b.FCStd", "item": "", "sha256": ""}]'}),
-    (create, ITEM, {"name": "Bolt"}),
-    (create, ITEM, {"category": "F02"}),
-    (create, ITEM, {"properties": {"a": 2}}),
-    (create, ITEM, {"part_number": "LEAF-2"}),
-    (create, {**ITEM, "id": None, "key": "KEY"}, {"name": "Bolt"}),
-    (import_csv, IMPORT, {"csv": "Part number,Quantity\nLEAF,4\n"}),
-    (import_csv, {**IMPORT, "name": "robot.csv"}, {"name": "arm.csv"}),
+# How it is sent, the request, and by what the other requests differ, one by one.
+ROWS: list[tuple[Send, dict[str, Any], list[dict[str, Any]]]] = [
+    (
+        merge,
+        MERGE,
+        [
+            {"entries": [{"child_part_number": "LEAF", "quantity": 3}]},
+            {"entries": [{"child_part_number": "LEAF", "quantity": 2}]},
+            {"left_out": []},
+            {"document": {"file": "Other.FCStd", "folder": "robot"}},
+            {"document": {"file": "Top.FCStd", "folder": "arm"}},
+        ],
+    ),
+    (
+        upload,
+        UPLOAD,
+        [
+            {"file": ("a.FCStd", b"two")},
+            {"file": ("b.FCStd", b"one")},
+            {"comment": "second"},
+            {"properties": '{"mass_kg": 2}'},
+            {"path": "a.FCStd"},
+            {"base_revision": "1"},
+            {"links": '[{"path": "b.FCStd", "item": "", "sha256": ""}]'},
+        ],
+    ),
+    (
+        create,
+        ITEM,
+        [{"name": "Bolt"}, {"category": "F02"}, {"properties": {"a": 2}}, {"part_number": "LEAF-2"}],
+    ),
+    (create, {**ITEM, "id": None, "key": "KEY"}, [{"name": "Bolt"}]),
+    (import_csv, IMPORT, [{"csv": "Part number,Quantity\nLEAF,4\n"}]),
+    (import_csv, {**IMPORT, "name": "robot.csv"}, [{"name": "arm.csv"}]),
 ]
 
 
+@BOTH
 @pytest.mark.parametrize(
-    ("send", "request_", "other"), ROWS, ids=[f"{s.__name__}-{number}" for number, (s, *_) in enumerate(ROWS)]
+    ("send", "request_", "others"), ROWS, ids=[f"{s.__name__}-{n}" for n, (s, *_) in enumerate(ROWS)]
 )
 def test_a_key_stands_for_one_whole_request(
-    api: Api, send: Send, request_: dict[str, Any], other: dict[str, Any]
+    api: Api, send: Send, request_: dict[str, Any], others: list[dict[str, Any]]
 ) -> None:
     """Once more: the same answer, nothing is done. With other content: 409, and the first stays."""
     parent, leaf = api.items(2)
@@ -114,12 +130,14 @@ def test_a_key_stands_for_one_whole_request(
     before = state()
     again = send(api, parent, filled(request_))
     assert (again.status in (200, 201), again.json()) == (True, first.json())
-    refused = send(api, parent, filled({**request_, **other}))
-    assert (refused.status, refused.json()["error"]) == (409, "conflict"), refused.body
-    assert "was used before for another request" in refused.json()["message"]
+    for other in others:
+        refused = send(api, parent, filled({**request_, **other}))
+        assert (refused.status, refused.json()["error"]) == (409, "conflict"), (other, refused.body)
+        assert "was used before for another request" in refused.json()["message"]
     assert state() == before
 
 
+@BOTH
 def test_a_key_belongs_to_its_item_and_its_kind(api: Api) -> None:
     """A commit names its file and its BOM by one key."""
     parent, other, leaf = api.items(3)

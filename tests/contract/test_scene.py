@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hunting import BOTH
 from server_testing import Answer, Api, form_body
 
 from silo.drawing import Glb, cube
@@ -67,36 +68,56 @@ def put(api: Api, content: bytes, part: str, body: bytes, **headers: str) -> Ans
     return api.call("PUT", f"/api/models/{checksum}/{part}", body=body, headers={**packed, **headers})
 
 
+def state(api: Api, content: bytes, **products: Any) -> int:
+    """Send the structure of a file; returns the status."""
+    return put(api, content, "structure", json.dumps(structure(**products)).encode()).status
+
+
+def upload(
+    api: Api, item: str, content: bytes | None = None, links: list[dict[str, str]] | None = None
+) -> bytes:
+    """Upload a file, of a content that no other test has; returns the content."""
+    content = content or uuid.uuid4().bytes
+    api.upload(item, content, links=json.dumps(links or []))
+    return content
+
+
+def upload_for(api: Api, document: str, held: dict[str, str]) -> bytes:
+    """Upload a file that holds items: object → part number; returns its content."""
+    content = uuid.uuid4().bytes
+    items = [{"item": api.get(f"/api/items/{number}")["id"], "object": name} for name, number in held.items()]
+    body, headers = form_body({"file": ("x.FCStd", content), "items": json.dumps(items)})
+    api.good("POST", f"/api/documents/{document}/file", body=body, headers=headers)
+    return content
+
+
 def commit(
-    api: Api, item: str, content: bytes, links: list[dict[str, str]] | None = None, **products: Any
+    api: Api,
+    item: str,
+    links: list[dict[str, str]] | None = None,
+    *,
+    content: bytes | None = None,
+    **products: Any,
 ) -> str:
     """Upload a file with its model; returns the SHA-256."""
-    body, headers = form_body({"file": ("x.FCStd", content), "links": json.dumps(links or [])})
-    api.good("POST", f"/api/items/{item}/file", body=body, headers=headers)
+    content = upload(api, item, content, links)
     shapes = [key for key, one in products.items() if one.get("shape")]
     assert put(api, content, "geometry", gzip.compress(glb(*shapes))).status == 204
-    assert put(api, content, "structure", json.dumps(structure(**products)).encode()).status == 204
+    assert state(api, content, **products) == 204
     return hashlib.sha256(content).hexdigest()
-
-
-def fresh() -> bytes:
-    """A content that no other test has."""
-    return uuid.uuid4().bytes
 
 
 def test_a_model_is_kept_by_content_and_may_be_cached_for_ever(api: Api) -> None:
     """Packed at rest and on the way; only for files of revisions."""
-    item, content = api.item(), fresh()
-    sent = glb("Body")
-    assert put(api, content, "geometry", sent).status == 404
-    body, headers = form_body({"file": ("x.FCStd", content)})
-    api.good("POST", f"/api/items/{item}/file", body=body, headers=headers)
+    item, sent = api.item(), glb("Body")
+    assert put(api, b"no file here", "geometry", sent).status == 404
+    content = upload(api, item)
     checksum = hashlib.sha256(content).hexdigest()
     asked = {"sha256": [checksum, "0" * 64]}
     assert api.good("POST", "/api/models/missing", asked) == {"sha256": [checksum]}
     assert api.call("GET", f"/api/models/{checksum}/geometry").status == 404
     assert put(api, content, "geometry", sent).status == 204
-    assert put(api, content, "structure", json.dumps(structure(Body={"shape": True})).encode()).status == 204
+    assert state(api, content, Body={"shape": True}) == 204
     assert api.good("POST", "/api/models/missing", asked) == {"sha256": []}
     (told,) = api.get(f"/api/items/{item}/scene")["geometries"]
     found = api.call("GET", told["url"], headers={"Accept-Encoding": "gzip"})
@@ -110,15 +131,15 @@ def test_a_model_is_kept_by_content_and_may_be_cached_for_ever(api: Api) -> None
     assert api.get(f"/api/items/{item}/scene")["geometries"][0]["url"] != told["url"]
 
 
+@BOTH
 def test_a_scene_joins_the_newest_files_or_those_that_a_revision_recorded(api: Api) -> None:
     """A changed part needs no new assembly; each occurrence knows the lines that lead to it."""
     top, sub, leaf = api.items(3)
     uuids = {one: api.get(f"/api/items/{one}")["id"] for one in (top, sub, leaf)}
-    old = commit(api, leaf, fresh(), Body={"label": "Bolt", "shape": True})
+    old = commit(api, leaf, Body={"label": "Bolt", "shape": True})
     middle = commit(
         api,
         sub,
-        fresh(),
         [{"path": "leaf.FCStd", "item": uuids[leaf], "sha256": old}],
         Assembly={
             "uses": [use("Body", "leaf.FCStd", TURNED, uuid=uuids[leaf], color=[0, 1, 0, 1]), use("Plate")]
@@ -128,7 +149,6 @@ def test_a_scene_joins_the_newest_files_or_those_that_a_revision_recorded(api: A
     commit(
         api,
         top,
-        fresh(),
         [{"path": "sub.FCStd", "item": uuids[sub], "sha256": middle}],
         Assembly={"uses": [use("Assembly", "sub.FCStd", TURNED, uuid=uuids[sub], color=[1, 0, 0, 0.5])] * 2},
     )
@@ -136,7 +156,6 @@ def test_a_scene_joins_the_newest_files_or_those_that_a_revision_recorded(api: A
     commit(
         api,
         flexible := api.item(),
-        fresh(),
         [{"path": "sub.FCStd", "item": uuids[sub], "sha256": middle}],
         **{"Assembly@Flexible": {"uses": [use("Body", "sub.FCStd|leaf.FCStd"), use("X", "sub.FCStd|x")]}},
     )
@@ -155,7 +174,7 @@ def test_a_scene_joins_the_newest_files_or_those_that_a_revision_recorded(api: A
     assert bolt["matrix"] == [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0.5, 0.5, 0, 1]
     assert (plate["lines"], plate["part_number"]) == ([sub, ""], "")
     assert scene["geometries"][bolt["geometry"]]["id"] == old
-    new = commit(api, leaf, fresh(), Body={"label": "Longer bolt", "shape": True})
+    new = commit(api, leaf, Body={"label": "Longer bolt", "shape": True})
     now, before = (api.get(f"/api/items/{top}/scene{query}") for query in ("", "?revision=1"))
     assert (now["geometries"][0]["id"], now["occurrences"][0]["label"]) == (new, "Longer bolt")
     assert before == scene
@@ -166,13 +185,11 @@ def test_what_a_scene_lacks_is_listed_once(api: Api) -> None:
     """A file that is not here, one without a model, a part that its file lost, a ring, a wild place."""
     top, bare = api.items(2)
     number = {one: api.get(f"/api/items/{one}")["id"] for one in (top, bare)}
-    body, headers = form_body({"file": ("bare.FCStd", fresh())})
-    api.good("POST", f"/api/items/{bare}/file", body=body, headers=headers)
+    upload(api, bare)
     far = [1e6, 0, 0, 0, 0, 1e6, 0, 0, 0, 0, 1e6, 0, 0, 0, 0, 1]
     commit(
         api,
         top,
-        fresh(),
         [
             {"path": "gone.FCStd", "item": str(uuid.uuid4())},
             {"path": "bare.FCStd", "item": number[bare]},
@@ -198,7 +215,7 @@ def test_what_a_scene_lacks_is_listed_once(api: Api) -> None:
     assert [(one["part_number"], one["label"], one["why"]) for one in scene["missing"]] == [
         ("", "X", "its file gone.FCStd is not in Silo"),
         ("", "X", "its file unknown.FCStd is not in Silo"),
-        (bare, "bare.FCStd", "its file has no model yet"),
+        (bare, "x.FCStd", "its file has no model yet"),
         ("", "X", "x.FCStd has no such part any more"),
         (top, "Ring", "it contains itself; it is left out where the ring closes"),
         ("", "Farther", "its place or its scale is beyond all bounds"),
@@ -207,12 +224,13 @@ def test_what_a_scene_lacks_is_listed_once(api: Api) -> None:
     api.bad(404, "GET", f"/api/items/{api.item()}/scene")
 
 
-def test_a_scene_is_bounded_however_small_the_file(api: Api) -> None:
+def test_a_scene_is_bounded_however_small_the_file(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
     """60 levels of two uses each are 10^18 parts, also if none has a shape."""
+    monkeypatch.setattr("silo_server.services.scene.MAX_OCCURRENCES", 500)
     item = api.item()
     levels = {f"L{n}": {"uses": [use(f"L{n + 1}")] * 2} for n in range(60)}
-    commit(api, item, fresh(), **levels, L60={})
-    assert "50000" in api.bad(413, "GET", f"/api/items/{item}/scene")["message"]
+    commit(api, item, **levels, L60={})
+    assert "at most 500 parts" in api.bad(413, "GET", f"/api/items/{item}/scene")["message"]
 
 
 def spoil(path: str, value: Any) -> Callable[[dict[str, Any]], None]:
@@ -340,9 +358,7 @@ STRUCTURES: dict[str, Any] = {
 @pytest.mark.parametrize("part", ["geometry", "structure"])
 def test_hostile_models_are_refused_with_a_sentence(api: Api, part: str) -> None:
     """Huge counts, NaN, claims of gigabytes, addresses elsewhere; the server keeps nothing and goes on."""
-    item, content = api.item(), fresh()
-    body, headers = form_body({"file": ("x.FCStd", content)})
-    api.good("POST", f"/api/items/{item}/file", body=body, headers=headers)
+    content = upload(api, api.item())
     for name, value in (GEOMETRIES if part == "geometry" else STRUCTURES).items():
         answer = put(api, content, part, value if isinstance(value, bytes) else json.dumps(value).encode())
         assert answer.status == 400, name
@@ -365,14 +381,15 @@ def test_hostile_models_are_refused_with_a_sentence(api: Api, part: str) -> None
 BOX = {"mass_kg": 0.5, "volume_m3": 6e-5, "com_m": [0.0, 0.01, 0.02], "size_m": [0.01, 0.02, 0.3]}
 
 
+@BOTH
 def test_items_take_what_their_newest_file_states(api: Api) -> None:
     """With source and time, in the revision of the file; what is typed stays; older files say nothing."""
     number = api.item()
     path = f"/api/items/{number}"
     named = api.get(path)["name"]
-    old = fresh()
+    old, new = uuid.uuid4().bytes, uuid.uuid4().bytes
     about = {**BOX, "material": "Steel", "description": "Box, 300 long"}
-    commit(api, number, old, Body={"shape": True, "stated": about})
+    commit(api, number, content=old, Body={"shape": True, "stated": about})
     item = api.get(path)
     assert item["properties"] == {**BOX, "material": "Steel"}
     assert (item["description"], item["name"], item["current_revision"]) == ("Box, 300 long", named, 1)
@@ -380,28 +397,20 @@ def test_items_take_what_their_newest_file_states(api: Api) -> None:
     assert api.get(f"{path}/revisions")[0]["properties"] == item["properties"]
     # The same from another kernel is no change.
     near = {**about, "mass_kg": 0.5 + 1e-8, "com_m": [1e-11, 0.01, 0.02]}
-    new = fresh()
-    commit(api, number, new, Body={"shape": True, "stated": near})
+    commit(api, number, content=new, Body={"shape": True, "stated": near})
     assert api.get(path)["origins"] == item["origins"]
     api.good("PATCH", f"{path}/properties?source=scale", {"mass_kg": 0.53})
     api.good("PUT", path, {"description": "A box"})
     # An older content says nothing; the newest one does, beside what is typed, in a revision of its own.
-    stated = json.dumps(structure(Body={"stated": {**about, "mass_kg": 9}})).encode()
-    assert put(api, old, "structure", stated).status == 204
+    assert state(api, old, Body={"stated": {**about, "mass_kg": 9}}) == 204
     assert api.get(path)["properties"]["mass_kg"] == 0.53
-    assert (
-        put(
-            api, new, "structure", json.dumps(structure(Body={"stated": {"size_m": [1, 2, 3]}})).encode()
-        ).status
-        == 204
-    )
+    assert state(api, new, Body={"stated": {"size_m": [1, 2, 3]}}) == 204
     item = api.get(path)
     assert item["properties"] == {"mass_kg": 0.53, "size_m": [1, 2, 3]}
     assert (item["description"], item["current_revision"]) == ("A box", 4)
     # A content that is known states it again as soon as it is the newest.
     api.good("PATCH", f"{path}/properties", {"mass_kg": None})
-    body, headers = form_body({"file": ("x.FCStd", old)})
-    api.good("POST", f"{path}/file", body=body, headers=headers)
+    upload(api, number, old)
     assert api.get(path)["properties"] == {**BOX, "material": "Steel", "mass_kg": 9}
 
 
@@ -418,61 +427,52 @@ def test_a_mass_from_cad_goes_with_its_shape(api: Api) -> None:
         (None, 4),
         ({"size_m": [1, 2, 4], "material": "Wood"}, None),
     ]:
-        commit(api, number, fresh(), Body={"shape": True, "stated": stated})
+        commit(api, number, Body={"shape": True, "stated": stated})
         assert api.get(path)["properties"].get("mass_kg") == mass
 
 
-@pytest.mark.parametrize(
-    "stated",
-    [
-        {"mass_kg": 0}, {"mass_kg": -1}, {"mass_kg": 1e13}, {"size_m": [1, 2]}, {"material": 3},
-        {"com_m": [0, 0, 1e7]}, {"material": "\u0000"}, {"description": "x" * 1001},
-    ],
-)  # fmt: skip
-def test_what_no_file_can_state_is_refused(api: Api, stated: dict[str, Any]) -> None:
+def test_what_no_file_can_state_is_refused(api: Api) -> None:
     """Signs, sizes, characters."""
-    number, content = api.item(), fresh()
-    body, headers = form_body({"file": ("x.FCStd", content)})
-    api.good("POST", f"/api/items/{number}/file", body=body, headers=headers)
-    told = json.dumps(structure(Body={"stated": stated})).encode()
-    assert put(api, content, "structure", told).status == 400
+    number = api.item()
+    content = upload(api, number)
+    for stated in (
+        {"mass_kg": 0},
+        {"mass_kg": -1},
+        {"mass_kg": 1e13},
+        {"size_m": [1, 2]},
+        {"material": 3},
+        {"com_m": [0, 0, 1e7]},
+        {"material": "\u0000"},
+        {"description": "x" * 1001},
+    ):
+        assert state(api, content, Body={"stated": stated}) == 400, stated
     assert api.get(f"/api/items/{number}")["properties"] == {}
 
 
 def test_each_item_of_a_file_takes_what_its_object_states(api: Api) -> None:
     """Without revisions of their own; an object that is gone states nothing."""
     numbers = api.items(3)
-    held = [
-        {"item": api.get(f"/api/items/{one}")["id"], "object": name}
-        for one, name in zip(numbers, ("A", "B", "Gone"), strict=True)
-    ]
-    content, document = fresh(), str(uuid.uuid4())
-    body, headers = form_body({"file": ("x.FCStd", content), "items": json.dumps(held)})
-    api.good("POST", f"/api/documents/{document}/file", body=body, headers=headers)
-    products = {name: {"stated": {"mass_kg": mass}} for name, mass in (("A", 1), ("B", 2))}
-    assert put(api, content, "structure", json.dumps(structure(**products)).encode()).status == 204
+    content = upload_for(api, str(uuid.uuid4()), dict(zip(("A", "B", "Gone"), numbers, strict=True)))
+    assert state(api, content, A={"stated": {"mass_kg": 1}}, B={"stated": {"mass_kg": 2}}) == 204
     items = [api.get(f"/api/items/{one}") for one in numbers]
     assert [(one["properties"].get("mass_kg"), one["current_revision"]) for one in items] == [
-        (1, 0), (2, 0), (None, 0),
-    ]  # fmt: skip
+        (1, 0),
+        (2, 0),
+        (None, 0),
+    ]
 
 
+@BOTH
 def test_an_older_file_of_several_items_is_found_whatever_else_an_item_has(api: Api) -> None:
     """The number is that of the file's revision, also if its items have revisions of their own properties."""
     numbers, document = api.items(2), str(uuid.uuid4())
-    held = [
-        {"item": api.get(f"/api/items/{one}")["id"], "object": name}
-        for one, name in zip(numbers, ("A", "B"), strict=True)
-    ]
     for label in ("Old", "New"):
-        content = fresh()
-        body, headers = form_body({"file": ("x.FCStd", content), "items": json.dumps(held)})
-        api.good("POST", f"/api/documents/{document}/file", body=body, headers=headers)
-        products = {name: {"label": f"{label} {name}", "shape": True} for name in ("A", "B")}
-        assert put(api, content, "structure", json.dumps(structure(**products)).encode()).status == 204
+        content = upload_for(api, document, dict(zip("AB", numbers, strict=True)))
+        products = {name: {"label": f"{label} {name}", "shape": True} for name in "AB"}
+        assert state(api, content, **products) == 204
     api.good("PATCH", f"/api/items/{numbers[1]}/properties?source=scale", {"mass_kg": 2})
     assert api.get(f"/api/items/{numbers[1]}")["current_revision"] == 1
-    for number, name in zip(numbers, ("A", "B"), strict=True):
+    for number, name in zip(numbers, "AB", strict=True):
         path = f"/api/items/{number}/scene"
         shown = [api.get(path + query) for query in ("?revision=1", "?revision=2", "")]
         assert [one["revision"] for one in shown] == [1, 2, 2]

@@ -8,6 +8,7 @@ import uuid
 from urllib.parse import quote
 
 import pytest
+from hunting import BOTH
 from server_testing import Api
 
 from silo.bom.resolve import name_key
@@ -23,6 +24,7 @@ SAME = [
 ]
 
 
+@BOTH
 @pytest.mark.parametrize("ways", SAME, ids=[ways[0] for ways in SAME])
 def test_they_find_each_other(api: Api, ways: tuple[str, ...]) -> None:
     """Each way in a name or a description is found by each other way, typed whole."""
@@ -36,6 +38,7 @@ def test_they_find_each_other(api: Api, ways: tuple[str, ...]) -> None:
         assert numbers == {f"-{kind}{number}" for kind in "AB" for number in range(len(ways))}, typed
 
 
+@BOTH
 @pytest.mark.parametrize("ways", SAME[:4], ids=[ways[0] for ways in SAME[:4]])
 def test_they_look_alike(api: Api, ways: tuple[str, ...]) -> None:
     """A component of one of these names may be an item of another."""

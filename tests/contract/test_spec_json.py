@@ -9,8 +9,6 @@ from typing import Any
 import pytest
 from server_testing import Api, bom
 
-from silo.api.wire import MergeEvent, MergeResult
-
 REQUEST = {
     "source": "assembly",
     "entries": [
@@ -83,29 +81,12 @@ def test_whole_quantities_are_written_as_whole_numbers(api: Api) -> None:
     assert b'"quantity":0.5}' in body
 
 
-def test_the_shared_wire_models_read_the_answers(api: Api) -> None:
-    """Client and server speak by the same models: what is sent validates, what is validated was sent."""
-    parent, a, b = api.items(3)
-    api.merge(parent, {a: 1})
-    with api.events() as events:
-        raw = api.merge(parent, {b: 2}, sync_id="wire-models")
-        event = events.next("bom_merge")
-    result = MergeResult.model_validate(raw)
-    assert [line.part_number for line in result.diff.added] == [b]
-    assert result.sync_id == "wire-models"
-    told = MergeEvent.model_validate(event.data)
-    assert (told.item, told.sync_id) == (parent, "wire-models")
-    assert [line.part_number for line in told.diff.removed] == [a]
-
-
 def test_resolve_url_leads_to_a_page(api: Api, server: Any) -> None:
     """The merge's ``resolve_url`` is a page that shows the BOM, for who is logged in."""
     parent, a = api.items(2)
     api.merge(parent, {a: 3})
     url = api.merge(parent, {})["resolve_url"]
     assert url == f"/items/{parent}/bom"
-    login = api.as_(None).call("POST", "/login", body=b"username=x&password=y")
-    assert login.status in (401, 422, 400)
     stranger = api.as_(None).call("GET", url)
     assert stranger.status == 303
     assert stranger.headers["location"].startswith("/login?next=")

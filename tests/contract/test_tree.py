@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import pytest
+from hunting import BOTH
 from server_testing import Api, bom
 
 
@@ -19,6 +20,7 @@ def gearbox(api: Api) -> dict[str, str]:
     return items
 
 
+@BOTH
 def test_expanded(api: Api, gearbox: dict[str, str]) -> None:
     """Rows in tree order with depth, quantities per one parent, and totals."""
     rows = api.get(bom(gearbox["top"], "expanded"))
@@ -79,7 +81,7 @@ def test_alternates_are_not_counted(api: Api) -> None:
     """Only components are multiplied, weighed and paid; alternates are shown in the tree."""
     top, a, b = api.items(3)
     api.merge(top, {a: 1})
-    api.good("POST", bom(top), {"child_part_number": b, "rel_type": "alternate"})
+    api.add_line(top, b, rel_type="alternate")
     assert [row["part_number"] for row in api.get(bom(top, "flat"))["flat_bom"]] == [a]
     assert len(api.get(bom(top, "expanded"))) == 2
     assert api.get(bom(top, "cost"))["missing"] == [a]
@@ -89,6 +91,7 @@ def test_alternates_are_not_counted(api: Api) -> None:
     assert [row["part_number"] for row in api.get(bom(top, "flat"))["flat_bom"]] == [a]
 
 
+@BOTH
 def test_where_used(api: Api, gearbox: dict[str, str]) -> None:
     """Direct parents; with ``indirect`` theirs as well."""
     gear = api.get(bom(gearbox["gear"], "where-used"))
@@ -145,6 +148,7 @@ def test_mass(api: Api, gearbox: dict[str, str]) -> None:
     assert answer["stated_mass_kg"] is None
 
 
+@BOTH
 def test_a_newer_revision_is_reported(api: Api) -> None:
     """A line pinned to a revision says so when there is a newer one."""
     top, a = api.items(2)
@@ -153,7 +157,7 @@ def test_a_newer_revision_is_reported(api: Api) -> None:
     api.merge(top, {a: 1})
     line = api.lines(top)[a]
     assert (line["effective_revision"], line["newer_revision_exists"]) == (3, False)
-    line = api.good("PUT", bom(top, a), {"child_revision": 2})
+    line = api.edit_line(top, a, child_revision=2)
     assert (line["effective_revision"], line["newer_revision_exists"]) == (2, True)
 
 

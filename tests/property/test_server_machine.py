@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pytest
-from hunting import examples
+from hunting import examples, kinds
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -300,7 +300,7 @@ def told(state: Any) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)])
+@pytest.mark.parametrize("kind", kinds("sqlite", "postgres"))
 def test_the_server_behaves_like_the_model(kind: str) -> None:
     """Whatever several users do in whatever order, on both databases."""
     with tempfile.TemporaryDirectory() as folder:

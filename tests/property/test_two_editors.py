@@ -14,12 +14,11 @@ import re
 from collections.abc import Iterator
 from html import escape
 from html.parser import HTMLParser
-from pathlib import Path
 from random import Random
 from urllib.parse import urlencode
 
 import pytest
-from hunting import LONG
+from hunting import LONG, kinds
 from server_testing import Answer, Api, Databases, bom
 from web_visitor import FORM, HTML, Visitor, enter
 
@@ -35,9 +34,6 @@ TEXTS = {
     "find_number": ["", "10", "20"],
 }
 STEPS = 90
-POSTGRES = pytest.mark.postgres
-GAMES = [("sqlite", 1), pytest.param("postgres", 2, marks=POSTGRES)]
-GAMES += [("sqlite", 2), pytest.param("postgres", 1, marks=POSTGRES)] if LONG else []
 
 
 class FormReader(HTMLParser):
@@ -134,49 +130,51 @@ def shown(line: dict[str, object]) -> dict[str, str]:
     return {name: "" if line[name] is None else str(line[name]) for name in FIELDS}
 
 
-@pytest.fixture(params=["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)])
-def api(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Api]:
+@pytest.fixture(scope="module", params=kinds("sqlite"))
+def api(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Api]:
     """A server with two editors."""
-    databases = Databases(tmp_path)
+    folder = tmp_path_factory.mktemp("editors")
+    databases = Databases(folder)
     url = databases.new(str(request.param))
     with (
-        running_server(url, token="silo_two", files_dir=tmp_path / "files") as server,
+        running_server(url, token="silo_two", files_dir=folder / "files") as server,
         Api(server.base_url, "silo_two") as caller,
     ):
         yield caller
     databases.close()
 
 
-@pytest.mark.parametrize(("api", "seed"), GAMES, indirect=["api"])
-def test_nothing_is_lost_or_reverted_without_a_choice(api: Api, seed: int) -> None:
-    """Random interleavings of two forms, syncs and undos on two lines; SILO_LONG=1 plays each over both."""
-    play(api, Random(seed), STEPS)
+@pytest.mark.parametrize("api", kinds("sqlite", "postgres"), indirect=True, scope="module")
+def test_nothing_is_lost_or_reverted_without_a_choice(api: Api) -> None:
+    """Random interleavings of two forms, syncs and undos on two lines."""
+    for seed in (1, 2) if LONG else (1,):
+        play(api, Random(seed), STEPS)
 
 
-@pytest.mark.parametrize("typed", ["many", "1,000", "8"])
-def test_a_form_that_was_refused_reverts_nobody(api: Api, typed: str) -> None:
+def test_a_form_that_was_refused_reverts_nobody(api: Api) -> None:
     """A colleague's note, while a quantity is refused, asked about, or clashes, survives the next save."""
-    parent, child = api.items(2)
-    api.merge(parent, {child: 2})
     api.call("POST", "/api/users", {"username": "ann", "role": "editor"})
-    ann = Editor("ann", enter(api, "ann"), parent)
-    line_id = str(api.lines(parent)[child]["id"])
-    ann.begin(line_id)
-    api.good(
-        "PUT", bom(parent, child), {"notes": "mine to keep", **({"quantity": 6} if typed == "8" else {})}
-    )
-    ann.open |= {"quantity": typed, "why": "for this form alone"}
-    answer = ann.send(Random(0))
-    assert answer.status == (412 if typed == "8" else 400)
-    # The reason belongs to this form, not to the one for a new line.
-    assert answer.body.count(b"for this form alone") == 1
-    ann.refused(answer, shown(api.lines(parent)[child]))
-    ann.open["quantity"] = "9"
-    ann.radios = set()
-    ann.open |= {"pick_quantity": "mine"} if typed == "8" else {}
-    assert ann.send(Random(0)).status == 303
-    line = api.lines(parent)[child]
-    assert (line["quantity"], line["notes"]) == (9, "mine to keep")
+    ann = enter(api, "ann")
+    for typed in ("many", "1,000", "8"):
+        parent, child = api.items(2)
+        api.merge(parent, {child: 2})
+        editor = Editor("ann", ann, parent)
+        line_id = str(api.lines(parent)[child]["id"])
+        editor.begin(line_id)
+        clash = typed == "8"
+        api.good("PUT", bom(parent, child), {"notes": "mine to keep", **({"quantity": 6} if clash else {})})
+        editor.open |= {"quantity": typed, "why": "for this form alone"}
+        answer = editor.send(Random(0))
+        assert answer.status == (412 if clash else 400)
+        # The reason belongs to this form, not to the one for a new line.
+        assert answer.body.count(b"for this form alone") == 1
+        editor.refused(answer, shown(api.lines(parent)[child]))
+        editor.open["quantity"] = "9"
+        editor.radios = set()
+        editor.open |= {"pick_quantity": "mine"} if clash else {}
+        assert editor.send(Random(0)).status == 303
+        line = api.lines(parent)[child]
+        assert (line["quantity"], line["notes"]) == (9, "mine to keep")
 
 
 def play(api: Api, random: Random, steps: int) -> None:

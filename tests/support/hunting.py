@@ -2,6 +2,7 @@
 """How much is tried: few examples and one database in each run, many and both where there is time."""
 
 import os
+from typing import Any
 
 import pytest
 
@@ -13,9 +14,18 @@ def examples(usual: int) -> int:
     return usual * 10 if LONG else usual
 
 
-def over(kind: str) -> pytest.MarkDecorator:
-    """Run over this database only (``sqlite`` or ``postgres``), and over both with ``SILO_LONG``."""
-    kinds = ["sqlite", "postgres"] if LONG else [kind]
-    marks = {"sqlite": [], "postgres": [pytest.mark.postgres]}
-    rows = [pytest.param(name, marks=marks[name]) for name in kinds]
-    return pytest.mark.parametrize("kind", rows, indirect=True, scope="session")
+def kinds(*usual: str) -> list[Any]:
+    """Return these databases (``sqlite``, ``postgres``), and both with ``SILO_LONG``."""
+    return [
+        pytest.param(kind, marks=[pytest.mark.postgres] if kind == "postgres" else [])
+        for kind in ("sqlite", "postgres")
+        if LONG or kind in usual
+    ]
+
+
+def over(*usual: str) -> pytest.MarkDecorator:
+    """Run over these databases, and over both with ``SILO_LONG``."""
+    return pytest.mark.parametrize("kind", kinds(*usual), indirect=True, scope="session")
+
+
+BOTH = over("sqlite", "postgres")

@@ -150,6 +150,19 @@ class Api:
         """Merge ``entries`` (part number → quantity); the answer."""
         return self.good("POST", bom(parent, "merge"), merge_body(entries, **more))
 
+    def add_line(self, parent: str, child: str, **fields: Any) -> Any:
+        """Add a line by hand; the line."""
+        return self.good("POST", bom(parent), {"child_part_number": child, **fields})
+
+    def edit_line(self, parent: str, child: str, **fields: Any) -> Any:
+        """Change a line by hand; the line."""
+        return self.good("PUT", bom(parent, child), fields)
+
+    def upload(self, item: str, content: bytes = b"x", name: str = "x.FCStd", **parts: str) -> Any:
+        """Upload a file; its revision."""
+        body, headers = form_body({"file": (name, content), **parts})
+        return self.good("POST", f"/api/items/{quote(item)}/file", body=body, headers=headers)
+
     def lines(self, parent: str) -> dict[str, Any]:
         """The BOM's lines by child part number."""
         return {line["child_part_number"]: line for line in self.get(bom(parent))}
