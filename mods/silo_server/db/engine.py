@@ -188,14 +188,12 @@ class Tx:
         if self.postgres:
             self.conn.execute(select(func.pg_notify(EVENT_CHANNEL, "access")))
 
-    def lock(self, key: int) -> None:
-        """Take this lock until the commit; SQLite needs none: it has one writer at a time."""
+    def lock(self, key: int | str) -> None:
+        """Take this lock, or that of a text, until the commit; SQLite needs none: it has one writer."""
         if self.postgres:
+            if isinstance(key, str):
+                key = int(hashlib.sha256(key.encode()).hexdigest()[:15], 16)
             self.conn.execute(select(func.pg_advisory_xact_lock(key)))
-
-    def lock_structure(self) -> None:
-        """Keep others from adding a BOM edge until the commit."""
-        self.lock(STRUCTURE_LOCK)
 
 
 class Database:
@@ -219,7 +217,8 @@ class Database:
             self.engine = _postgres_engine(settings, 1)
             self._reads = _postgres_engine(settings, READERS, READ_SECONDS)
             self._writes = _postgres_engine(settings, WRITERS, WRITE_SECONDS)
-        self._reader = self._reads.execution_options(**_reader_options(settings))
+        snapshot: dict[str, Any] = {"isolation_level": "REPEATABLE READ", "postgresql_readonly": True}
+        self._reader = self._reads.execution_options(**({} if settings.is_sqlite else snapshot))
         self._writer = self._writes.execution_options(silo_write=True)
         places = 1 if settings.is_sqlite else WRITERS
         self.turn = Turnstile(places, WRITERS_WAITING, WAIT_SECONDS, "changes")
@@ -320,12 +319,6 @@ def uses_of(which: ColumnElement[bool], *, kept: bool = False) -> Select[Any]:
     if kept:
         step = step.join(product_summaries, product_summaries.c.item_id == bom_lines.c.parent_id)
     return select(above.union(step).c.id)
-
-
-def _reader_options(settings: Settings) -> dict[str, Any]:
-    if settings.is_sqlite:
-        return {}
-    return {"isolation_level": "REPEATABLE READ", "postgresql_readonly": True}
 
 
 def _postgres_engine(settings: Settings, connections: int, seconds: float | None = None) -> Engine:

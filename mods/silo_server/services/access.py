@@ -199,20 +199,17 @@ def change_user(
     if password is not None:
         check_lasting(tx, "set a password")
     loses = (role is not None and role is not Role.ADMIN) or active is False
-    if loses and user.role is Role.ADMIN and user.active and _active_admins(tx) <= 1:
+    admins = select(func.count()).where(users.c.role == Role.ADMIN.value, users.c.active)
+    if loses and user.role is Role.ADMIN and user.active and tx.conn.execute(admins).scalar_one() <= 1:
         raise ConflictError(f"{user.username} is the last admin; make another user an admin first")
-    values: dict[str, object] = {}
-    if role is not None:
-        values["role"] = role.value
-    if display_name is not None:
-        values["display_name"] = display_name
-    if active is not None:
-        values["active"] = active
-    if approver is not None:
-        values["approver"] = approver
-    if password is not None:
-        values["password_hash"] = hash_password(password)
-    if values:
+    given: dict[str, object] = {
+        "role": role and role.value,
+        "display_name": display_name,
+        "active": active,
+        "approver": approver,
+        "password_hash": None if password is None else hash_password(password),
+    }
+    if values := {name: value for name, value in given.items() if value is not None}:
         tx.conn.execute(update(users).where(users.c.id == user.id).values(**values))
         note(tx, "user.changed", user.username, _what_changed(user, values))
     ended = [sessions] if password is not None or active is False else []
@@ -287,11 +284,6 @@ def hash_password(password: str) -> str:
         )
     with _HASHING.enter():
         return _hasher().hash(password)
-
-
-def _active_admins(tx: Tx) -> int:
-    query = select(func.count()).select_from(users)
-    return tx.conn.scalar(query.where(users.c.role == Role.ADMIN.value, users.c.active)) or 0
 
 
 PREFIX = "silo_"
@@ -385,7 +377,7 @@ def create_own_token(
 
 def let_program_in(tx: Tx, name: str, hashed: str) -> None:
     """Make a token for a program that sent the SHA-256 of its own secret; only one for each secret."""
-    tx.lock(int(hashed[:15], 16))
+    tx.lock(hashed)
     if tx.conn.scalar(select(api_tokens.c.id).where(api_tokens.c.token_hash == hashed)) is None:
         create_own_token(tx, name, days=PROGRAM_DAYS, forever=False, scope=Scope.WRITE, hashed=hashed)
 
@@ -393,7 +385,7 @@ def let_program_in(tx: Tx, name: str, hashed: str) -> None:
 def _made_before(tx: Tx, user_id: int, secret: str) -> Token | None:
     # A repeat that comes while the first request is under way waits for it.
     hashed = secret_hash(secret)
-    tx.lock(int(hashed[:15], 16))
+    tx.lock(hashed)
     token_id = tx.conn.scalar(select(api_tokens.c.id).where(api_tokens.c.token_hash == hashed))
     if token_id is None:
         return None
@@ -420,7 +412,6 @@ def create_token(
     hashed: str = "",
 ) -> tuple[Token, str]:
     """Make a token for a user; return it with its secret, which is never shown again."""
-    prefix = PREFIX if hashed else shown_prefix(secret) if secret else None
     secret = "" if hashed else secret or PREFIX + secrets.token_hex(20)
     token_id = tx.conn.execute(
         insert(api_tokens)
@@ -428,7 +419,7 @@ def create_token(
             user_id=user_id,
             name=name,
             token_hash=hashed or secret_hash(secret),
-            prefix=secret[:9] if prefix is None else prefix,
+            prefix=shown_prefix(secret) or PREFIX,
             scope=scope.value,
             created_at=tx.stamp,
             expires_at=expires,

@@ -6,7 +6,6 @@ Part numbers: what one may look like, and how the next of a category is found.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import re
@@ -81,20 +80,13 @@ def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
 def take_number(tx: Tx, schema: Schema, category: Category) -> str:
     """Take the next free number of the category."""
     where = (number_counters.c.schema_name == schema.name, number_counters.c.category == category.code)
-    _ensure_counter(tx, schema.name, category.code)
+    make = postgresql.insert if tx.postgres else sqlite.insert
+    first = {"schema_name": schema.name, "category": category.code, "last_serial": 0}
+    tx.conn.execute(make(number_counters).values(first).on_conflict_do_nothing())
     last = tx.conn.scalar(select(number_counters.c.last_serial).where(*where).with_for_update()) or 0
     number, serial = _next_free(tx, schema, category, last)
     tx.conn.execute(update(number_counters).where(*where).values(last_serial=serial))
     return number
-
-
-def _ensure_counter(tx: Tx, schema: str, category: str) -> None:
-    make = postgresql.insert if tx.postgres else sqlite.insert
-    tx.conn.execute(
-        make(number_counters)
-        .values(schema_name=schema, category=category, last_serial=0)
-        .on_conflict_do_nothing()
-    )
 
 
 def _next_free(tx: Tx, schema: Schema, category: Category, last: int) -> tuple[str, int]:
@@ -289,7 +281,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     request = KeyedRequest.of("item", uuid or new.key, asdict(replace(new, uuid=uuid, key=None)))
     if request is not None:
         # A repeat that comes while the first request is under way waits for it, and finds its item.
-        tx.lock(int(hashlib.sha256(request.key.encode()).hexdigest()[:15], 16))
+        tx.lock(request.key)
     if (earlier := earlier_answer(tx, request)) is not None:
         return _made_before(tx, earlier.text), False
     if uuid is not None and (others := get_by_uuids(tx, [uuid], include_archived=True)):
@@ -526,14 +518,12 @@ def _item_type(given: str | None, category: Category | None) -> str:
     return given
 
 
-def _new_number(item: Item, given: str | None) -> str | None:
-    # A number that is older than a rule may stay.
-    return given if given is None or given == item.part_number else check_number(given)
-
-
 def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
+    number = change.part_number
+    if number not in (None, item.part_number):  # a number that is older than a rule may stay
+        number = check_number(number)
     given = {
-        "part_number": _new_number(item, change.part_number),
+        "part_number": number,
         "name": change.name,
         "description": change.description,
         "item_type": _item_type(change.item_type, None) if change.item_type is not None else None,

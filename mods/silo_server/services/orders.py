@@ -40,6 +40,7 @@ from silo_server.values import Item, from_row
 
 MOST_PIECES = 1_000_000
 MOST_SPARES = 1000
+MOST_LISTED = 1000
 BOUGHT, MADE, UNSAID = "bought", "made", "unsaid"
 
 
@@ -389,7 +390,7 @@ def take_back(tx: Tx, part_number: str, order_id: int) -> Recorded:
 
 
 def list_recorded(
-    tx: Tx, ids: Collection[int] | None = None, product: Item | None = None, limit: int = 1000
+    tx: Tx, ids: Collection[int] | None = None, product: Item | None = None
 ) -> list[tuple[Recorded, str]]:
     """Read what was ordered, newest first, each with its part number: these, or those for a product."""
     query = select(orders, items.c.part_number).join(items, items.c.id == orders.c.item_id)
@@ -397,7 +398,7 @@ def list_recorded(
         query = query.where(one_of(tx, orders.c.id, ids))
     if product is not None:
         query = query.where(orders.c.product_id == product.id)
-    rows = tx.conn.execute(query.order_by(orders.c.id.desc()).limit(limit))
+    rows = tx.conn.execute(query.order_by(orders.c.id.desc()).limit(MOST_LISTED))
     return [(from_row(Recorded, row), row.part_number) for row in rows]
 
 

@@ -71,7 +71,7 @@ def find_document(tx: Tx, uuid: str, *, lock: bool = False) -> Document | None:
     ``lock`` makes other writers of it wait until this transaction ends.
     """
     if lock:
-        tx.lock(int(hashlib.sha256(uuid.encode()).hexdigest()[:15], 16))
+        tx.lock(uuid)
     row = tx.conn.execute(select(documents).where(documents.c.uuid == uuid)).one_or_none()
     return None if row is None else from_row(Document, row)
 
@@ -151,31 +151,31 @@ def keep_picture(tx: Tx, store: FileStore, item: Item, picture: bytes) -> None:
 
 def documents_holding(tx: Tx, item: Item) -> list[Document]:
     """Find the documents whose newest revision holds an item, its own first."""
-    query = select(documents).where(
-        documents.c.id.in_(select(document_items.c.document_id).where(document_items.c.item_id == item.id))
-    )
-    rows = [from_row(Document, row) for row in tx.conn.execute(query.order_by(documents.c.id))]
-    return sorted(rows, key=lambda document: document.item_id != item.id)
+    holding = select(document_items.c.document_id).where(document_items.c.item_id == item.id)
+    found = _documents(tx, documents.c.id.in_(holding))
+    return sorted(found, key=lambda document: document.item_id != item.id)
 
 
 def linking_to(tx: Tx, document: Document) -> list[Document]:
     """Find the documents whose newest revision links to this one."""
     sources = select(document_links.c.document_id).where(document_links.c.target == document.uuid)
-    query = select(documents).where(documents.c.id.in_(sources)).order_by(documents.c.id)
-    return [from_row(Document, row) for row in tx.conn.execute(query)]
+    return _documents(tx, documents.c.id.in_(sources))
 
 
 def linked_from(tx: Tx, document: Document) -> list[Document]:
     """Find the documents that the newest revision of this one links to."""
     targets = select(document_links.c.target).where(document_links.c.document_id == document.id)
-    query = select(documents).where(documents.c.uuid.in_(targets)).order_by(documents.c.id)
-    return [from_row(Document, row) for row in tx.conn.execute(query)]
+    return _documents(tx, documents.c.uuid.in_(targets))
 
 
 def documents_by_uuid(tx: Tx, wanted: Sequence[str]) -> list[Document]:
     """Find the documents with these UUIDs; unknown ones are absent."""
-    query = select(documents).where(one_of(tx, documents.c.uuid, {uuid.lower() for uuid in wanted}))
-    return [from_row(Document, row) for row in tx.conn.execute(query.order_by(documents.c.id))]
+    return _documents(tx, one_of(tx, documents.c.uuid, {uuid.lower() for uuid in wanted}))
+
+
+def _documents(tx: Tx, which: ColumnElement[bool]) -> list[Document]:
+    query = select(documents).where(which).order_by(documents.c.id)
+    return [from_row(Document, row) for row in tx.conn.execute(query)]
 
 
 def shown(tx: Tx, several: Sequence[Document]) -> list[ShownDocument]:

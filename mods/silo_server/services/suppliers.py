@@ -67,21 +67,17 @@ LARGEST_AMOUNT, LARGEST_PRICE = Decimal(10) ** 9, Decimal(10) ** 12
 LONGEST_LEAD_TIME = 3650
 # What an imported table has; several rows may have the prices of one supplier part.
 _ROLES = (
-    *(
-        Heading.PART_NUMBER,
-        Heading.SUPPLIER,
-        Heading.SUPPLIER_NUMBER,
-        Heading.LINK,
-        Heading.PACK_SIZE,
-        Heading.MINIMUM,
-    ),
-    *(
-        Heading.PRICE,
-        Heading.FROM_QUANTITY,
-        Heading.CURRENCY,
-        Heading.LEAD_TIME,
-        Heading.PREFERRED,
-    ),
+    Heading.PART_NUMBER,
+    Heading.SUPPLIER,
+    Heading.SUPPLIER_NUMBER,
+    Heading.LINK,
+    Heading.PACK_SIZE,
+    Heading.MINIMUM,
+    Heading.PRICE,
+    Heading.FROM_QUANTITY,
+    Heading.CURRENCY,
+    Heading.LEAD_TIME,
+    Heading.PREFERRED,
 )
 TABLE = Table(_ROLES, (Heading.PART_NUMBER, Heading.SUPPLIER), {}, _ROLES)
 
@@ -166,7 +162,7 @@ def _offer(part: SupplierPart, needed: Decimal, rates: Mapping[str, Decimal]) ->
 
     amount = part.amount(needed)
     price, rate = part.price_at(amount), rates.get(part.currency)
-    cost = None if price is None else exact_product((amount, price))
+    cost = cost_of(amount)
     in_base = None if cost is None or rate is None else exact_product((cost, rate))
     larger = {part.amount(least) for least, _ in part.prices if least > amount}
     cheaper = [

@@ -181,8 +181,9 @@ def change_at(tx: Tx, parent: Item, when: str) -> int:
 
 def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
     """Return the BOM as change ``change_id`` left it; NotFoundError if the change is not one of this BOM."""
-    if change_id != 0:
-        get_own_change(tx, parent, change_id)
+    owner = select(bom_changes.c.parent_id).where(bom_changes.c.id == change_id)
+    if change_id != 0 and tx.conn.scalar(owner) != parent.id:
+        raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
     newest = (
         select(bom_change_lines.c.line_id, func.max(bom_change_lines.c.change_id).label("change_id"))
         .join(bom_changes, bom_changes.c.id == bom_change_lines.c.change_id)
@@ -204,14 +205,6 @@ def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
     return [
         PastLine(row.line_id, children[row.child_id], row.position, stored_state(row.after)) for row in rows
     ]
-
-
-def get_own_change(tx: Tx, parent: Item, change_id: int) -> int:
-    """Return ``change_id`` if it is a change of this BOM; NotFoundError otherwise."""
-    owner = tx.conn.scalar(select(bom_changes.c.parent_id).where(bom_changes.c.id == change_id))
-    if owner != parent.id:
-        raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
-    return change_id
 
 
 def compare(before: Sequence[PastLine], after: Sequence[PastLine]) -> list[Difference]:

@@ -71,24 +71,28 @@ from silo_server.values import Item, Line, LineState
 
 # What a line says; then what identifies a part without a number, or describes a new one.
 LINE_ROLES = (
-    *(
-        Heading.PART_NUMBER,
-        Heading.QUANTITY,
-        Heading.REFERENCE_DESIGNATORS,
-        *map(Heading, LineTexts.model_fields),
-    ),
-    *(Heading.TYPE, Heading.REVISION, Heading.LEVEL),
+    Heading.PART_NUMBER,
+    Heading.QUANTITY,
+    Heading.REFERENCE_DESIGNATORS,
+    *map(Heading, LineTexts.model_fields),
+    Heading.TYPE,
+    Heading.REVISION,
+    Heading.LEVEL,
+)
+_BOUGHT = (
+    Heading.MANUFACTURER,
+    Heading.MANUFACTURER_NUMBER,
+    Heading.SUPPLIER,
+    Heading.SUPPLIER_NUMBER,
 )
 ROLES = (
-    *(
-        *LINE_ROLES,
-        Heading.NAME,
-        Heading.DESCRIPTION,
-        Heading.VALUE,
-        Heading.FOOTPRINT,
-        Heading.MANUFACTURER,
-    ),
-    *(Heading.MANUFACTURER_NUMBER, Heading.SUPPLIER, Heading.SUPPLIER_NUMBER, Heading.NOT_FITTED),
+    *LINE_ROLES,
+    Heading.NAME,
+    Heading.DESCRIPTION,
+    Heading.VALUE,
+    Heading.FOOTPRINT,
+    *_BOUGHT,
+    Heading.NOT_FITTED,
 )
 NEEDED = (Heading.PART_NUMBER, Heading.QUANTITY)
 # In place of a needed column, if the file has none.
@@ -96,12 +100,6 @@ _INSTEAD = {
     Heading.PART_NUMBER: (Heading.MANUFACTURER_NUMBER, Heading.VALUE),
     Heading.QUANTITY: (Heading.REFERENCE_DESIGNATORS,),
 }
-_BOUGHT = (
-    Heading.MANUFACTURER,
-    Heading.MANUFACTURER_NUMBER,
-    Heading.SUPPLIER,
-    Heading.SUPPLIER_NUMBER,
-)
 _RANGE = re.compile(r"([A-Za-z]+)([0-9]+)-([A-Za-z]*)([0-9]+)")
 
 

@@ -24,7 +24,7 @@ from sqlalchemy import Integer, Select, delete, func, insert, literal_column, se
 from silo.bom.errors import ConflictError, CycleError, NotFoundError, VersionConflictError
 from silo.bom.numbers import plain
 from silo_server import events
-from silo_server.db.engine import Tx, insert_rows, one_of, update_rows
+from silo_server.db.engine import STRUCTURE_LOCK, Tx, insert_rows, one_of, update_rows
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_lines, items
 from silo_server.services.items import get_item
 from silo_server.settings import TooLargeError
@@ -367,7 +367,7 @@ def check_no_cycle(tx: Tx, parent: Item, child_ids: Collection[int]) -> None:
     """
     if not child_ids:
         return
-    tx.lock_structure()
+    tx.lock(STRUCTURE_LOCK)
     for ring in find_rings(tx, parent, child_ids).values():
         raise CycleError(ring)
 

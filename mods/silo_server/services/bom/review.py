@@ -124,22 +124,24 @@ def change_line(
     among the changes wins over this.
     """
     parent = parent_to_change(tx, part_number, expected)
-    line = line_of(lines_of(tx, parent), which, parent)
+    lines = lines_of(tx, parent)
+    line = line_of(lines, which, parent)
     after = edited_state(line.state, changes)
     check_state(after)
     if after == line.state:
         return Edited(parent, line, parent.bom_version, 0, line.child_part_number)
-    if after.rel_type != line.state.rel_type:
-        _check_free(tx, parent, line, after.rel_type)
+    child = line.child_part_number
+    if after.rel_type != line.state.rel_type and any(
+        (other.child_id, other.state.rel_type) == (line.child_id, after.rel_type) for other in lines
+    ):
+        raise DuplicateError(f"{child} is in this BOM as {after.rel_type} already")
     fields = sorted(k for k in changes if getattr(after, k) != getattr(line.state, k))
     if not same_quantity(after.quantity, line.state.quantity):
         quantity = f"quantity {plain(line.state.quantity)} → {plain(after.quantity)}"
         fields = [quantity, *(name for name in fields if name != "quantity")]
     words = ", ".join(name.replace("_", " ") for name in fields) or "source"
     change = LineRecord(line.id, line.child_id, line.state, after, line.position)
-    return _apply(
-        tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {words}", why
-    )
+    return _apply(tx, parent, change, child, f"{child} changed: {words}", why)
 
 
 def remove_line(
@@ -206,12 +208,6 @@ def check_state(state: LineState) -> None:
         problems.append(f"metadata: {problem}")
     if problems:
         raise RejectedError("; ".join(problems), problems)
-
-
-def _check_free(tx: Tx, parent: Item, line: Line, rel_type: str) -> None:
-    for other in lines_of(tx, parent):
-        if other.child_id == line.child_id and other.state.rel_type == rel_type:
-            raise DuplicateError(f"{line.child_part_number} is in this BOM as {rel_type} already")
 
 
 def _apply(tx: Tx, parent: Item, change: LineRecord, child: str, text: str, why: str | None = None) -> Edited:
@@ -709,9 +705,7 @@ def badge(tx: Tx, actor: Actor) -> int:
 def last_look(tx: Tx, user_id: int, item: Item) -> str | None:
     """Find when this person last looked at the product before now; looks within one hour count as one."""
     row = tx.conn.execute(select(product_looks).where(_look_of([(user_id, item.id)]))).one_or_none()
-    if row is None:
-        return None
-    return str(row.at) if _is_another(row.at, tx.stamp) else row.since
+    return _look_before(row, tx.stamp)
 
 
 def keep_looks(db: Database) -> None:
@@ -725,17 +719,10 @@ def keep_looks(db: Database) -> None:
             (row.user_id, row.item_id): row for row in tx.conn.execute(select(product_looks).where(ours))
         }
         tx.conn.execute(delete(product_looks).where(ours))
-        rows = []
-        for who, at in looks.items():
-            looks_before = before.get(who)
-            since = (
-                None
-                if looks_before is None
-                else looks_before.at
-                if _is_another(looks_before.at, at)
-                else looks_before.since
-            )
-            rows.append({"user_id": who[0], "item_id": who[1], "at": at, "since": since})
+        rows = [
+            {"user_id": user, "item_id": item, "at": at, "since": _look_before(before.get((user, item)), at)}
+            for (user, item), at in looks.items()
+        ]
         insert_rows(tx, product_looks, rows)
     for who, at in looks.items():
         if db.looks.get(who) == at:
@@ -747,5 +734,8 @@ def _look_of(whose: Iterable[tuple[int, int]]) -> ColumnElement[bool]:
     return or_(*((row.user_id == user) & (row.item_id == item) for user, item in whose))
 
 
-def _is_another(last: str, now: str) -> bool:
-    return datetime.fromisoformat(now) - datetime.fromisoformat(last) > SAME_LOOK
+def _look_before(row: Any, now: str) -> str | None:
+    if row is None:
+        return None
+    is_another = datetime.fromisoformat(now) - datetime.fromisoformat(row.at) > SAME_LOOK
+    return str(row.at) if is_another else row.since

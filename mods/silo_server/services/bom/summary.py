@@ -47,7 +47,14 @@ from silo_server.db.tables import (
 from silo_server.db.tables import events as event_log
 from silo_server.services.bom.lines import newer_exists, select_lines, to_line
 from silo_server.services.bom.merge import NEVER, last_syncs
-from silo_server.services.bom.tree import MAX_DEPTH, Graph, conflicts_in, currency_of, positive_number
+from silo_server.services.bom.tree import (
+    MAX_DEPTH,
+    Graph,
+    children_first,
+    conflicts_in,
+    currency_of,
+    positive_number,
+)
 from silo_server.settings import stamp
 from silo_server.values import Item, Line, dumps, names_of
 
@@ -249,8 +256,8 @@ def _make(tx: Tx, wanted: Collection[int], most: int | None = None) -> dict[int,
     own = _own(tx, {*wanted, *lines, *children} - nodes.keys())
     maker = _Maker(lines, nodes, own, _open(tx, lines, own), _bom_changes(tx, lines))
     edges = {part_id: [line.child_id for line in rows if _followed(line)] for part_id, rows in lines.items()}
-    for item_id in _children_first(
-        edges, wanted, {part_id: own_facts.part_number for part_id, own_facts in own.items()}
+    for item_id in children_first(
+        edges, wanted, lambda: {part_id: facts.part_number for part_id, facts in own.items()}
     ):
         maker.node(item_id)
     products = {part_id for part_id in own if part_id in lines or own[part_id].is_assembly}
@@ -364,27 +371,6 @@ def _bom_changes(tx: Tx, parent_ids: Collection[int]) -> dict[int, tuple[str, st
     )
     ordered = query.where(one_of(tx, row.parent_id, parent_ids)).order_by(row.id.desc())
     return {parent_id: (at, who) for parent_id, at, who in tx.conn.execute(ordered)}
-
-
-def _children_first(
-    below: Mapping[int, Sequence[int]], wanted: Iterable[int], names: Mapping[int, str]
-) -> Iterator[int]:
-    """Yield the wanted items and the assemblies below them, children first. Raises CycleError."""
-    done: set[int] = set()
-    for first in wanted:
-        way: dict[int, Iterator[int]] = {} if first in done else {first: iter(below.get(first, ()))}
-        while way:
-            item_id, rest = next(reversed(way.items()))
-            child = next(rest, None)
-            if child is None:
-                del way[item_id]
-                done.add(item_id)
-                yield item_id
-            elif child in way:
-                ring = list(way)
-                raise CycleError([names[part_id] for part_id in [*ring[ring.index(child) :], child]])
-            elif child in below and child not in done:
-                way[child] = iter(below[child])
 
 
 @dataclass(frozen=True, slots=True)
@@ -568,7 +554,7 @@ def _keep_below(
             unmade |= level
         number_of = select(items.c.id, items.c.part_number).where(one_of(tx, items.c.id, below))
         names = dict(tx.conn.execute(number_of).all())
-    order, done = list(_children_first(below, sorted(unmade & {*wanted, *below}), names)), 0
+    order, done = list(children_first(below, sorted(unmade & {*wanted, *below}), lambda: names)), 0
     for part in _parts(order, counts):
         if ended():
             break

@@ -413,26 +413,32 @@ def _uses(tx: Tx, of_level: ColumnElement[bool], depth: int, limit: int, offset:
 
 def order_of(graph: Graph) -> list[int]:
     """Sort the assemblies (internal ids), parents before their children; CycleError if there is a ring."""
-    done: list[int] = []
-    state: dict[int, bool] = {graph.root.id: False}  # False = being walked, True = done
-    stack = [(graph.root.id, iter(graph.components(graph.root.id)))]
-    while stack:
-        item_id, lines = stack[-1]
-        line = next(lines, None)
-        if line is None:
-            stack.pop()
-            state[item_id] = True
-            done.append(item_id)
-            continue
-        child = line.child_id
-        if child not in graph.lines or state.get(child) is True:
-            continue
-        if state.get(child) is False:
-            ring, names = [entry[0] for entry in stack], graph.names()
-            raise CycleError([names[i] for i in [*ring[ring.index(child) :], child]])
-        state[child] = False
-        stack.append((child, iter(graph.components(child))))
-    return done[::-1]
+    below = {item_id: [line.child_id for line in graph.components(item_id)] for item_id in graph.lines}
+    return list(children_first(below, [graph.root.id], graph.names))[::-1]
+
+
+def children_first(
+    below: Mapping[int, Sequence[int]], wanted: Iterable[int], names: Callable[[], Mapping[int, str]]
+) -> Iterator[int]:
+    """Yield the wanted items and the assemblies below them, children first.
+
+    Raises CycleError with the part numbers of the ring, which ``names`` has.
+    """
+    done: set[int] = set()
+    for first in wanted:
+        way: dict[int, Iterator[int]] = {} if first in done else {first: iter(below.get(first, ()))}
+        while way:
+            item_id, rest = next(reversed(way.items()))
+            child = next(rest, None)
+            if child is None:
+                del way[item_id]
+                done.add(item_id)
+                yield item_id
+            elif child in way:
+                ring, numbers = list(way), names()
+                raise CycleError([numbers[part_id] for part_id in [*ring[ring.index(child) :], child]])
+            elif child in below and child not in done:
+                way[child] = iter(below[child])
 
 
 DEFAULT_CURRENCY = "EUR"
