@@ -70,14 +70,6 @@ def test_all_is_what_is_exported() -> None:
     assert done.stdout.split() == ["silo.bom.errors"]
 
 
-@pytest.mark.parametrize(
-    "name", ["BomEntry", "BomDiff", "extract_bom_links", "resolve_part_numbers", "diff_bom"]
-)
-def test_the_specs_names_are_the_public_surface(name: str) -> None:
-    """As the spec calls them."""
-    assert name in silo.bom.__all__
-
-
 @pytest.mark.parametrize("module", MODULES)
 def test_every_module_says_what_it_is(module: str) -> None:
     """The first thing a reader sees."""

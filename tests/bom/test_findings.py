@@ -218,10 +218,6 @@ BLOCKING = {
 }
 
 
-def meet(code: FindingCode) -> Finding:
-    return next(finding for finding in SCENES[code]() if finding.code is code)
-
-
 def test_there_is_a_scene_for_every_code() -> None:
     """A code that nothing can produce is a promise that nobody keeps."""
     assert set(SCENES) == set(FindingCode)
@@ -229,26 +225,18 @@ def test_there_is_a_scene_for_every_code() -> None:
 
 @pytest.mark.parametrize("code", FindingCode)
 def test_every_code_is_met_and_reported_in_plain_words(code: FindingCode) -> None:
-    """One sentence or two, with an end, a place, and none of Python's own words."""
-    finding = meet(code)
+    """One sentence or two, with an end, a place, and none of Python's own words; what is missing blocks."""
+    finding = next(finding for finding in SCENES[code]() if finding.code is code)
+    assert finding.blocks is (code in BLOCKING)
+    assert re.fullmatch(r"[a-z]+(_[a-z]+)*", code.value)
+    assert code.meaning
+    assert code.remedy
     assert finding.where
     assert finding.where[0].doc_path.startswith("/v/")
     assert finding.message.strip() == finding.message != ""
     assert finding.message.endswith((".", "?"))
     assert not re.search(r"\bNone\b|<|object at|\{|\}|Traceback", finding.message)
     assert len(finding.message) < 400
-
-
-@pytest.mark.parametrize("code", FindingCode)
-def test_what_is_missing_blocks_and_nothing_else_does(code: FindingCode) -> None:
-    """A BOM that cannot be trusted is not synced; doubts and remarks do not stop the work."""
-    assert meet(code).blocks is (code in BLOCKING)
-
-
-@pytest.mark.parametrize("code", FindingCode)
-def test_codes_are_names_for_machines(code: FindingCode) -> None:
-    """Stable, lower case, one word to a machine."""
-    assert re.fullmatch(r"[a-z]+(_[a-z]+)*", code.value)
 
 
 @pytest.mark.parametrize("label", ["<b>Bolt</b>", "{users}", "{0}", "%s", "a\nb", "\x1b[31m", "💥"])
@@ -264,11 +252,6 @@ def test_labels_are_text(label: str) -> None:
 def test_severities_are_ordered_words() -> None:
     """What machines read in JSON."""
     assert [severity.value for severity in Severity] == ["info", "warning", "error"]
-
-
-def test_every_code_has_a_meaning_and_a_remedy() -> None:
-    """Reports group by the meaning, and the reference lists both."""
-    assert all(code.meaning and code.remedy for code in FindingCode)
 
 
 @pytest.mark.parametrize(

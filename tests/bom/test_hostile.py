@@ -27,36 +27,6 @@ def bolt_in(path: str, uuid: str = "u") -> Any:
     return Doc(path, meta={"SiloUUID": uuid}).body()
 
 
-def doubling(levels: int, parts_per_level: int) -> Any:
-    """Each level links the next one twice and has parts of its own: 2^levels instances of the last."""
-    below: Any = None
-    for level in range(levels, 0, -1):
-        doc = Doc(f"/v/a{level}.FCStd", meta={"SiloUUID": f"a{level}"})
-        members = [
-            doc.link(f"P{n}", bolt_in(f"/v/p{level}-{n}.FCStd", f"p{level}-{n}"))
-            for n in range(parts_per_level)
-        ]
-        if below is not None:
-            members += [doc.link("Left", below), doc.link("Right", below)]
-        below = doc.assembly(*members)
-    return below
-
-
-def test_forty_levels_of_two_references_each() -> None:
-    """2^39 instances of the innermost assembly: extracted, resolved and flattened, each distinct once."""
-    found = extract(doubling(40, 25))
-    flat = flat_counts(found.entries)
-    assert flat["/v/a40.FCStd", "Assembly"] == 2**39
-    assert flat["/v/p40-0.FCStd", "Body"] == 2**39
-    assert len(flat) == 39 + 40 * 25
-    # Each level counts its two links as one line of two.
-    assert tree_size(found.entries) == 39 + 40 * 25
-    resolved, unresolved = resolve_part_numbers(found.entries, EveryItem())
-    assert unresolved == []
-    assert len(list(walk_entries(resolved))) == len(flat)
-    assert len(consolidation_findings(resolved)) == 39
-
-
 def test_a_lattice_of_assemblies() -> None:
     """Two assemblies per level, each holding both of the next: 2^40 ways down, 80 assemblies."""
     below: tuple[Any, ...] = ()
@@ -65,17 +35,19 @@ def test_a_lattice_of_assemblies() -> None:
         for side in "ab":
             doc = Doc(f"/v/{side}{level}.FCStd", meta={"SiloUUID": f"{side}{level}"})
             members = [doc.link(f"L{n}", target) for n, target in enumerate(below)]
-            pair.append(
-                doc.assembly(*members, doc.link("P", bolt_in(f"/v/p{side}{level}.FCStd", f"p{side}{level}")))
-            )
+            bolt = bolt_in(f"/v/p{side}{level}.FCStd", f"p{side}{level}")
+            pair.append(doc.assembly(*members, doc.link("P", bolt), doc.link("Q", bolt)))
         below = tuple(pair)
     top = Doc("/v/top.FCStd")
     found = extract(top.assembly(*(top.link(f"L{n}", target) for n, target in enumerate(below))))
     flat = flat_counts(found.entries)
     assert flat["/v/a40.FCStd", "Assembly"] == 2**39
     assert tree_size(found.entries) > 2**40
-    resolved, _ = resolve_part_numbers(found.entries, EveryItem())
+    resolved, unresolved = resolve_part_numbers(found.entries, EveryItem())
+    assert unresolved == []
     assert flat_counts(resolved) == flat
+    assert len(list(walk_entries(resolved))) == len(flat) == 160
+    assert len(consolidation_findings(resolved)) == 80
 
 
 def test_skipping_links_put_an_assembly_at_every_depth() -> None:
@@ -92,23 +64,23 @@ def test_skipping_links_put_an_assembly_at_every_depth() -> None:
 
 
 def test_everything_holds_everything() -> None:
-    """Forty assemblies that all contain each other: every path is a ring, and the walk ends."""
-    docs = [Doc(f"/v/{number}.FCStd") for number in range(40)]
+    """Twenty assemblies that all contain each other: every path is a ring, and the walk ends."""
+    docs = [Doc(f"/v/{number}.FCStd") for number in range(20)]
     assemblies = [doc.assembly() for doc in docs]
     for doc, asm in zip(docs, assemblies, strict=True):
         edit(asm, Group=[doc.link(f"L{n}", target) for n, target in enumerate(assemblies)])
     found = extract(assemblies[0])
     assert found.blocked
-    assert len(list(walk_entries(found.entries))) == 39
+    assert len(list(walk_entries(found.entries))) == 19
 
 
-def test_ten_thousand_links_in_one_group() -> None:
+def test_a_thousand_links_in_one_group() -> None:
     """One line per part, each link once."""
     top = Doc("/v/top.FCStd")
     parts = [bolt_in(f"/v/p{n}.FCStd") for n in range(100)]
-    found = extract(top.assembly(*(top.link(f"L{n}", parts[n % 100]) for n in range(10_000))))
+    found = extract(top.assembly(*(top.link(f"L{n}", parts[n % 100]) for n in range(1000))))
     assert len(found.entries) == 100
-    assert {entry.quantity for entry in found.entries} == {100}
+    assert {entry.quantity for entry in found.entries} == {10}
 
 
 def test_huge_arrays_of_arrays_stay_numbers() -> None:

@@ -9,7 +9,7 @@ import pytest
 from fakes import BareDocument, BarePart, Doc, ForwardingLink
 
 from silo.bom import FindingCode, Severity, extract
-from silo.bom.model import BomEntry, identity_findings, identity_of, meta_key, walk_entries
+from silo.bom.model import BomEntry, identity_findings, identity_of, walk_entries
 
 PLACES = ("object SiloItemId", "object SiloUUID", "Meta per object", "document SiloUUID", "Meta")
 
@@ -86,11 +86,6 @@ def test_labels_and_names_are_never_identities() -> None:
     assert (entry.silo_uuid, entry.part_number) == (None, None)
 
 
-def test_the_keys_in_meta() -> None:
-    """One for the document, one per object of it."""
-    assert (meta_key(), meta_key("Body")) == ("SiloUUID", "SiloUUID/Body")
-
-
 # --- one identity twice -----------------------------------------------------------------------------------
 
 
@@ -115,15 +110,6 @@ def test_a_copied_identity_is_found_across_levels_and_in_the_assembly_itself() -
     found = extract(top.assembly(top.link("S", inner)))
     (finding,) = found.findings_of(FindingCode.COPIED_IDENTITY)
     assert [place.doc_path for place in finding.where] == ["/v/deep.FCStd", "/v/top.FCStd"]
-
-
-def test_two_components_of_one_file_share_its_identity() -> None:
-    """A file of two parts with one document identity: told, since they would count as one item."""
-    top, shop = Doc("/v/top.FCStd"), Doc("/v/shop.FCStd", meta={"SiloUUID": "u-1"})
-    asm = top.assembly(top.link("L1", shop.body("Screw")), top.link("L2", shop.body("Nut")))
-    (finding,) = extract(asm).findings
-    assert finding.code is FindingCode.SHARED_IDENTITY
-    assert "Nut, Screw" in finding.message
 
 
 def test_identities_per_object_of_one_file_are_not_shared() -> None:

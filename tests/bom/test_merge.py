@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-
-from silo.bom import BomDiff, apply_merge, plan_merge
-from silo.bom.compare import MergePlan, summary
+from silo.bom import apply_merge, plan_merge
+from silo.bom.compare import summary
 
 NOW = "2026-02-08T22:15:00Z"
 
@@ -50,14 +48,6 @@ def test_removed_on_server_not_in_assembly() -> None:
     assert apply_merge([line("P", 2)], plan, NOW) == [line("P", 2, unreferenced_since=NOW)]
 
 
-def test_removed_and_flagged_before() -> None:
-    """Row 3 again: since when stays what it was."""
-    before = line("P", 2, unreferenced_since="2025-01-01T00:00:00Z")
-    plan = plan_merge([], [before])
-    assert not plan.writes
-    assert apply_merge([before], plan, NOW) == [before]
-
-
 def test_referenced_again() -> None:
     """The flag goes, with or without a change of quantity."""
     before = [line("P", 2, unreferenced_since="2025"), line("Q", 1, unreferenced_since="2025")]
@@ -74,37 +64,6 @@ def test_unchanged() -> None:
     plan = plan_merge([want("P", 2), want("Q", 3)], before)
     assert not plan.writes
     assert apply_merge(before, plan, NOW) == before
-
-
-@pytest.mark.parametrize("entries", [[], [want("P", 1)], [want("P", 7)]])
-def test_manual_lines_are_never_touched(entries: list[dict[str, Any]]) -> None:
-    """Design decision 2: not changed, not flagged, not doubled."""
-    before = line("P", 7, "manual", reason="glue", unreferenced_since=None)
-    assert merged(entries, [before]) == {"P/manual": before}
-
-
-def test_a_conflict_writes_nothing() -> None:
-    """CAD says 1, a person says 7: told, not done."""
-    plan = plan_merge([want("P", 1)], [line("P", 7, "manual")])
-    assert plan.diff.conflicts
-    assert not plan.writes
-
-
-def test_a_flagged_line_that_became_manual_stays_as_it_is() -> None:
-    """ "Keep as intentional" makes a line people's; an old flag on it is their affair."""
-    before = line("P", 7, "manual", unreferenced_since="2025")
-    plan = plan_merge([want("P", 7)], [before])
-    assert (plan.flag, plan.unflag) == ((), ())
-    assert apply_merge([before], plan, NOW) == [before]
-
-
-@pytest.mark.parametrize("rel_type", ["alternate", "reference"])
-def test_other_relations_are_never_touched(rel_type: str) -> None:
-    """Neither flagged nor changed; the component beside it is added."""
-    before = line("P", 1, rel_type=rel_type)
-    after = apply_merge([before], plan_merge([want("P", 4)], [before]), NOW)
-    assert after[0] == before
-    assert after[1]["quantity"] == 4
 
 
 def test_a_line_without_a_quantity_is_not_given_one_in_passing() -> None:
@@ -145,9 +104,3 @@ def test_the_summary_reports_conflicts_where_there_are_any() -> None:
     """Something for a person is never left out."""
     plan = plan_merge([want("P", 1)], [line("P", 7, "manual")])
     assert summary(plan.diff).endswith("0 unreferenced, 1 in conflict")
-
-
-def test_an_empty_plan_writes_nothing() -> None:
-    """Nothing there, nothing to do."""
-    assert plan_merge([], []) == MergePlan(BomDiff())
-    assert not plan_merge([], []).writes

@@ -45,19 +45,6 @@ def test_one_link_in_several_link_groups_is_shown_by_each(top: Doc, bolt: Any) -
     assert counts(assembly) == {"Bolt": 3}
 
 
-def test_the_assemblys_identity_in_other_letters_declares_nothing(top: Doc) -> None:
-    """Add-ons write a UUID in capitals as well."""
-    body = top.body("Base", SiloItemId=ITEM.upper())
-    assert counts(top.assembly(body, SiloItemId=ITEM)) == {}
-
-
-def test_what_a_left_out_compound_holds_is_left_out_with_it(top: Doc) -> None:
-    """Its members lie in the assembly as well, and are not shown."""
-    screw = top.screw("S")
-    bundle = top.add("Part::Compound", "Bundle", Links=[screw], SiloBomExclude=True)
-    assert counts(top.assembly(screw, bundle, top.screw("Other", "30"))) == {"ISO 4762 M4×30": 1}
-
-
 def test_a_declared_body_is_counted_through_its_draft_array(top: Doc) -> None:
     """The original lies in the assembly beside the array that shows it."""
     body = top.body("Foot", SiloItemId=ITEM)

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 from fakes import Doc
-from hypothesis import given
+from hunting import examples
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.bom import BomEntry, Extraction, Finding, FindingCode, Place, Severity, diff_bom, extract
@@ -211,6 +212,7 @@ def everything(entry: BomEntry) -> list[Any]:
     return [own, [everything(child) for child in entry.children]]
 
 
+@settings(max_examples=examples(10))
 @given(EXTRACTIONS)
 def test_the_way_there_and_back_loses_nothing(extraction: Extraction) -> None:
     """Through JSON text as well, and with the fields that do not count in comparisons."""

@@ -10,7 +10,6 @@ from fakes import Doc, edit
 
 from silo.bom import FindingCode, Severity, extract
 from silo.bom.document import LinkProblem, located, split_sub_name
-from silo.bom.findings import Finding
 from silo.bom.targets import resolve_target
 
 
@@ -386,14 +385,6 @@ def test_a_damaged_live_assembly_is_not_read(top: Doc, bolt: Any) -> None:
     assert found.findings_of(FindingCode.UNREADABLE_FILE)
 
 
-def test_a_link_that_was_never_set_does_not_block(top: Doc, bolt: Any) -> None:
-    """Nothing is missing where there never was anything; it is reported anyway."""
-    found = extract(top.assembly(broken(top, "New", FindingCode.UNSET_LINK), top.link("L", bolt)))
-    (finding,) = found.findings
-    assert (finding.code, finding.severity) == (FindingCode.UNSET_LINK, Severity.WARNING)
-    assert "New" in finding.message
-
-
 def test_the_reason_is_reported(top: Doc) -> None:
     """What the reader found out stands in the message."""
     link = broken(top, "L", FindingCode.UNREADABLE_FILE, "b.FCStd", "Box", "it is not a zip file")
@@ -408,17 +399,6 @@ def test_many_users_do_not_make_a_message_endless(top: Doc) -> None:
     assert len(finding.message) < 200
     assert "992 more" in finding.message
     assert len(finding.where) == 1000
-
-
-def test_a_broken_link_does_not_hide_the_others(top: Doc, bolt: Any) -> None:
-    """What can be counted is counted; the finding says the rest."""
-    asm = top.assembly(broken(top, "X", FindingCode.MISSING_FILE, "b.FCStd"), top.link("L", bolt))
-    found = extract(asm)
-    assert [(entry.doc_path, entry.missing) for entry in found.entries] == [
-        ("/v/b.FCStd", True),
-        ("/v/bolt.FCStd", False),
-    ]
-    assert found.blocked
 
 
 @pytest.mark.parametrize(
@@ -436,17 +416,6 @@ def test_a_broken_link_does_not_hide_the_others(top: Doc, bolt: Any) -> None:
 def test_recorded_paths_are_located_as_text(recorded: str, owner: str, path: str) -> None:
     """Relative to the folder of the owning file (facts §3.3); what stands for itself stays."""
     assert located(recorded, owner) == path
-
-
-def test_findings_read_the_same_in_any_order(top: Doc) -> None:
-    """Two assemblies that differ in the order of their Group have equal findings."""
-    links = [broken(top, f"L{n}", FindingCode.MISSING_FILE, "b.FCStd", "Box") for n in range(3)]
-    there, back = top.assembly(*links, name="A"), top.assembly(*reversed(links), name="A")
-
-    def told(found: Any) -> set[Finding]:
-        return set(found.findings)
-
-    assert told(extract(there)) == told(extract(back))
 
 
 def test_a_long_path_through_many_links_is_no_loop(top: Doc, bolt: Any) -> None:

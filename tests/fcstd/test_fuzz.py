@@ -21,7 +21,7 @@ from silo.fcstd import Library, Limits, stamp
 
 LIMITS = Limits(document_xml=1 << 20, packed=1 << 20, side_entry=1 << 16, objects=1000)
 
-relaxed = settings(max_examples=examples(80))
+relaxed = settings(max_examples=examples(40))
 
 
 def top() -> Doc:

@@ -41,12 +41,6 @@ def test_hand_made_link_arrays_of_1_2_count_their_elements(tmp_path: Path, kind:
     assert {finding.code for finding in found.findings} == {FindingCode.NEWER_FREECAD}
 
 
-def test_a_version_that_is_a_date_is_not_newer(tmp_path: Path) -> None:
-    """realthunder's branch counts by dates: 2022.111 is no FreeCAD of the future."""
-    found = read(tmp_path, array("Part::LinkArrayLinear", program="2022.1117R28778 (Git)"))
-    assert found.findings == ()
-
-
 @pytest.mark.parametrize("kind", ["App::Link", "Part::LinkArrayLinear"])
 def test_hand_made_suppressed_elements_of_1_2_do_not_count(tmp_path: Path, kind: str) -> None:
     """FreeCAD leaves them out of its component counts, in plain link arrays too."""

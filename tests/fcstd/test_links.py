@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from fcstd_writer import Doc, XLink, container, part
+from fcstd_writer import Doc, XLink, container, locals_, part
 
 from silo.bom.document import LinkProblem
 from silo.bom.errors import DocumentError
@@ -113,19 +113,13 @@ def test_the_walker_reports_each_missing_file_once(tmp_path: Path) -> None:
     doc = (
         Doc().link("L1", "none.FCStd", "Box").link("L2", "none.FCStd", "Box").link("L3", "part.FCStd", "Box")
     )
-    doc.add("App::Part", "A", Group=_members("L1", "L2", "L3"))
+    doc.add("App::Part", "A", Group=locals_("L1", "L2", "L3"))
     found = extract(open_document(doc.save(tmp_path / "top.FCStd")).getObject("A"))
     assert [(entry.quantity, entry.missing) for entry in found.entries] == [(2, True), (1, False)]
     assert [f.code for f in found.findings] == [FindingCode.MISSING_FILE]
     assert found.blocked
     assert "L1" in found.findings[0].message
     assert "L2" in found.findings[0].message
-
-
-def _members(*names: str) -> object:
-    from fcstd_writer import locals_
-
-    return locals_(*names)
 
 
 @pytest.mark.parametrize("file", ["../lib/part.FCStd", "./../lib//part.FCStd", "../asm/../lib/part.FCStd"])
@@ -335,55 +329,24 @@ def test_a_damaged_file_is_read_once(tmp_path: Path) -> None:
     assert len(looks) == 1
 
 
-@pytest.mark.parametrize(
-    "recorded",
-    [
-        *(
-            "//evil/share/x.FCStd",
-            "\\\\evil\\share\\x.FCStd",
-            "\\/evil/share/x.FCStd",
-            "/\\evil\\share\\x.FCStd",
-        ),
-        *("//./pipe/x", "\\\\.\\pipe\\x", "//?/C:/x.FCStd", "/\\/evil/x.FCStd"),
-    ],
-)
-def test_no_spelling_of_another_host_or_a_device_is_looked_at(recorded: str) -> None:
-    """On Windows the look alone would send the user's credentials; so it is refused on every platform."""
+REFUSED = {
+    FindingCode.OUTSIDE_ROOT: (
+        *("//evil/share/x.FCStd", "\\\\evil\\share\\x.FCStd", "\\/evil/share/x.FCStd"),
+        *("/\\evil\\share\\x.FCStd", "//./pipe/x", "\\\\.\\pipe\\x", "//?/C:/x.FCStd", "/\\/evil/x.FCStd"),
+    ),
+    FindingCode.MISSING_FILE: (
+        *("NUL", "parts/con", "aux.FCStd", "sub/COM1.txt", "prn .FCStd", "nul:", "x.FCStd:stream", "conin$"),
+    ),
+    None: (
+        *("part.FCStd", "../parts/part.FCStd", "C:/vault/part.FCStd", "C:\\vault\\part.FCStd"),
+        *("/vault/part.FCStd", "console.FCStd", "auxiliary/nullpart.FCStd", "COM.FCStd", "com10.FCStd"),
+        *("a:b.FCStd", "", "./x.FCStd"),
+    ),
+}
+
+
+@pytest.mark.parametrize(("code", "recorded"), [(code, path) for code in REFUSED for path in REFUSED[code]])
+def test_paths_that_are_not_looked_at(code: FindingCode | None, recorded: str) -> None:
+    """Other hosts, to which Windows sends the user's credentials with the first look; devices and streams."""
     found = refusal(recorded)
-    assert found is not None
-    assert found.code is FindingCode.OUTSIDE_ROOT
-
-
-@pytest.mark.parametrize(
-    "recorded",
-    ["NUL", "parts/con", "aux.FCStd", "sub/COM1.txt", "prn .FCStd", "nul:", "x.FCStd:stream", "conin$"],
-)
-def test_windows_devices_and_streams_are_no_files(recorded: str) -> None:
-    found = refusal(recorded)
-    assert found is not None
-    assert found.code is FindingCode.MISSING_FILE
-
-
-@pytest.mark.parametrize(
-    "recorded",
-    [
-        *(
-            "part.FCStd",
-            "../parts/part.FCStd",
-            "C:/vault/part.FCStd",
-            "C:\\vault\\part.FCStd",
-            "/vault/part.FCStd",
-        ),
-        *(
-            "console.FCStd",
-            "auxiliary/nullpart.FCStd",
-            "COM.FCStd",
-            "com10.FCStd",
-            "a:b.FCStd",
-            "",
-            "./x.FCStd",
-        ),
-    ],
-)
-def test_usual_names_are_looked_for(recorded: str) -> None:
-    assert refusal(recorded) is None
+    assert (found.code if found else None) is code

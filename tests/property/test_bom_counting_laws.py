@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from silo.bom import extract
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
-from silo.bom.model import BomEntry
+from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import flat_counts
 from silo.bom.standard import STANDARD_PARTS
 
@@ -245,29 +245,36 @@ def key_of(plan: Plan, name: str) -> Key:
 # --- laws -------------------------------------------------------------------------------------------------
 
 
-@given(plans())
-def test_quantities_multiplied_down_the_tree_are_the_naive_count(plan: Plan) -> None:
-    """Arrays, chains, live links, Draft arrays, inline containers, repeated groups, what is left out."""
-    wanted = Counter(key_of(plan, name) for name in instances(plan, plan.top))
-    assert flat_counts(extract(build(plan)).entries) == wanted
+@given(plans(), st.randoms(use_true_random=False))
+def test_the_walk_is_the_naive_count_in_any_order(plan: Plan, random: Any) -> None:
+    """Per one parent at each level, multiplied down the tree, and the same again after a walk.
 
-
-@given(plans())
-def test_each_level_is_the_naive_count_of_its_assembly(plan: Plan) -> None:
-    """Quantities are per one parent at every depth, and levels count up."""
+    Plans have arrays, chains, live links, Draft arrays, inline containers, repeated groups, what is left out.
+    """
 
     def check(entries: tuple[BomEntry, ...], name: str, level: int) -> None:
         wanted = Counter(key_of(plan, target) for target in direct(plan.assemblies[name]))
         assert {entry.key: entry.quantity for entry in entries} == wanted
         for entry in entries:
             assert entry.level == level
-            if entry.standard:
-                continue
             below = entry.doc_path.removeprefix("/v/").removesuffix(".FCStd")
-            if below in plan.assemblies:
+            if not entry.standard and below in plan.assemblies:
                 check(entry.children, below, level + 1)
 
-    check(extract(build(plan)).entries, plan.top, 1)
+    asm = build(plan)
+    found = extract(asm)
+    check(found.entries, plan.top, 1)
+    assert flat_counts(found.entries) == Counter(key_of(plan, name) for name in instances(plan, plan.top))
+    assert extract(asm) == found
+    is_order_free(asm, found, random)
+
+
+def is_order_free(asm: Any, before: Extraction, random: Any) -> None:
+    """Any order of any Group gives the same lines and the same findings."""
+    shuffled(asm, random, set())
+    after = extract(asm)
+    assert normal(after.entries) == normal(before.entries)
+    assert set(after.findings) == set(before.findings)
 
 
 def shuffled(obj: Any, random: Any, seen: set[int]) -> None:
@@ -304,17 +311,6 @@ def normal(entries: tuple[BomEntry, ...]) -> Any:
     )
 
 
-@given(plans(), st.randoms(use_true_random=False))
-def test_counting_is_order_free(plan: Plan, random: Any) -> None:
-    """Any order of any Group gives the same lines and the same findings."""
-    asm = build(plan)
-    before = extract(asm)
-    shuffled(asm, random, set())
-    after = extract(asm)
-    assert normal(after.entries) == normal(before.entries)
-    assert set(after.findings) == set(before.findings)
-
-
 @st.composite
 def tangles(draw: st.DrawFn) -> Any:
     """Assemblies that link each other in any way, rings included, with broken and odd links among them."""
@@ -342,18 +338,8 @@ def tangles(draw: st.DrawFn) -> Any:
 
 @settings(max_examples=examples(60))
 @given(tangles(), st.randoms(use_true_random=False))
-def test_also_tangles_are_order_free_and_end(asm: Any, random: Any) -> None:
-    """Rings are cut at the same place, and reported in the same words, whatever the order."""
-    before = extract(asm)
-    shuffled(asm, random, set())
-    after = extract(asm)
-    assert normal(after.entries) == normal(before.entries)
-    assert set(after.findings) == set(before.findings)
-
-
-@given(tangles())
-def test_no_tree_contains_itself(asm: Any) -> None:
-    """However assemblies refer to each other, no component stands below itself."""
+def test_a_tangle_is_cut_at_the_same_place_in_any_order(asm: Any, random: Any) -> None:
+    """However assemblies refer to each other, no component stands below itself, and the walk ends."""
 
     def check(entries: tuple[BomEntry, ...], above: tuple[Key, ...]) -> None:
         for entry in entries:
@@ -362,13 +348,7 @@ def test_no_tree_contains_itself(asm: Any) -> None:
 
     found = extract(asm)
     check(found.entries, (found.assembly.key,))
-
-
-@given(plans())
-def test_walking_twice_says_the_same(plan: Plan) -> None:
-    """The walker keeps nothing and changes nothing."""
-    asm = build(plan)
-    assert extract(asm) == extract(asm)
+    is_order_free(asm, found, random)
 
 
 @given(plans(), st.integers(0, 3), st.integers(1, 5))
