@@ -22,7 +22,6 @@ PAGES = [
     *sorted((ROOT / "docs").rglob("*.md")),
     *sorted((ROOT / "examples").rglob("*.md")),
 ]
-IDS = [str(page.relative_to(ROOT)) for page in PAGES]
 # Other programs have options too; what stands behind these words is theirs.
 _OTHERS = re.compile(
     r"^\s*(?:\$ )?(?:sudo )?(docker|podman|pip|python3?|curl|git|psql|make|freecadcmd|apt)\b"
@@ -38,6 +37,7 @@ INSIDE |= {f"FREECAD_{name}" for name in ("PACKAGES", "USER_HOME", "USER_TEMP")}
 MADE = ("mods/silo/workbench/resources/translations/silo_de.ts",)
 
 
+@cache
 def commands() -> dict[str, argparse.ArgumentParser]:
     """The sub-commands of ``silo-mod``."""
     actions = build_parser()._subparsers._group_actions  # type: ignore[union-attr]
@@ -53,48 +53,48 @@ def told_lines(text: str) -> list[tuple[str, str]]:
     return [(match[1], match[2]) for match in found if match]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
-def test_every_command_and_option_exists(page: Path) -> None:
+def test_every_command_and_option_exists() -> None:
     """A line that is copied from a page is understood."""
-    known = commands()
-    for command, words in told_lines(page.read_text("utf-8")):
-        assert command in known, f"{page.name}: silo-mod {command}"
-        options = known[command]._option_string_actions
-        for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", words):
-            assert option in options, f"{page.name}: silo-mod {command} {option}"
+    for page in PAGES:
+        known = commands()
+        for command, words in told_lines(page.read_text("utf-8")):
+            assert command in known, f"{page.name}: silo-mod {command}"
+            options = known[command]._option_string_actions
+            for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", words):
+                assert option in options, f"{page.name}: silo-mod {command} {option}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
-def test_every_link_leads_somewhere(page: Path) -> None:
+def test_every_link_leads_somewhere() -> None:
     """Relative links and pictures point at files of the repository."""
-    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text("utf-8")):
-        if not re.match(r"[a-z]+:", target):
-            assert (page.parent / target).exists(), f"{page.name}: {target}"
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text("utf-8")):
+            if not re.match(r"[a-z]+:", target):
+                assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
-def test_every_module_and_target_exists(page: Path) -> None:
+def test_every_module_and_target_exists() -> None:
     """``silo.x.y`` and ``make x`` are there."""
-    text = page.read_text("utf-8")
-    for name in re.findall(r"`(silo(?:_server)?(?:\.[a-z_]+)+)`", text):
-        # The last word may be a name in a module.
-        homes = [name.replace(".", "/"), name.rpartition(".")[0].replace(".", "/")]
-        found = [(ROOT / "mods" / f"{home}{end}").exists() for home in homes for end in ("", ".py")]
-        assert any(found), f"{page.name}: {name}"
-    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
-    for target in re.findall(r"(?:^|`)make ([a-z-]+)", text, re.MULTILINE):
-        assert target in targets, f"{page.name}: make {target}"
+    for page in PAGES:
+        text = page.read_text("utf-8")
+        for name in re.findall(r"`(silo(?:_server)?(?:\.[a-z_]+)+)`", text):
+            # The last word may be a name in a module.
+            homes = [name.replace(".", "/"), name.rpartition(".")[0].replace(".", "/")]
+            found = [(ROOT / "mods" / f"{home}{end}").exists() for home in homes for end in ("", ".py")]
+            assert any(found), f"{page.name}: {name}"
+        targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
+        for target in re.findall(r"(?:^|`)make ([a-z-]+)", text, re.MULTILINE):
+            assert target in targets, f"{page.name}: make {target}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
-def test_every_path_exists(page: Path) -> None:
+def test_every_path_exists() -> None:
     """A program (`api/policy.py`), or a path below a folder of the project (`tests/data/control`)."""
-    folders = {part.name for part in ROOT.iterdir() if part.is_dir()}
-    for name in re.findall(r"`([\w.-]+(?:/[\w.-]+)*/?)`", page.read_text("utf-8")):
-        program = name.endswith((".py", ".sh")) and name not in THEIRS
-        if program or (name.partition("/")[0] in folders and name not in MADE):
-            found = f"/{name.rstrip('/')}\n" in all_paths() or (ROOT / name).exists()
-            assert found, f"{page.name}: {name}"
+    for page in PAGES:
+        folders = {part.name for part in ROOT.iterdir() if part.is_dir()}
+        for name in re.findall(r"`([\w.-]+(?:/[\w.-]+)*/?)`", page.read_text("utf-8")):
+            program = name.endswith((".py", ".sh")) and name not in THEIRS
+            if program or (name.partition("/")[0] in folders and name not in MADE):
+                found = f"/{name.rstrip('/')}\n" in all_paths() or (ROOT / name).exists()
+                assert found, f"{page.name}: {name}"
 
 
 @cache
@@ -160,18 +160,18 @@ def test_the_exit_codes_are_the_same_everywhere() -> None:
 LANGUAGES = {"before", "browser", "sh", "text", "python", "json", "toml", "yaml", "csv", "sql"}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=IDS)
-def test_every_block_says_what_it_is(page: Path) -> None:
+def test_every_block_says_what_it_is() -> None:
     """No command line hides in a block that is taken for a picture. A reason names tests that there are."""
-    for step in page_commands.steps(page.read_text("utf-8")):
-        assert step.kind in LANGUAGES, f"{page.name}: a block of {step.kind or 'nothing'}: {step.text}"
-        for path in re.findall(r"[\w./]+/[\w./]+", step.reason):
-            assert (ROOT / path).exists(), f"{page.name}: {path}"
+    for page in PAGES:
+        for step in page_commands.steps(page.read_text("utf-8")):
+            assert step.kind in LANGUAGES, f"{page.name}: a block of {step.kind or 'nothing'}: {step.text}"
+            for path in re.findall(r"[\w./]+/[\w./]+", step.reason):
+                assert (ROOT / path).exists(), f"{page.name}: {path}"
 
 
 FOLLOWED = [
-    pytest.param(page, id=name)
-    for page, name in zip(PAGES, IDS, strict=True)
+    pytest.param(page, id=str(page.relative_to(ROOT)))
+    for page in PAGES
     for kinds in [{step.kind for step in page_commands.steps(page.read_text("utf-8")) if not step.reason}]
     if "sh" in kinds and "browser" not in kinds  # tests/browser/test_first_hour.py follows the others
 ]
