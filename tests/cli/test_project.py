@@ -91,19 +91,13 @@ def test_a_project_comes_back_as_it_was(registered: Path, silo: Any, run: Any, t
     assert set(states(run("status", back, "--json")).values()) == {"same"}
     again = run("commit", top)
     assert (again.code, "Nothing to send" in again.out or "BOM unchanged" in again.out) == (0, True)
-
-
-def test_an_item_of_a_file_of_several_is_pulled_with_that_file(
-    registered: Path, silo: Any, run: Any, tmp_path: Path
-) -> None:
-    """Its own routes and its document say where it is."""
-    assert run("commit", registered).code == 0
+    # An item of a file of several items is pulled with that file.
     item = next(one for one in silo.client.search_items("Left"))
     (document,) = silo.client.documents_of(item.part_number)
     assert (document.part_number, document.file_path) == ("", "parts/Both.FCStd")
     assert {held.object for held in document.holds} == {"Left", "Right"}
-    assert run("pull", item.part_number, "--into", tmp_path / "back").code == 0
-    assert set(contents(tmp_path / "back")) == {"parts/Both.FCStd"}
+    assert run("pull", item.part_number, "--into", tmp_path / "alone").code == 0
+    assert set(contents(tmp_path / "alone")) == {"parts/Both.FCStd"}
 
 
 def test_a_released_revision_comes_back_as_it_was_frozen(
