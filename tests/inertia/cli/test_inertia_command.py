@@ -394,10 +394,13 @@ def test_names_survive_a_pipe_of_another_code_page(arm: Path, output: str) -> No
         assert ET.fromstring(ran.stdout)[0].get("name") == "größe_Ω"  # noqa: S314 (our own text)
 
 
-def test_a_snippet_comes_with_the_reports(run: Run, arm: Path) -> None:
-    """Files that were asked for are written, whatever goes to standard output."""
-    ran = run("inertia", arm / "arm.step", "--snippet", "mjcf", "--report", arm / "r.json")
+def test_a_snippet_comes_with_the_reports(weigh: Run, arm: Path) -> None:
+    """Files that were asked for are written, whatever goes to standard output; warnings go to the other."""
+    ran = weigh("--snippet", "mjcf", "--report", arm / "r.json")
     assert ran.out.startswith("<mujoco")
+    assert ran.out.count("fullinertia") == 4
+    assert "forearm: frame of the numbers: assembly frame" in ran.err
+    assert "No mass or material assigned: counted as 0 kg  [no_mass_no_material]" in ran.err
     assert json.loads((arm / "r.json").read_text("utf-8"))["format"] == "silo-inertia/1"
 
 
