@@ -128,7 +128,7 @@ def test_pauses_are_bounded_and_never_shorter_than_asked(
     attempt: int, chance: float, told: float | None
 ) -> None:
     """Half of the full pause at least, the longest one at most, unless the server asks for more."""
-    pause = Backoff(1.0, 2.0, 60.0).pause(attempt, chance, told)
+    pause = Backoff(1.0, 60.0).pause(attempt, chance, told)
     assert pause >= (told or 0.0)
     assert 0.5 <= pause <= max(60.0, told or 0.0)
     if told is None:  # many clients do not come back in one moment

@@ -623,7 +623,7 @@ def test_a_command_that_waits_says_for_how_long_and_what_to_do(
     with real_silo() as silo:
         silo.faults = {0: fault, 1: fault}
         stop, args = Stop(), argparse.Namespace(server=silo.url, token=TOKEN)
-        with client_of(args, busy_tries=5, longest=120.0, stop=stop) as client:
+        with client_of(args, Retries(busy_tries=5, longest=120.0), stop=stop) as client:
             assert client.search_items() == []
     lines = capsys.readouterr().err.splitlines()
     assert (stop.waited, len(lines)) == ([seconds, seconds], 2)

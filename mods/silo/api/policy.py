@@ -597,10 +597,9 @@ def may_repeat(error: SiloError, *, harmless: bool) -> bool:
 
 @dataclass(frozen=True)
 class Backoff:
-    """Growing pauses, in seconds."""
+    """Growing pauses, in seconds: each is twice as long as the last."""
 
     first: float = 1.0
-    factor: float = 2.0
     longest: float = 60.0
 
     def pause(self, attempt: int, chance: float, wanted_s: float | None = None) -> float:
@@ -609,8 +608,12 @@ class Backoff:
         ``chance`` in [0, 1) takes off up to half, so that many clients do not return in one moment.
         ``wanted_s`` is the server's own wish: the pause is never shorter.
         """
-        full = min(self.longest, self.first * self.factor ** min(attempt - 1, 60))
+        full = min(self.longest, self.first * 2.0 ** min(attempt - 1, 60))
         return max(full * (1.0 - chance / 2.0), wanted_s or 0.0)
+
+
+# Of the queue of commits.
+QUEUE_PAUSES = Backoff(first=5.0, longest=900.0)
 
 
 def pause_after(
@@ -658,4 +661,8 @@ class Retries:
             return None
         if value is not None:
             return float(value) if value <= self.longest else None
-        return Backoff(self.first, 2.0, self.longest).pause(attempt, self.chance())
+        return Backoff(self.first, self.longest).pause(attempt, self.chance())
+
+
+# A job at night waits for a server that is busy.
+NIGHT = Retries(busy_tries=12, longest=120.0)

@@ -36,6 +36,7 @@ from silo.platform import processors
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
+    from silo.api.policy import Retries
     from silo.api.wire import Item
     from silo.outbox.entry import Entry
     from silo.vault.plan import Plan
@@ -251,16 +252,12 @@ def reading_of(args: argparse.Namespace) -> Iterator[VaultReader]:
 
 @contextmanager
 def client_of(
-    args: argparse.Namespace,
-    *,
-    busy_tries: int | None = None,
-    longest: float = 10.0,
-    stop: threading.Event | None = None,
+    args: argparse.Namespace, retries: Retries | None = None, *, stop: threading.Event | None = None
 ) -> Iterator[SiloClient]:
     """Yield a client for the server that the options, the environment or the configuration name.
 
-    busy_tries, longest
-        for jobs that may wait: how often a busy server is asked, and the longest pause (seconds).
+    retries
+        how often and how soon a request is repeated, for a job that may wait.
     stop
         once it is set, nobody waits for the server any more.
     """
@@ -281,7 +278,7 @@ def client_of(
             print(f"silo-mod: {error}. {again}", file=sys.stderr, flush=True)
 
     where = resolve_server(getattr(args, "server", None), getattr(args, "token", None))
-    retries = Retries(busy_tries=busy_tries, longest=longest, sleep=rest, tell=tell)
+    retries = replace(retries or Retries(), sleep=rest, tell=tell)
     memory = abilities_path()
     with SiloClient(where.url, where.token, verify=where.verify, memory=memory, retries=retries) as client:
         yield client

@@ -36,10 +36,6 @@ if TYPE_CHECKING:
     from silo.vault.pull import Pulled
 
 
-# A job at night waits for a server that is busy.
-_BUSY_TRIES, _LONGEST_S = 12, 120.0
-
-
 def add_sync(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser.add_argument(
@@ -49,6 +45,7 @@ def add_sync(parser: argparse.ArgumentParser) -> None:
 
 def run_sync(args: argparse.Namespace) -> int:
     """Sync each file; one failure does not stop the rest. Returns 1 or 3 if anything was left undone."""
+    from silo.api.policy import NIGHT
     from silo.batch import ReportFile, RunSummary
     from silo.vault.plan import only_job
 
@@ -70,9 +67,7 @@ def run_sync(args: argparse.Namespace) -> int:
     with ExitStack() as stack:
         for folder in {os.path.realpath(folder): folder for folder in folders}.values():
             summary.notes += filter(None, [stack.enter_context(only_job(folder))])
-        client = stack.enter_context(
-            common.client_of(args, busy_tries=_BUSY_TRIES, longest=_LONGEST_S, stop=stop)
-        )
+        client = stack.enter_context(common.client_of(args, NIGHT, stop=stop))
         reports = [ReportFile(path) for path in args.report]
         shown = _Shown(args, many=len(tops) > 1)
         ended = None

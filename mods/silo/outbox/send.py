@@ -36,7 +36,7 @@ from silo.api.files import (
     other_name,
     standing,
 )
-from silo.api.policy import Backoff, ErrorScope, Then, is_certain, judge, pause_after
+from silo.api.policy import QUEUE_PAUSES, Backoff, ErrorScope, Then, is_certain, judge, pause_after
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
     HeldItem,
@@ -136,9 +136,6 @@ def went_alone(entry: Entry) -> list[str]:
     return [f"Its {there} is in Silo; only the {left} is not"]
 
 
-PAUSES = Backoff(first=5.0, longest=900.0)
-
-
 def send_all(
     store: Store,
     client: SiloClient,
@@ -147,7 +144,7 @@ def send_all(
     on_progress: Callable[[Entry, int, int], object] | None = None,
     on_sent: Callable[[Sent], object] | None = None,
     force: bool = False,
-    backoff: Backoff = PAUSES,
+    backoff: Backoff = QUEUE_PAUSES,
     chance: Callable[[], float] = random.random,
 ) -> Report:
     """Send what waits for this client's server, oldest first, in order per item; nothing in a pause.
