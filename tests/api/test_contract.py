@@ -11,7 +11,6 @@ from pathlib import Path
 from uuid import uuid4
 
 import pytest
-from hunting import LONG
 
 from silo.api.client import SiloClient
 from silo.api.files import DocumentId, Origin
@@ -62,11 +61,7 @@ def postgres_client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SiloCl
         yield client
 
 
-# What the server says over PostgreSQL, the suites of the server ask in each run.
-KINDS = ["fake", "server", *([pytest.param("postgres", marks=pytest.mark.postgres)] if LONG else [])]
-
-
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=["fake", "server", pytest.param("postgres", marks=pytest.mark.postgres)])
 def silo(request: pytest.FixtureRequest) -> Silo:
     if request.param == "fake":
         return FakeSilo()
