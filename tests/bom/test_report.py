@@ -126,6 +126,13 @@ def test_a_tree_that_nobody_could_read_is_refused() -> None:
     assert flat_counts(found.entries)["/proj/b40.FCStd", "Body"] == 2**39
 
 
+def test_a_component_below_its_equal_counts_with_it() -> None:
+    """Where a ring of files is cut, the same component lies below itself."""
+    ring = entry("a", 2, entry("b", 3, entry("a", 5)))
+    counts = flat_counts([ring])
+    assert (counts["/proj/a.FCStd", "Body"], counts["/proj/b.FCStd", "Body"]) == (2 + 2 * 3 * 5, 2 * 3)
+
+
 def test_a_diff_as_json() -> None:
     """All six lists, as plain dicts."""
     told: dict[str, Any] = diff_json(diff_bom([{"child_part_number": "P", "quantity": 2}], []))

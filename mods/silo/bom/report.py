@@ -157,7 +157,8 @@ def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
         for entry in group:
             # Nested assemblies share their values; each distinct one is counted once.
             if id(entry) not in below:
-                below[id(entry)] = {entry.key: 1, **total(entry.children)}
+                counted = below[id(entry)] = {entry.key: 0, **total(entry.children)}
+                counted[entry.key] += 1
             for key, count in below[id(entry)].items():
                 counts[key] = counts.get(key, 0) + count * entry.quantity
         return counts
