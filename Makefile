@@ -21,11 +21,12 @@ BIN := $(VENV)/bin
 DEV := $(VENV)/.installed-dev
 SERVER := $(VENV)/.installed-server
 
-.PHONY: help demo test test-machine test-windows-files test-other-disk check translations release setup docs clean
+.PHONY: help demo test test-postgres test-machine test-windows-files test-other-disk check translations release setup docs clean
 
 help:
 	@echo "make demo   set up and sync a real assembly with the embedded server (DEMO=--keep leaves it running)"
 	@echo "make test   set up and run the tests"
+	@echo "make test-postgres  the contract of the server over PostgreSQL, whole"
 	@echo "make test-machine  the tests that need FreeCAD or Chromium on the machine"
 	@echo "make test-windows-files  the tests with the file semantics of Windows, simulated"
 	@echo "make test-other-disk  the tests on a disk that does not distinguish upper and lower case (Linux, FUSE)"
@@ -56,6 +57,10 @@ demo: $(SERVER)
 
 test: setup
 	$(IN_MEMORY) $(BIN)/python -m pytest $(SPREAD) --dist worksteal -m "not freecad and not browser" --ignore=tests/browser
+
+# `make test` runs each test over one database, and over both if they might differ; here is the rest.
+test-postgres: setup
+	$(IN_MEMORY) SILO_POSTGRES=1 $(BIN)/python -m pytest $(SPREAD) --dist worksteal -k postgres tests/contract
 
 # Where files are replaced, removed and locked: all but a few of the places that do so are reached from one of these.
 # PostgreSQL's test library is POSIX only.

@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 LONG = bool(os.environ.get("SILO_LONG"))
+# All suites that run over a database run over both.
+_ALL = LONG or bool(os.environ.get("SILO_POSTGRES"))
 
 
 def examples(usual: int) -> int:
@@ -15,16 +17,16 @@ def examples(usual: int) -> int:
 
 
 def kinds(*usual: str) -> list[Any]:
-    """Return these databases (``sqlite``, ``postgres``), and both with ``SILO_LONG``."""
+    """Return these databases (``sqlite``, ``postgres``), and both with ``SILO_LONG`` or ``SILO_POSTGRES``."""
     return [
         pytest.param(kind, marks=[pytest.mark.postgres] if kind == "postgres" else [])
         for kind in ("sqlite", "postgres")
-        if LONG or kind in usual
+        if _ALL or kind in usual
     ]
 
 
 def over(*usual: str) -> pytest.MarkDecorator:
-    """Run over these databases, and over both with ``SILO_LONG``."""
+    """Run over these databases, and over both with ``SILO_LONG`` or ``SILO_POSTGRES``."""
     return pytest.mark.parametrize("kind", kinds(*usual), indirect=True, scope="session")
 
 
