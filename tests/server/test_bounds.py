@@ -60,14 +60,12 @@ def used_everywhere(db: Database) -> str:
         found = tx.conn.execute(items.select().where(items.c.part_number.like("p-%"))).all()
         state = state_columns(LineState(1.0, "assembly"))
         pairs = [(p.id, bolt.id) for p in found] + [(top.id, p.id) for p in found]
-        insert_rows(
-            tx,
-            bom_lines,
-            [
-                {"id": str(uuid.uuid4()), "parent_id": parent, "child_id": child, "position": n, **state}
-                for n, (parent, child) in enumerate(pairs)
-            ],
-        )
+        rows = [
+            {"id": str(uuid.uuid4()), "parent_id": parent, "child_id": child, "position": n, **state}
+            for n, (parent, child) in enumerate(pairs)
+        ]
+        for begin in range(0, len(rows), 20_000):  # a statement must end in time on a busy machine
+            insert_rows(tx, bom_lines, rows[begin : begin + 20_000])
     if not db.settings.is_sqlite:
         # What PostgreSQL does by itself after a while: until then it takes the tables for empty.
         with db.engine.connect() as connection, connection.begin():

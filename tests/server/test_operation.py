@@ -149,7 +149,7 @@ def test_a_stream_ends_if_its_credential_went_before_it_began(tmp_path: Path) ->
 
 def test_half_an_upload_does_not_hold_a_server_that_stops(tmp_path: Path) -> None:
     """It is told so, and the server ends in good order."""
-    with ServerProcess.forked(sqlite_database(tmp_path / "x.db"), tmp_path, TOKEN) as server:
+    with ServerProcess(sqlite_database(tmp_path / "x.db"), tmp_path, TOKEN) as server:
         with Api(server.base_url, TOKEN) as api:
             number = api.item()
         parts = urlsplit(server.base_url)

@@ -355,7 +355,7 @@ def login_path(call: Call, username: str) -> str:
     with call.write(even_when_read_only=True) as tx:
         secret = access.create_login_link(tx, username)
         access.note(tx, "login_link.created", username)
-    return f"/login/link/{secret}"
+        return f"/login/link/{secret}"
 
 
 @auth_router.get("/admin/audit", responses=READ_ERRORS)
