@@ -411,7 +411,9 @@ def _other_texts(tree: ast.Module, path: Path) -> Iterator[ast.AST]:
                 func=ast.Name("translate" | "QT_TRANSLATE_NOOP") | ast.Attribute(attr="translate")
             ) if "workbench" in path.parts:
                 yield node
-            case ast.Call(func=ast.Name("_" | "N_" | "plural" | "_gauge" | "Counter" | "Histogram")):
+            case ast.Call(
+                func=ast.Name("_" | "N_" | "plural" | "GaugeMetricFamily" | "Counter" | "Histogram")
+            ):
                 yield node
             case ast.Call(func=ast.Attribute(value=ast.Name("logger")) | ast.Attribute(attr="_gauge")):
                 yield node

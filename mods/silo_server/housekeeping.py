@@ -433,25 +433,27 @@ class Metrics:
         with db.read() as tx:
             mode, run = mode_of(tx), last_run(tx)
             horizon, head = events.bounds(tx)
-        gauges: list[tuple[str, str, float]] = [
-            ("silo_read_only", "1 while the server takes no changes", mode != "normal"),
-            ("silo_events_kept", "Events in the log", head - horizon),
-            ("silo_event_newest_id", "Id of the newest event", head),
-            ("silo_files_free_bytes", "Free space on the disk of the uploads", files.free()),
+        gauges: list[Metric] = [
+            GaugeMetricFamily("silo_read_only", "1 while the server takes no changes", mode != "normal"),
+            GaugeMetricFamily("silo_events_kept", "Events in the log", head - horizon),
+            GaugeMetricFamily("silo_event_newest_id", "Id of the newest event", head),
+            GaugeMetricFamily("silo_files_free_bytes", "Free space on the disk of the uploads", files.free()),
         ]
         path = db.settings.sqlite_path
         if path is not None:
             wal = path.with_name(path.name + "-wal")
             size = wal.stat().st_size if wal.exists() else 0
             gauges += [
-                ("silo_database_bytes", "Size of the SQLite database", path.stat().st_size),
-                ("silo_database_wal_bytes", "Size of the SQLite write-ahead log", size),
+                GaugeMetricFamily("silo_database_bytes", "Size of the SQLite database", path.stat().st_size),
+                GaugeMetricFamily("silo_database_wal_bytes", "Size of the SQLite write-ahead log", size),
             ]
         if run is not None:
             age = db.clock().timestamp() - datetime.fromisoformat(run.at).timestamp()
             gauges += [
-                ("silo_housekeeping_age_seconds", "Since the last run", max(0.0, age)),
-                ("silo_housekeeping_failed", "1 where it could not do all", run.problem is not None),
+                GaugeMetricFamily("silo_housekeeping_age_seconds", "Since the last run", max(0.0, age)),
+                GaugeMetricFamily(
+                    "silo_housekeeping_failed", "1 where it could not do all", run.problem is not None
+                ),
             ]
         now.register(_Gauges(gauges))
         counted = self._registry
@@ -498,10 +500,10 @@ def standing(db: Database, hub: Hub, files: FileStore, large_reads: Turnstile) -
 
 
 class _Gauges:
-    """Numbers of this moment: (name, text, value) each."""
+    """Numbers of this moment."""
 
-    def __init__(self, gauges: Sequence[tuple[str, str, float]]) -> None:
+    def __init__(self, gauges: Sequence[Metric]) -> None:
         self._gauges = gauges
 
-    def collect(self) -> list[Metric]:
-        return [GaugeMetricFamily(name, text, value) for name, text, value in self._gauges]
+    def collect(self) -> Sequence[Metric]:
+        return self._gauges
