@@ -10,6 +10,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
+from hunting import kinds
 from server_testing import Databases
 from sqlalchemy import func, select
 
@@ -58,8 +59,8 @@ class Door:
         self.now += timedelta(seconds=seconds)
 
 
-# Guesses that come at once are counted by locks, which are finer in PostgreSQL.
-@pytest.fixture(params=[pytest.param("postgres", marks=pytest.mark.postgres)])
+# Guesses that come at once are counted by locks, which differ.
+@pytest.fixture(params=kinds("sqlite", "postgres"))
 def door(request: pytest.FixtureRequest, databases: Databases, tmp_path: Path) -> Iterator[Door]:
     made = Door(databases.new(request.param), tmp_path)
     yield made
