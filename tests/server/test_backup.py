@@ -81,6 +81,8 @@ def tables(url: str, files: Path) -> dict[str, list[tuple[Any, ...]]]:
     return found
 
 
+@pytest.mark.postgres
+@pytest.mark.parametrize("kind", ["sqlite", "postgres"], ids="{0} and postgres".format, indirect=True)
 def test_what_was_saved_comes_back_on_the_other_database(
     kind: str, url: str, databases: Databases, tmp_path: Path
 ) -> None:
