@@ -56,7 +56,9 @@ def used_everywhere(db: Database) -> str:
         }
         numbers = [f"p-{n:06}" for n in range(PARENTS)]
         made = [{**row, "uuid": str(uuid.uuid4()), "part_number": n, "part_number_key": n} for n in numbers]
-        insert_rows(tx, items, made)
+        # A statement must end in time on a busy machine.
+        for begin in range(0, PARENTS, 5_000):
+            insert_rows(tx, items, made[begin : begin + 5_000])
         found = tx.conn.execute(items.select().where(items.c.part_number.like("p-%"))).all()
         state = state_columns(LineState(1.0, "assembly"))
         pairs = [(p.id, bolt.id) for p in found] + [(top.id, p.id) for p in found]
@@ -64,8 +66,8 @@ def used_everywhere(db: Database) -> str:
             {"id": str(uuid.uuid4()), "parent_id": parent, "child_id": child, "position": n, **state}
             for n, (parent, child) in enumerate(pairs)
         ]
-        for begin in range(0, len(rows), 20_000):  # a statement must end in time on a busy machine
-            insert_rows(tx, bom_lines, rows[begin : begin + 20_000])
+        for begin in range(0, len(rows), 5_000):
+            insert_rows(tx, bom_lines, rows[begin : begin + 5_000])
     if not db.settings.is_sqlite:
         # What PostgreSQL does by itself after a while: until then it takes the tables for empty.
         with db.engine.connect() as connection, connection.begin():
