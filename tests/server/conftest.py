@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hunting import kinds
 from server_testing import Api, Databases, sqlite_database
 from web_visitor import Visitor, visitors_of
 
@@ -25,7 +26,7 @@ def databases(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Databases]:
     made.close()
 
 
-@pytest.fixture(scope="session", params=["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)])
+@pytest.fixture(scope="session", params=kinds("sqlite", "postgres"))
 def kind(request: pytest.FixtureRequest) -> str:
     """Which database a test is over: each, or that of :func:`hunting.over` where they cannot differ."""
     return str(request.param)

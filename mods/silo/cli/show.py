@@ -286,7 +286,9 @@ def proposal_json(
     if result is not None and result.error is None:
         row |= {"part_number": result.part_number, "silo_uuid": result.item_id, "found": result.found}
     if result is not None and result.error is not None:
-        row |= {"error": {"code": result.error.code, "message": str(result.error)}}
+        from silo.batch import error_json
+
+        row |= {"error": error_json(result.error)}
     return row
 
 

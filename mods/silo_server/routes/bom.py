@@ -232,9 +232,10 @@ def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
 
 
 def _open_to_wire(summary: Summary) -> dict[str, Any]:
+    boms = summary.open.values()
     return {
-        name: {bom.part_number: words for bom in summary.open.values() if (words := getattr(bom, of_bom))}
-        for name, of_bom in (("open", "questions"), ("incomplete", "incomplete"))
+        "open": {each.part_number: each.questions for each in boms if each.questions},
+        "incomplete": {each.part_number: each.incomplete for each in boms if each.incomplete},
     }
 
 
