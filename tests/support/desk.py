@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-from silo.api.wire import Scene
+from silo.api.transport import Cancel
+from silo.api.wire import Item, Scene
 from silo.bom.errors import DocumentError, NotFoundError, SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
@@ -51,7 +52,10 @@ class Gui:
 
 
 class Silo(FakeSilo):
-    """A server that can be closed like a client, and shows the models that a test gives it."""
+    """A server that can be closed like a client, and shows the models that a test gives it.
+
+    ``before`` is called before a read of many items, too.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -60,6 +64,12 @@ class Silo(FakeSilo):
 
     def close(self) -> None:
         return
+
+    def get_items_by_uuid(
+        self, uuids: Iterable[str], /, *, cancelled: Cancel | None = None
+    ) -> dict[str, Item]:
+        self.before("get_items_by_uuid")
+        return super().get_items_by_uuid(uuids, cancelled=cancelled)
 
     def get_scene(self, part_number: str, revision: int, /) -> Scene:
         if (part_number, revision) not in self.scenes:

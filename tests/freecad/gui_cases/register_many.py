@@ -89,8 +89,7 @@ def project_view(one: Any) -> None:
     tell(asked=view.news.text())
     view._choose(str(VAULT))
     wait(lambda: len(view._flow.view.rows) == DOCUMENTS)
-    # A look that found no server is at work beside the others, and could come back after the next.
-    wait(lambda: settled() and one.session._aside.idle)
+    wait(settled)
     # A file of several parts is no item's, so registering has not sent it.
     tell(several=[row.words() for row in view._flow.view.rows if "Gizmo 0" in row.place])
     edited = next(doc for doc in App.listDocuments().values() if doc.Label == "Bracket 3")

@@ -219,7 +219,7 @@ class EventReader:
         deadline = time.monotonic() + TIMEOUT
         while time.monotonic() < deadline:
             event = self._read()
-            # A heartbeat comes when its time is due and whenever a credential changes: at any time, for a test.
+            # A heartbeat is sent if its time is due or a credential changed: at any moment, for a test.
             if event.name in names or (not names and event.name != "heartbeat"):
                 return event
         raise AssertionError(f"no event {names} within {TIMEOUT} s")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -188,3 +189,27 @@ def test_without_a_connection_the_folder_says_what_it_remembers(place: Place) ->
 
     place.office.silo.before = refuse
     assert place.states(flow) == {"Sheet.FCStd": "SAME", "parts/Plate.FCStd": "EDITED"}
+
+
+def test_an_older_look_does_not_replace_a_newer_one(place: Place) -> None:
+    """A look that found no server works beside the others, and can end after them."""
+    flow, office = place.committed(), place.office
+    free = threading.Event()
+    office.session.aside("in the way", lambda _control: free.wait(60), lambda _done: None, print)
+
+    def refuse(_name: str) -> None:
+        raise UnreachableError("no route")
+
+    office.silo.before = refuse
+    older: list[object] = []
+    flow.look(str(place.root), older.append, older.append)
+    office.gui.run_until(lambda: office.session._aside.left() == 2)
+    office.silo.before = lambda _name: None
+    place.write("edited")
+    newer: list[ProjectView] = []
+    flow.look(str(place.root), newer.append, older.append)
+    office.gui.run_until(lambda: newer)
+    free.set()
+    office.settle()
+    assert (flow.view, older) == (newer[0], [])
+    assert [row.state.name for row in flow.view.rows] == ["SAME", "EDITED"]

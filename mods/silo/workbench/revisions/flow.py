@@ -495,6 +495,7 @@ class ProjectFlow:
     ) -> None:
         self._session, self._preferences, self._commits = session, preferences, commits
         self._desk, self._files = desk, files
+        self._newest: Callable[[ProjectView], None] | None = None
         self.view = ProjectView()
 
     def roots(self) -> list[str]:
@@ -513,36 +514,44 @@ class ProjectFlow:
         self, root: str, done: Callable[[ProjectView], None], failed: Callable[[SiloError], None]
     ) -> None:
         """Find out how the files of a project stand; without a connection, as far as the folder
-        remembers it.
+        remembers it. Only the newest look is reported.
         """
+        self._newest = done
         edited = self._edited()
 
         def work(client: SiloClient | None) -> ProjectView:
             return _project_view(root, client, self._session.outbox, edited)
 
-        def told(view: ProjectView) -> None:
-            self.view = view
-            done(view)
+        def seen(view: ProjectView) -> None:
+            if self._newest is done:
+                self.view = view
+                done(view)
+
+        def unseen(error: SiloError) -> None:
+            if self._newest is done:
+                failed(error)
 
         def offline(error: SiloError) -> None:
+            # A look without a server works beside the others, so an older look can end after a newer.
             if isinstance(error, (DocumentError, InputError)):
-                failed(error)
-                return
-            self._session.aside(title, lambda _control: work(None), told, failed)
+                unseen(error)
+            else:
+                self._session.aside(title, lambda _control: work(None), seen, unseen)
 
         title = translate("Silo", "Looking at the project")
-        self._session.ask(title, lambda client, _control: work(client), told, offline)
+        self._session.ask(title, lambda client, _control: work(client), seen, offline)
 
     def _edited(self) -> set[str]:
         """Return the open files with edits, as far as there is time to compare; marks of FreeCAD alone do not
         count.
         """
         documents, until = self._desk.documents, time.thread_time() + MOST_S
-        edited_documents = ((one_path(path), self._desk.find(path)) for path in self._desk.open_paths())
         return {
-            path
-            for path, doc in edited_documents
-            if doc is not None and documents.is_modified(doc) and documents.is_edited(doc, until)
+            one_path(path)
+            for path in self._desk.open_paths()
+            if (doc := self._desk.find(path)) is not None
+            and documents.is_modified(doc)
+            and documents.is_edited(doc, until)
         }
 
     def commit_all(self, comment: str) -> None:

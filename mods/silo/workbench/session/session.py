@@ -540,8 +540,8 @@ class Session:
 
     @property
     def idle(self) -> bool:
-        """Return True if all workers are idle."""
-        return self._rows.idle and self._disk.idle and self._net.idle
+        """Return True if no worker has work that a person waits for."""
+        return self._rows.idle and self._disk.idle and self._net.idle and self._aside.idle
 
     # -- what is shown ----------------------------------------------------------------------------------
 
