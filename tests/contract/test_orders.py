@@ -65,18 +65,19 @@ def product(api: Api) -> tuple[str, str, str, str]:
 def test_a_list_is_one_value_with_a_version(api: Api) -> None:
     """What is sent comes back, in the item too; a second editor is refused; the search finds it."""
     (screw,) = api.items(1)
-    told = given(api, screw, MISUMI)
-    assert told["supplier_parts"] == [MISUMI]
+    part = {**MISUMI, "number": f"CB8-{screw}"}  # other items have MISUMI, too
+    told = given(api, screw, part)
+    assert told["supplier_parts"] == [part]
     assert api.get(suppliers(screw)) == told
-    assert api.get(f"/api/items/{screw}")["supplier_parts"] == [MISUMI]
+    assert api.get(f"/api/items/{screw}")["supplier_parts"] == [part]
     version = {"If-Match": f'"v{told["version"]}"'}
-    second = {**MISUMI, "preferred": True}
+    second = {**part, "preferred": True}
     assert api.call("PUT", suppliers(screw), {"supplier_parts": [second]}, headers=version).status == 200
     assert api.call("PUT", suppliers(screw), {"supplier_parts": []}, headers=version).status == 412
-    assert [one["part_number"] for one in api.get("/api/items/search?q=cb8-20")] == [screw]
+    assert [one["part_number"] for one in api.get(f"/api/items/search?q=cb8-{screw}")] == [screw]
     given(api, screw)
     assert "supplier_parts" not in api.get(f"/api/items/{screw}")
-    assert api.get("/api/items/search?q=cb8-20") == []
+    assert api.get(f"/api/items/search?q=cb8-{screw}") == []
 
 
 def test_what_is_refused(api: Api) -> None:
