@@ -32,6 +32,7 @@ import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -215,6 +216,7 @@ class Domain:
         """Return the path of a language's .po file."""
         return self.package / "locale" / language / "LC_MESSAGES" / f"{self.name}.po"
 
+    @cache
     def messages(self) -> dict[str, Message]:
         """Text → message, in the order of the files."""
         made: dict[str, Message] = {}
