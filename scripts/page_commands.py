@@ -196,8 +196,8 @@ def plain(text: str) -> str:
     return " ".join(text.split())
 
 
-def follow(page: Path) -> str:
-    """Follow a page in a folder of its own; return what went wrong."""
+def follow(page: Path, *first: Path) -> str:
+    """Follow a page in a folder of its own, with the programs in ``first``; return what went wrong."""
     with tempfile.TemporaryDirectory() as scratch:
         home, work = Path(scratch, "home"), Path(scratch, "work")
         home.mkdir()
@@ -205,7 +205,7 @@ def follow(page: Path) -> str:
         env = {name: value for name, value in os.environ.items() if not name.startswith(("SILO_", "XDG_"))}
         env |= {name: str(home) for name in ("HOME", "USERPROFILE", "LOCALAPPDATA", "APPDATA")}
         env |= {f"GIT_{who}_{what}": "x@y" for who in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}
-        env["PATH"] = os.pathsep.join((str(Path(sys.executable).parent), env["PATH"]))
+        env["PATH"] = os.pathsep.join((*map(str, first), str(Path(sys.executable).parent), env["PATH"]))
         reader = Reader(Path(scratch), env)
         try:
             return reader.follow(page.read_text("utf-8"))

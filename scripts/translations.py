@@ -216,18 +216,22 @@ class Domain:
         """Return the path of a language's .po file."""
         return self.package / "locale" / language / "LC_MESSAGES" / f"{self.name}.po"
 
-    @cache
     def messages(self) -> dict[str, Message]:
         """Text → message, in the order of the files."""
-        made: dict[str, Message] = {}
-        for text, many, path in self.texts(self.package):
-            before = made.get(text, Message(text))
-            if before.many and many and before.many != many:
-                raise NotLiteral(f"{path}: {text!r} has the plurals {before.many!r} and {many!r}")
-            name = path.relative_to(ROOT / "mods").as_posix()
-            files = before.files if name in before.files else (*before.files, name)
-            made[text] = Message(text, before.many or many, files)
-        return made
+        return _messages(self)
+
+
+@cache
+def _messages(domain: Domain) -> dict[str, Message]:
+    made: dict[str, Message] = {}
+    for text, many, path in domain.texts(domain.package):
+        before = made.get(text, Message(text))
+        if before.many and many and before.many != many:
+            raise NotLiteral(f"{path}: {text!r} has the plurals {before.many!r} and {many!r}")
+        name = path.relative_to(ROOT / "mods").as_posix()
+        files = before.files if name in before.files else (*before.files, name)
+        made[text] = Message(text, before.many or many, files)
+    return made
 
 
 def texts_of_python(path: Path) -> Iterator[tuple[str, str, Path]]:

@@ -80,7 +80,7 @@ with suppress(ImportError):
 
     _Route.from_api_route = _route  # type: ignore[method-assign, assignment]
 
-# A tenth of the time went into looking for garbage: tests make many objects, and hardly any of them are garbage.
+# A tenth of the time went into looking for garbage: tests make many objects, and hardly any are garbage.
 gc.set_threshold(100_000, 50, 100)
 
 # A shell that runs tests in the background ignores Ctrl-C for them; their programs would inherit that.

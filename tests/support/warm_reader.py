@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A process that has loaded the geometry kernel, and forks the children that read files.
+"""A process that has loaded the geometry kernel and the command line, and forks readers and commands.
 
-The kernel takes a second of processor to load, and some hundred tests read in a child. The child gives its
-work away as soon as it starts, waits, and ends as the work ended: by the same code, or by the same signal.
+The kernel takes a second of processor to load, and some hundred tests read in a child; the commands of the
+documentation take half a second each. A process that is started for such work gives it away, waits, and ends
+as the work ended: by the same code, or by the same signal.
 """
 
 from __future__ import annotations
@@ -10,27 +11,32 @@ from __future__ import annotations
 import json
 import os
 import select
+import shlex
 import signal
 import socket
-import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from uuid import uuid4
 
 NAME = "SILO_WARM_READER"
 WORK = ("from silo.inertia.geometry.read import main; main()", "from silo.drawing.models import main; main()")
+COMMAND = "from silo.cli.main import main; raise SystemExit(main())"
 LOADED = """
 from silo.inertia.geometry.read import without
 without("scipy", "networkx")
 import silo.drawing.models, silo.inertia.geometry.step, silo.inertia.geometry.meshes
+import silo.api.client, silo.bom_sync, silo.cli.main
 """
+# They run until a signal ends them, which the process gets that was started.
+LASTING = ("serve", "watch")
 
 
 @contextmanager
 def warm_reader() -> Iterator[str]:
     """Start it; it loads the kernel with its first job. Children use it if ``NAME`` is what this gives."""
+    import subprocess
+    from uuid import uuid4
+
     path = os.pathsep.join(part for part in sys.path if part)
     environment = {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     with socket.socket(socket.AF_UNIX) as listener:
@@ -38,7 +44,7 @@ def warm_reader() -> Iterator[str]:
         listener.bind(f"\0{address}")
         listener.listen(100)
         process = subprocess.Popen(
-            [sys.executable, str(Path(__file__)), str(listener.fileno())],
+            [sys.executable, __file__, str(listener.fileno())],
             stdin=subprocess.PIPE,
             env=environment,
             pass_fds=[listener.fileno()],
@@ -50,11 +56,29 @@ def warm_reader() -> Iterator[str]:
 def pass_on(code: str) -> None:
     """Let the warm process do what this child was started for, if it is the same code with the same path."""
     address, path = os.environ[NAME].split("\n")
-    if code not in WORK or os.environ.get("PYTHONPATH") != path:
-        return
+    if code in WORK and os.environ.get("PYTHONPATH") == path:
+        _hand_over(address, code)
+
+
+def run_command(reader: str) -> None:
+    """Let the warm process ``reader`` run ``silo-mod`` with the arguments of this process."""
+    if set(sys.argv[1:2]) & {*LASTING}:
+        os.execv(sys.executable, [sys.executable, "-c", COMMAND, *sys.argv[1:]])
+    os.environ[NAME] = reader
+    _hand_over(reader.split("\n")[0], COMMAND)
+
+
+def stand_in(reader: str) -> str:
+    """Return a program for the shell that runs ``silo-mod`` in the warm process ``reader``."""
+    here = os.path.dirname(os.path.abspath(__file__))
+    code = f"import sys; sys.path.append({here!r}); import warm_reader; warm_reader.run_command({reader!r})"
+    return f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -IS -c {shlex.quote(code)} "$@"\n'
+
+
+def _hand_over(address: str, code: str) -> None:
     with socket.socket(socket.AF_UNIX) as line:
         line.connect(f"\0{address}")
-        job = json.dumps([code, os.getcwd(), dict(os.environ)]).encode()
+        job = json.dumps([code, os.getcwd(), dict(os.environ), ["silo-mod", *sys.argv[1:]]]).encode()
         socket.send_fds(line, [len(job).to_bytes(4)], [0, 1, 2])
         line.sendall(job)
         ended = line.makefile().readline()
@@ -80,7 +104,7 @@ def watch(line: socket.socket, listener: socket.socket) -> None:
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     listener.close()
     length, fds, _, _ = socket.recv_fds(line, 4, 3)
-    code, folder, environment = json.loads(line.makefile("rb").read(int.from_bytes(length)))
+    code, folder, environment, sys.argv = json.loads(line.makefile("rb").read(int.from_bytes(length)))
     worker = os.fork()
     if worker == 0:
         os.setsid()
