@@ -366,6 +366,8 @@ def test_json_alone_goes_to_standard_output(weigh: Run, arm: Path) -> None:
     assert ran.json()["format"] == "silo-inertia/1"
     for words in ("--strict: ", "wrote the inertia", "Would write "):
         assert words in ran.err
+    assert (arm / "p.glb").read_bytes().startswith(b"glTF")
+    assert (arm / "r.md").read_text("utf-8").startswith("# ")
 
 
 @pytest.mark.parametrize("output", ["--json", "--snippet=urdf"])
