@@ -9,7 +9,7 @@ import re
 import pytest
 
 from silo.bom import errors
-from silo.bom.errors import CycleError, DocumentError, RejectedError, SiloError, counted, listed
+from silo.bom.errors import CycleError, DocumentError, RejectedError, SiloError, counted, duration, listed
 
 CLASSES = [cls for _, cls in inspect.getmembers(errors, inspect.isclass) if issubclass(cls, SiloError)]
 
@@ -73,3 +73,10 @@ def test_listed() -> None:
     """As many as fit, and how many more."""
     assert listed(["a", "b"]) == "a, b"
     assert listed(list("abcdef"), 4) == "a, b, c, d and 2 more"
+
+
+def test_a_duration_has_the_largest_unit_of_which_there_are_two() -> None:
+    hour, day = 3600, 86400
+    spans = {0: "0 s", 119: "119 s", 120: "2 min", 2 * hour - 60: "119 min", 2 * hour: "2 hours"}
+    spans |= {2 * day - hour: "47 hours", 2 * day: "2 days"}
+    assert {seconds: duration(seconds) for seconds in spans} == spans

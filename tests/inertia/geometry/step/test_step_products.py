@@ -32,6 +32,7 @@ from silo.bom.errors import DocumentError
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.kernel.solids import beside_edges, solid_moments
+from silo.inertia.geometry.part21 import ProductFacts, Products
 from silo.inertia.geometry.step import StatedInStep, StepFile, against_stated, stated_totals
 from silo.inertia.model import GeometryCode, Note, Prototype, place
 
@@ -383,3 +384,12 @@ def test_points_that_lag_behind_along_an_edge_open_no_gap(aside: float, doubt: f
     spline.SetKnots(knots)
     BRep_Builder().UpdateEdge(edge, spline, face, 2.0)
     assert beside_edges(solid, 1000.0) == pytest.approx(doubt, rel=0.2)
+
+
+def test_a_name_stands_for_the_only_product_that_has_it() -> None:
+    """A product without a name is known by its part number."""
+    parts = (("P-1", "Plate"), ("P-2", ""), ("P-3", "Twin"), ("P-4", "Twin"))
+    products = Products({key: ProductFacts(*part) for key, part in enumerate(parts)})
+    assert products.named("Plate") is products.facts[0]
+    assert products.named("P-2") is products.facts[1]
+    assert [products.named(name) for name in ("Twin", "P-1", "Bolt")] == [None] * 3
