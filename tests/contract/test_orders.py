@@ -116,6 +116,7 @@ def test_an_order_list_over_all_levels(api: Api, product: tuple[str, ...]) -> No
     top, _sub, screw, plate = product
     given(api, screw, MISUMI)
     api.good("PATCH", f"/api/items/{plate}/properties", {"material": "Steel", "mass_kg": 1.5})
+    assert "wanted 0 to 1000 percent, got 1001" in str(api.bad(400, "GET", order(top, "?spares=1001")))
     told = api.get(order(top, "?pieces=90&spares=5"))
     rows = {one["part_number"]: one for one in told["parts"]}
     assert (

@@ -303,6 +303,8 @@ def test_what_the_server_lost_is_named_and_the_rest_is_saved(
     where = ["--database", db.settings.database_url, "--files", str(store)]
     assert main(["backup", str(tmp_path / "second"), *where]) == 1
     assert file.name in capsys.readouterr().err
+    whole, rest = backup.verify(saved), backup.verify(tmp_path / "second")
+    assert (rest.files, rest.missing_files) == (whole.files - 1, [file.name])
     assert main(["backup", str(tmp_path / "second"), *where]) == 2
     assert "exists already" in capsys.readouterr().err
     assert main(["restore", str(tmp_path / "second"), "--verify"]) == 0

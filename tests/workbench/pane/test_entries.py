@@ -191,6 +191,27 @@ def test_what_people_need_not_see_is_no_box(kind: str) -> None:
     assert of_event(ServerEvent("1", "item.created", {}), page) is None
 
 
+def test_what_a_colleague_did_is_a_box() -> None:
+    """Items and revisions; the first revision of a new item is shown with the item."""
+
+    def titles(*events: ServerEvent) -> list[str]:
+        return [made.title for made in (of_event(event, page) for event in events) if made is not None]
+
+    data = {"part_number": "M01-0001", "user": "alice"}
+    revised = {**data, "comment": "thinner", "revision_number": 2}
+    kinds = [("item.created", data), ("revision.created", revised), ("item.deleted", data)]
+    assert titles(*(ServerEvent(kind, kind, given) for kind, given in kinds)) == [
+        "New item: M01-0001",
+        "Revision 2 of M01-0001",
+        "Archived: M01-0001",
+    ]
+    first = ServerEvent("1", "revision.created", {**data, "comment": "created", "revision_number": 1})
+    assert titles(first) == []
+    entry = of_event(ServerEvent("1", "revision.created", revised), page)
+    assert entry is not None
+    assert (entry.who, [line.text for line in entry.lines]) == ("alice", ["thinner"])
+
+
 @pytest.mark.parametrize(
     ("wanted", "here", "said"),
     [
