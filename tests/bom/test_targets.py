@@ -96,6 +96,15 @@ def test_a_path_through_several_containers(top: Doc, lib: Doc) -> None:
     assert end(top.link("L", (part, "Sub.Bolt."))) == (bolt, 1)
 
 
+def test_each_container_on_a_path_moves_the_part(top: Doc, lib: Doc) -> None:
+    """The first counts only if the link takes over its placement, those further inside always."""
+    inner = lib.part("Inner", lib.body("Bolt"))
+    array = lib.array("Arr", inner, 3)
+    link = top.link("L", (lib.part("Part", lib.part("Sub", array)), "Sub.Arr.1.Bolt."))
+    way = [(step.obj.Name, step.index, step.by_link) for step in resolve_target(link).way]
+    assert way == [("L", None, False), ("Part", None, True), ("Sub", None, False), ("Arr", 1, False)]
+
+
 def test_a_path_through_links(top: Doc, lib: Doc, bolt: Any) -> None:
     """A step may be a link to another file; the way continues in its target."""
     sub = Doc("/v/sub.FCStd")

@@ -587,3 +587,17 @@ def test_only_the_newest_change_of_suppliers_is_undone(api: Api, visitors: dict[
     assert [one["supplier"] for one in api.get(path)["supplier_parts"]] == ["B"]
     assert visitors[EDITOR].post(undo, change=str(versions[1])).status == 303
     assert [one["supplier"] for one in api.get(path)["supplier_parts"]] == ["A"]
+
+
+def test_the_bom_page_says_what_happened_since_the_last_sync(api: Api, visitors: dict[str, Visitor]) -> None:
+    """The sync itself is not among the changes after it."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 1})
+
+    def heads() -> list[str]:
+        page = visitors[EDITOR].get(f"/items/{parent}/bom").body.decode()
+        return [head for head in ("Last sync from CAD", "Since then") if f"<h2>{head}</h2>" in page]
+
+    assert heads() == ["Last sync from CAD"]
+    api.edit_line(parent, child, notes="x")
+    assert heads() == ["Last sync from CAD", "Since then"]
