@@ -18,7 +18,11 @@ from typing import IO, Any
 import pytest
 from fcstd_writer import Doc, locals_, part
 
+from silo.api.wire import Draft, MergeResult
+from silo.bom.model import BomEntry
+from silo.bom_sync import Outcome, Resolved, Status
 from silo.cli.main import main
+from silo.cli.show import outcome_text
 
 SILO_MOD = shlex.join([sys.executable, "-m", "silo.cli.main"])
 
@@ -209,3 +213,12 @@ def test_a_name_of_a_megabyte_does_not_fill_the_terminal(run: Any, silo: Any, tm
         assert done.code == 1
         assert "there is no" not in done.err
         assert len(done.out) + len(done.err) < 50_000
+
+
+def test_an_outcome_says_which_draft_it_is_part_of() -> None:
+    """Before the first release it says nothing, in one line."""
+    top = Resolved(BomEntry("asm/Top.FCStd", object_name="Top", label="Top"), (), (), ())
+    result = MergeResult(draft=Draft(label="C", released="B"))
+    told = [str(outcome_text(Outcome(Status.MERGED, top, result=one), "")) for one in (MergeResult(), result)]
+    assert [text.count("\n") for text in told] == [0, 1]
+    assert told[1].endswith("\n  This is part of draft C. Revision B stays released as it is.")
