@@ -17,7 +17,7 @@ from server_testing import Api
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.files import PROJECT_FILE
+from silo.files import PROJECT_FILE, Project, ProjectEntry
 from silo.outbox.store import Store
 
 
@@ -253,3 +253,12 @@ def test_without_a_server_the_commit_waits_in_the_queue(
     assert [one.comment for one in silo.client.revisions(item.part_number) if one.file_checksum] == [
         "on the train"
     ]
+
+
+def test_what_somebody_wrote_into_the_memory_of_a_project_is_left_out(tmp_path: Path) -> None:
+    """Only what names a document is a file; keys of a newer version are passed over."""
+    odd = {"a": 5, "b": {}, "c": {"document": ""}, "d": {"document": "D", "newer": 1}, "e": ["x"]}
+    (tmp_path / PROJECT_FILE).write_text(json.dumps({"files": odd}))
+    assert Project(str(tmp_path)).files() == {"d": ProjectEntry("D")}
+    (tmp_path / PROJECT_FILE).write_text(json.dumps({"files": ["a"]}))
+    assert Project(str(tmp_path)).files() == {}

@@ -26,7 +26,7 @@ def fcstd(picture: bytes) -> bytes:
 
 def test_content_is_found_by_its_hash(tmp_path: Path) -> None:
     """Kept once; nothing temporary is left."""
-    store = FileStore(tmp_path / "files")
+    store = FileStore(tmp_path / "new" / "files")
     content = b"x" * 3_000_000
     first = store.keep("a.FCStd", io.BytesIO(content))
     again = store.keep("b.FCStd", io.BytesIO(content))
