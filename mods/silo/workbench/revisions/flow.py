@@ -495,7 +495,7 @@ class ProjectFlow:
     ) -> None:
         self._session, self._preferences, self._commits = session, preferences, commits
         self._desk, self._files = desk, files
-        self._newest: Callable[[ProjectView], None] | None = None
+        self._newest = object()
         self.view = ProjectView()
 
     def roots(self) -> list[str]:
@@ -516,19 +516,19 @@ class ProjectFlow:
         """Find out how the files of a project stand; without a connection, as far as the folder
         remembers it. Only the newest look is reported.
         """
-        self._newest = done
+        look = self._newest = object()
         edited = self._edited()
 
         def work(client: SiloClient | None) -> ProjectView:
             return _project_view(root, client, self._session.outbox, edited)
 
         def seen(view: ProjectView) -> None:
-            if self._newest is done:
+            if look is self._newest:
                 self.view = view
                 done(view)
 
         def unseen(error: SiloError) -> None:
-            if self._newest is done:
+            if look is self._newest:
                 failed(error)
 
         def offline(error: SiloError) -> None:
