@@ -216,13 +216,10 @@ class Domain:
         """Return the path of a language's .po file."""
         return self.package / "locale" / language / "LC_MESSAGES" / f"{self.name}.po"
 
-    def messages(self) -> dict[str, Message]:
-        """Text → message, in the order of the files."""
-        return _messages(self)
-
 
 @cache
-def _messages(domain: Domain) -> dict[str, Message]:
+def messages_of(domain: Domain) -> dict[str, Message]:
+    """Text → message, in the order of the files."""
     made: dict[str, Message] = {}
     for text, many, path in domain.texts(domain.package):
         before = made.get(text, Message(text))
@@ -565,7 +562,7 @@ def mo(language: str, messages: Iterable[Message], plurals: str) -> bytes:
 
 def wanted_po(domain: Domain, languages: Iterable[str] = ()) -> dict[Path, bytes]:
     """What each file of a domain should hold: those that exist, and one for each of ``languages``."""
-    texts = domain.messages()
+    texts = messages_of(domain)
     there = [path.parents[1].name for path in domain.package.glob(f"locale/*/LC_MESSAGES/{domain.name}.po")]
     files = {}
     for language in sorted({*there, *languages}):

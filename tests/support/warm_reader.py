@@ -28,7 +28,7 @@ import silo.drawing.models, silo.inertia.geometry.step, silo.inertia.geometry.me
 import silo.api.client, silo.bom_sync, silo.cli.main
 """
 # They run until a signal ends them, which the process gets that was started.
-LASTING = ("serve", "watch")
+LASTING = {"serve", "watch"}
 
 
 @contextmanager
@@ -62,7 +62,7 @@ def pass_on(code: str) -> None:
 
 def run_command(reader: str) -> None:
     """Let the warm process ``reader`` run ``silo-mod`` with the arguments of this process."""
-    if set(sys.argv[1:2]) & {*LASTING}:
+    if LASTING.intersection(sys.argv[1:2]):
         os.execv(sys.executable, [sys.executable, "-c", COMMAND, *sys.argv[1:]])
     os.environ[NAME] = reader
     _hand_over(reader.split("\n")[0], COMMAND)
