@@ -34,7 +34,24 @@ from silo.bom.headers import safe_cell
 from silo.bom.model import BomDiff, BomEntry, Extraction, walk_entries
 from silo.bom.report import PIECES, base_of, bom_json, diff_json, finding_json, flat_json, shorten
 from silo.bom.resolve import consolidation_findings, display_name, one_hint_each, with_allowed_characters
-from silo.cli import common
+from silo.cli.common import (
+    EACH,
+    READING,
+    add_each,
+    add_options,
+    add_top,
+    client_of,
+    count_steps,
+    json_text,
+    not_with,
+    only_with,
+    plan_of,
+    print_json,
+    reach,
+    read_assembly,
+    read_tops,
+    reading_of,
+)
 from silo.files import check_writable, documents_in
 from silo.platform import replacing, scratch_folder
 
@@ -45,8 +62,8 @@ if TYPE_CHECKING:
 
 
 def add_bom(parser: argparse.ArgumentParser) -> None:
-    common.add_top(parser, "--csv", "--xlsx")
-    common.options(
+    add_top(parser, "--csv", "--xlsx")
+    add_options(
         parser,
         {
             "--flat": "quantities multiplied down the tree, each part once",
@@ -62,9 +79,9 @@ def add_bom(parser: argparse.ArgumentParser) -> None:
             "--xlsx FILE": "write the lines as a workbook",
         },
     )
-    common.only_with(parser, "--resolve", "--server", "--token")
-    common.not_with(parser, "--verify", "--flat", "--resolve", "--csv", "--xlsx", "--why", *common.READING)
-    common.not_with(parser, "--why", "--flat", "--resolve", "--csv", "--xlsx", "--json", *common.READING)
+    only_with(parser, "--resolve", "--server", "--token")
+    not_with(parser, "--verify", "--flat", "--resolve", "--csv", "--xlsx", "--why", *READING)
+    not_with(parser, "--why", "--flat", "--resolve", "--csv", "--xlsx", "--json", *READING)
 
 
 def run_bom(args: argparse.Namespace) -> int:
@@ -74,15 +91,15 @@ def run_bom(args: argparse.Namespace) -> int:
     if args.why:
         return _why(args)
     check_writable(*(path for path in (args.csv, args.xlsx) if path and path != "-"))
-    if os.path.isdir(args.top) or args.assembly == common.EACH:
+    if os.path.isdir(args.top) or args.assembly == EACH:
         return _show_each(args)
-    extraction, summary = common.read_tops(args)[0], None
+    extraction, summary = read_tops(args)[0], None
     if args.resolve:
         from silo.batch import ask_for_moved
         from silo.bom_sync import resolve
 
-        with common.client_of(args) as client:
-            common.reach(client, extraction)
+        with client_of(args) as client:
+            reach(client, extraction)
             resolved = ask_for_moved(resolve(extraction, client), client)
             if number := resolved.assembly.part_number:
                 try:
@@ -101,23 +118,23 @@ def run_bom(args: argparse.Namespace) -> int:
         _write_xlsx(args.xlsx, _table(extraction, flat=args.flat))
     if args.json:
         kept = {"silo": summary.model_dump(mode="json")} if summary else {}
-        common.print_json(flat_json(extraction) if args.flat else bom_json(extraction) | kept)
+        print_json(flat_json(extraction) if args.flat else bom_json(extraction) | kept)
     if args.json or args.csv == "-":
         return _exit_of(extraction, args)
-    from silo.cli import show
+    from silo.cli.show import bom_tree, console, findings_text, flat_table, summary_text
 
-    out = show.console()
-    out.print(show.flat_table(flat_json(extraction)) if args.flat else show.bom_tree(extraction))
+    out = console()
+    out.print(flat_table(flat_json(extraction)) if args.flat else bom_tree(extraction))
     findings = one_hint_each(extraction.findings)
     findings = tuple(
         finding for finding in findings if args.verbose or finding.code is not FindingCode.CONSOLIDATION
     )
     if findings:
         out.print()
-        out.print(show.findings_text(findings, base_of(extraction)))
+        out.print(findings_text(findings, base_of(extraction)))
     if summary:
         out.print()
-        out.print(show.summary_text(summary))
+        out.print(summary_text(summary))
     return _exit_of(extraction, args)
 
 
@@ -125,7 +142,7 @@ def _why(args: argparse.Namespace) -> int:
     """Print each way from the assembly to a part, with the arrays on it."""
     from silo.bom.links import why
     from silo.bom.roots import choose_assembly
-    from silo.cli import show
+    from silo.cli.show import console, plain
     from silo.fcstd import Library
 
     if os.path.isdir(args.top):
@@ -133,9 +150,9 @@ def _why(args: argparse.Namespace) -> int:
     with Library() as library:
         top = choose_assembly(library.open(args.top), args.assembly)
         first, *ways = why(top, [args.why], hardware=not args.no_hardware)
-    out = show.console()
+    out = console()
     for line in (first, *(f"  {way}" for way in ways)):
-        out.print(show.plain(line), markup=False)
+        out.print(plain(line), markup=False)
     return Exit.DONE
 
 
@@ -153,26 +170,24 @@ def _show_each(args: argparse.Namespace) -> int:
     """
     if args.flat or args.resolve or args.csv or args.xlsx:
         raise InputError("--flat, --resolve, --csv and --xlsx are for one assembly; name its file.")
-    from silo.cli import show
+    from silo.cli.show import bom_tree, console, findings_text, plain
 
-    out, errors = show.console(), {}
+    out, errors = console(), {}
     if os.path.isdir(args.top):
-        with common.plan_of(args) as (plan, reading, base):
+        with plan_of(args) as (plan, reading, base):
             tops = [(plan.extraction(node, reading), base) for layer in plan.layers for node in layer]
         errors = {relative(top, base): str(error) for top, error in plan.errors.items()}
     else:
-        tops = [
-            (extraction_of_top, base_of(extraction_of_top)) for extraction_of_top in common.read_tops(args)
-        ]
+        tops = [(extraction_of_top, base_of(extraction_of_top)) for extraction_of_top in read_tops(args)]
     if args.json:
-        common.print_json({"assemblies": [bom_json(*root) for root in tops], "errors": errors})
+        print_json({"assemblies": [bom_json(*root) for root in tops], "errors": errors})
     for extraction, base in tops if not args.json else ():
-        out.print(show.bom_tree(extraction, base))
+        out.print(bom_tree(extraction, base))
         if extraction.findings:
-            out.print(show.findings_text(extraction.findings, base))
+            out.print(findings_text(extraction.findings, base))
         out.print()
     for path, words in errors.items() if not args.json else ():
-        out.print(f"✗ {show.plain(path)}: {show.plain(words)}", style="red", markup=False)
+        out.print(f"✗ {plain(path)}: {plain(words)}", style="red", markup=False)
     return (
         Exit.UNDONE
         if errors
@@ -252,16 +267,16 @@ def _verify(args: argparse.Namespace) -> int:
     accounts = witness[top]
     differs = error.blocked or not all(account["agrees"] for account in accounts)
     if args.json:
-        common.print_json({**bom_json(error), "witness": accounts})
+        print_json({**bom_json(error), "witness": accounts})
         return int(differs)
-    from silo.cli import show
+    from silo.cli.show import console, findings_text, plain
 
-    out = show.console()
+    out = console()
     for account in accounts:
         mark = "✓" if account["agrees"] else "✗"
-        out.print(f"{mark} {show.plain(account['sentence'])}", markup=False)
+        out.print(f"{mark} {plain(account['sentence'])}", markup=False)
     if error.blocked:
-        out.print(show.findings_text(error.findings, base_of(error)))
+        out.print(findings_text(error.findings, base_of(error)))
     return int(differs)
 
 
@@ -277,7 +292,7 @@ def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> B
 
 def add_where_used(parser: argparse.ArgumentParser) -> None:
     text = "the file; it need not be there any more"
-    common.add_each(parser, "part", metavar="PART.FCStd", help=text)
+    add_each(parser, "part", metavar="PART.FCStd", help=text)
 
 
 def run_where_used(args: argparse.Namespace) -> int:
@@ -294,9 +309,9 @@ def run_where_used(args: argparse.Namespace) -> int:
         raise InputError(f"{args.part}: there is no such file, nor its folder.")
     users: dict[str, set[str]] = {}
     unread = []
-    with common.reading_of(args) as reading:
+    with reading_of(args) as reading:
         reading.index.expect(base)
-        progress = common.count_steps(len(tops))
+        progress = count_steps(len(tops))
         for top, answer in zip(tops, reading.ask_many(map(Question, tops)), strict=True):
             progress(top)
             if "document" in answer.plain:
@@ -316,17 +331,17 @@ def run_where_used(args: argparse.Namespace) -> int:
     }
     said = {name: [relative(path, base) for path in sorted(paths)] for name, paths in uses.items()}
     if args.json:
-        common.print_json({"part": relative(part, base), **said})
+        print_json({"part": relative(part, base), **said})
         return Exit.UNDONE if unread else Exit.DONE
-    from silo.cli import show
+    from silo.cli.show import console, plain
 
-    out = show.console()
+    out = console()
     lines = said["direct"] or [f"No file of {args.root} links to it."]
     if said["tops"]:
         lines.append(f"Tops that a change touches: {', '.join(said['tops'])}")
     lines += [f"✗ {path} could not be read, so its links are not known." for path in said["unreadable"]]
     for line in lines:
-        out.print(show.plain(line), markup=False)
+        out.print(plain(line), markup=False)
     return Exit.UNDONE if unread else Exit.DONE
 
 
@@ -343,7 +358,7 @@ def _above(part: str, users: Mapping[str, set[str]]) -> set[str]:
 
 
 def add_relink(parser: argparse.ArgumentParser) -> None:
-    common.add_each(parser, "top", metavar="TOP.FCStd", help="the assembly's file")
+    add_each(parser, "top", metavar="TOP.FCStd", help="the assembly's file")
     parser.add_argument(
         "--from",
         dest="old",
@@ -381,16 +396,16 @@ def run_relink(args: argparse.Namespace) -> int:
             }
             for relinked in done
         ]
-        common.print_json({"dry_run": args.dry_run, "to": relative(new, folder), "files": rows})
+        print_json({"dry_run": args.dry_run, "to": relative(new, folder), "files": rows})
         return Exit.DONE
-    from silo.cli import show
+    from silo.cli.show import console, plain
 
-    out = show.console()
+    out = console()
     for relinked in done:
         links = counted(relinked.links, "link")
         verb = "would lead" if args.dry_run else "now leads" if relinked.links == 1 else "now lead"
         text = f"✓ {relative(relinked.path, folder)}: {links} {verb} to {relative(new, folder)}"
-        out.print(show.plain(text), markup=False)
+        out.print(plain(text), markup=False)
     return Exit.DONE
 
 
@@ -412,7 +427,7 @@ def _closed(path: str) -> None:
 def _documents(top: str) -> list[str]:
     """List the files of the tree that can be read."""
     try:
-        extraction = common.read_assembly(top)
+        extraction = read_assembly(top)
     except SiloError:  # such as no assembly in the file: its own links can be mended anyway
         return [top]
     entries = walk_entries(extraction.entries)
@@ -425,7 +440,7 @@ def _either(folder: str, path: str) -> str:
 
 
 def add_diff(parser: argparse.ArgumentParser) -> None:
-    common.add_top(parser)
+    add_top(parser)
 
 
 def run_diff(args: argparse.Namespace) -> int:
@@ -437,9 +452,9 @@ def run_diff(args: argparse.Namespace) -> int:
 
     if os.path.isdir(args.top):
         return _folder_diff(args)
-    extraction = common.read_tops(args)[0]
-    with common.client_of(args) as client:
-        common.reach(client, extraction)
+    extraction = read_tops(args)[0]
+    with client_of(args) as client:
+        reach(client, extraction)
         whole = resolve(extraction, client)
         chosen = list(assemblies(whole)) if args.recursive else [whole]
         lines = [server_lines(resolved, client) for resolved in chosen]
@@ -455,7 +470,7 @@ def run_diff(args: argparse.Namespace) -> int:
             whole.findings, *(diff.findings_at(resolved.assembly) for resolved, diff in compared)
         )
         findings = [finding_json(finding, base) for finding in all_findings]
-        common.print_json({"drift": drifted, "assemblies": data, "findings": findings})
+        print_json({"drift": drifted, "assemblies": data, "findings": findings})
     else:
         _show(whole, compared, names_of(whole, chain.from_iterable(lines)), base)
     # What cannot be compared whole is no answer, whether one wants to know of differences or not.
@@ -470,13 +485,13 @@ def _folder_diff(args: argparse.Namespace) -> int:
     """Compare every assembly of a folder with the server, and show those that differ."""
     from silo.batch import RunSummary, SyncOptions, is_news
     from silo.bom_sync import blocking
-    from silo.cli import show
+    from silo.cli.show import console, diff_table, outcome_text, plain
     from silo.vault.plan import SyncJob
 
-    out, data = show.console(), []
-    with common.plan_of(args) as (plan, reading, base), common.client_of(args) as client:
+    out, data = console(), []
+    with plan_of(args) as (plan, reading, base), client_of(args) as client:
         if not plan.uuids:
-            common.reach(client)
+            reach(client)
         summary = RunSummary(base)
         options = SyncOptions(recursive=True, dry_run=True, allow_missing=args.allow_missing)
         drifted = broken = False
@@ -496,16 +511,16 @@ def _folder_diff(args: argparse.Namespace) -> int:
                     compared = {"diff": diff_json(outcome.plan.diff)} if outcome.plan is not None else {}
                     data.append({**_head(outcome.resolved, base), **compared})
                 elif news:
-                    out.print(show.outcome_text(outcome, base))
+                    out.print(outcome_text(outcome, base))
                     if outcome.plan is not None and whole:
-                        out.print(show.diff_table(outcome.plan.diff, outcome.names))
+                        out.print(diff_table(outcome.plan.diff, outcome.names))
     if args.json:
         findings = [finding_json(finding, base) for finding in summary.findings]
         errors = [{"message": words, "files": files} for words, files in summary.errors.items()]
-        common.print_json({"drift": drifted, "assemblies": data, "findings": findings, "errors": errors})
+        print_json({"drift": drifted, "assemblies": data, "findings": findings, "errors": errors})
     else:
         for words in (*summary.warnings, *summary.errors):
-            out.print(show.plain(words), markup=False)
+            out.print(plain(words), markup=False)
         words = "no differences"
         if drifted:
             words = "there are differences, or what could not be compared (see above)"
@@ -529,22 +544,22 @@ def _show(
     whole: Resolved, compared: list[tuple[Resolved, BomDiff]], names: dict[str, str], base: str
 ) -> None:
     from silo.bom_sync import blocking
-    from silo.cli import show
+    from silo.cli.show import console, diff_table, entry_text, findings_text, plain
 
-    out = show.console()
+    out = console()
     for resolved, diff in compared:
         head = resolved.assembly
         if head.part_number:
-            out.print(show.entry_text(head, base))
+            out.print(entry_text(head, base))
         else:
-            name = show.plain(display_name(head))
+            name = plain(display_name(head))
             out.print(
                 f"{name}: no part number yet, so nothing to compare with (silo-mod register)", markup=False
             )
         if head.part_number or diff.added:
-            out.print(show.diff_table(diff, names, whole=not (blocking(resolved) or resolved.unresolved)))
+            out.print(diff_table(diff, names, whole=not (blocking(resolved) or resolved.unresolved)))
         out.print()
-    out.print(show.findings_text(whole.findings, base))
+    out.print(findings_text(whole.findings, base))
 
 
 _MARK = {
@@ -559,7 +574,7 @@ def add_bom_diff(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "folders", metavar="FOLDER", nargs="*", help="OLD and NEW; with --git the one folder to compare"
     )
-    common.options(
+    add_options(
         parser,
         {
             "--git A..B": (
@@ -588,11 +603,11 @@ def run_bom_diff(args: argparse.Namespace) -> int:
     for path in args.report:
         make = _markdown if path.lower().endswith(".md") else _changes_json
         made = make(changes, old, new)
-        text = made if isinstance(made, str) else common.json_text(made, indent=2)
+        text = made if isinstance(made, str) else json_text(made, indent=2)
         with replacing(Path(path)) as stream:
             stream.write(f"{text}\n".encode())
     if args.json:
-        common.print_json(_changes_json(changes, old, new))
+        print_json(_changes_json(changes, old, new))
     else:
         _show_changes(changes, old, new)
     # An old state that is damaged cannot be mended any more; a new one can.
@@ -679,23 +694,23 @@ def _show_changes(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: Fol
     from rich.table import Table
     from rich.text import Text
 
-    from silo.cli import show
+    from silo.cli.show import console, plain
 
-    out = show.console()
+    out = console()
     for change in changes:
-        out.print(Text(show.plain(spoken(_title(change))), "bold"))
+        out.print(Text(plain(spoken(_title(change))), "bold"))
         table = Table(box=None, pad_edge=False, show_header=False)
         columns: tuple[Literal["left", "right"], ...] = ("left", "left", "right", "left")
         for justify in columns:
             table.add_column(justify=justify)
         for line in change.lines:
             mark, style = _MARK[line.kind]
-            name = Text(show.plain(_name(line.entry)))
+            name = Text(plain(_name(line.entry)))
             table.add_row(
                 Text(f"  {mark}", style),
                 name,
                 _quantities(line),
-                Text(show.plain(spoken(_where(line, change))), "dim"),
+                Text(plain(spoken(_where(line, change))), "dim"),
             )
         if change.lines:
             out.print(table)
@@ -704,7 +719,7 @@ def _show_changes(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: Fol
         text = spoken(_unchanged(old, new))
         out.print(Text(text, "green" if new.assemblies and new.complete else "yellow"))
     for words in (*_incomplete(old, "old"), *_incomplete(new, "new")):
-        out.print(Text("✗ ", "bold red").append(show.plain(spoken(words)), ""))
+        out.print(Text("✗ ", "bold red").append(plain(spoken(words)), ""))
 
 
 def _name(entry: BomEntry) -> str:

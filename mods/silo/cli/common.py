@@ -174,7 +174,7 @@ def add_each(parser: argparse.ArgumentParser, name: str, *alone: str, **how: Any
     parser.set_defaults(each=name, alone=alone)
 
 
-def options(parser: argparse._ActionsContainer, helps: Mapping[str, str]) -> None:
+def add_options(parser: argparse._ActionsContainer, helps: Mapping[str, str]) -> None:
     """Add options: ``--flag``, ``--option VALUE``, or ``--option VALUE...`` for one that may be repeated."""
     for spec, text in helps.items():
         option, _, value = spec.partition(" ")
@@ -375,21 +375,21 @@ def progress_of(command: str) -> Iterator[None]:
             _running.remove(progress)
 
 
-def at(step: str) -> None:
+def set_step(step: str) -> None:
     """Set the text for what the running command does now."""
     for progress in _running[-1:]:
         progress.step = step
 
 
-def sending(entry: Entry, done: int, total: int) -> None:
+def set_sending_step(entry: Entry, done: int, total: int) -> None:
     """Set that a file of the queue is being sent; both counts in bytes."""
-    at(f"sending {entry.label or entry.file_name}, {done * 100 // max(total, 1)} %")
+    set_step(f"sending {entry.label or entry.file_name}, {done * 100 // max(total, 1)} %")
 
 
 def count_steps(count: int) -> Callable[[str], None]:
     """Return a function that shows the next of ``count`` steps, by its name."""
     numbers = itertools.count(1)
-    return lambda name: at(f"[{next(numbers)}/{count}] {name}")
+    return lambda name: set_step(f"[{next(numbers)}/{count}] {name}")
 
 
 @contextmanager

@@ -28,8 +28,9 @@ from silo.bom.model import Extraction
 from silo.bom.report import base_of
 from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import Outcome, Status, activity_text, resolve, sync_tree
-from silo.cli import common, show
+from silo.cli.common import add_options, read_assembly
 from silo.cli.setup import need_server_extra
+from silo.cli.show import activity_box, bom_tree, console, diff_table, findings_text, outcome_text
 from silo.files import shipped
 from silo.platform import replace_patiently, scratch_folder
 from silo.registering.orders import proposals_for, register_all
@@ -51,7 +52,7 @@ DOCUMENT_XML = "Document.xml"
 
 def add_demo(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    common.options(parser, {"--keep": "leave the server running until Ctrl-C"})
+    add_options(parser, {"--keep": "leave the server running until Ctrl-C"})
     parser.add_argument("--port", type=int, default=0, help="port of the server (default: a free one)")
     parser.set_defaults(waits=True)
 
@@ -99,7 +100,7 @@ def _demo(folder: Path, port: int) -> Iterator[Demo]:
         SiloClient(server.base_url, server.token) as client,
         _merge_events(client) as events,
     ):
-        yield Demo(model / TOP, client, events, show.console(), getattr(server, "login_url", ""))
+        yield Demo(model / TOP, client, events, console(), getattr(server, "login_url", ""))
 
 
 @contextmanager
@@ -144,10 +145,10 @@ class Demo:
 
     def _read(self, title: str) -> Extraction:
         self.say(title)
-        extraction = common.read_assembly(str(self.top))
-        self.out.print(show.bom_tree(extraction))
+        extraction = read_assembly(str(self.top))
+        self.out.print(bom_tree(extraction))
         findings = (*extraction.findings, *consolidation_findings(extraction.entries))
-        self.out.print(show.findings_text(findings, base_of(extraction)))
+        self.out.print(findings_text(findings, base_of(extraction)))
         return extraction
 
     def _register(self, extraction: Extraction) -> None:
@@ -164,16 +165,16 @@ class Demo:
 
     def _sync(self, title: str) -> list[Outcome]:
         self.say(title)
-        whole = resolve(common.read_assembly(str(self.top)), self.client)
+        whole = resolve(read_assembly(str(self.top)), self.client)
         outcomes = list(
             sync_tree(whole, self.client, sync_id=lambda: str(uuid.uuid4()), describe=source_document)
         )
         for outcome in outcomes:
-            self.out.print(show.outcome_text(outcome, os.path.dirname(outcome.assembly.doc_path)))
+            self.out.print(outcome_text(outcome, os.path.dirname(outcome.assembly.doc_path)))
             if outcome.error is not None:
                 raise outcome.error
             if outcome.status is Status.MERGED and outcome.plan is not None:
-                self.out.print(show.diff_table(outcome.plan.diff, outcome.names))
+                self.out.print(diff_table(outcome.plan.diff, outcome.names))
         self._activity(outcomes, unregistered=len(whole.unresolved))
         return outcomes
 
@@ -196,13 +197,13 @@ class Demo:
                 resolve_url=self.client.web_url(event.resolve_url),
                 unregistered=unregistered if is_top else 0,
             )
-            self.out.print(show.activity_box(box))
+            self.out.print(activity_box(box))
 
     def _edit(self) -> None:
         self.say("Edit: the cover goes, four more bolts come, a person adds glue in Silo")
         remove_from_assembly(self.top, "Cover")
         before, after = set_element_count(self.top, "CoverBolts", added=4)
-        number = resolve(common.read_assembly(str(self.top)), self.client).assembly.part_number or ""
+        number = resolve(read_assembly(str(self.top)), self.client).assembly.part_number or ""
         glue = self.client.create_item("kindred-rd", "C01", "Thread locker", item_type="consumable")
         self.client.add_bom_line(number, glue.part_number, quantity=1)
         self.out.print("- Cover removed from the assembly")
@@ -210,7 +211,7 @@ class Demo:
         self.out.print(f"✎ {glue.part_number} Thread locker added to {number} by hand, on the server")
 
     def _finish(self) -> None:
-        number = resolve(common.read_assembly(str(self.top)), self.client).assembly.part_number or ""
+        number = resolve(read_assembly(str(self.top)), self.client).assembly.part_number or ""
         self.page = self.client.web_url(f"/items/{number}/bom")
         self.out.print()
         self.out.print(f"The page where a person decides: {self.page}", markup=False)

@@ -18,7 +18,16 @@ from typing import TYPE_CHECKING, Any
 
 from silo import spoken
 from silo.bom.errors import ConfigError, Exit, InputError, counted, listed
-from silo.cli import common
+from silo.cli.common import (
+    add_each,
+    add_options,
+    client_of,
+    job_count,
+    json_text,
+    only_with,
+    read_tops,
+    set_step,
+)
 
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry
@@ -35,19 +44,19 @@ if TYPE_CHECKING:
 def add_geometry_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for how files are read."""
     group = parser.add_argument_group("geometry")
-    common.options(group, {"--mesh-unit UNIT": "length unit of meshes that state none (mm, cm, m, in)"})
+    add_options(group, {"--mesh-unit UNIT": "length unit of meshes that state none (mm, cm, m, in)"})
     group.add_argument(
         "--timeout", type=float, default=600.0, metavar="S", help="give up reading after S seconds"
     )
     group.add_argument(
         "--jobs",
-        type=common.job_count,
+        type=job_count,
         dest="geometry_jobs",
         default=0,
         metavar="N",
         help="processes that read one large file or split assembly (default: the processors)",
     )
-    common.options(
+    add_options(
         group,
         {
             "--no-siblings": "do not look for the files of split assemblies",
@@ -58,7 +67,7 @@ def add_geometry_options(parser: argparse.ArgumentParser) -> None:
 def add_material_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for where densities come from."""
     group = parser.add_argument_group("materials")
-    common.options(
+    add_options(
         group,
         {
             "--materials FILE...": "your own densities (.csv or .toml)",
@@ -70,7 +79,7 @@ def add_material_options(parser: argparse.ArgumentParser) -> None:
 def add_bom_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for how the BOM is read if it is detected wrongly."""
     group = parser.add_argument_group("BOM")
-    common.options(
+    add_options(
         group,
         {
             "--bom BOM": "CSV, XLSX, XLS or ODS; names, masses or materials",
@@ -83,14 +92,14 @@ def add_bom_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--encoding", help="of the BOM, for example cp1252")
     group.add_argument("--delimiter", help="of the BOM, one character")
     group.add_argument("--decimal", choices=(".", ","), help="decimal mark of the BOM")
-    common.options(group, {"--mass-unit UNIT": "of masses without one (kg, g, lb, …)"})
-    common.only_with(parser, "--bom", "--column", "--encoding", "--delimiter", "--decimal", "--mass-unit")
+    add_options(group, {"--mass-unit UNIT": "of masses without one (kg, g, lb, …)"})
+    only_with(parser, "--bom", "--column", "--encoding", "--delimiter", "--decimal", "--mass-unit")
 
 
 def add_result_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for where results go, and when a warning is a failure."""
     group = parser.add_argument_group("results")
-    common.options(
+    add_options(
         group,
         {
             "--preview FILE...": (
@@ -100,20 +109,20 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
             "--allow CODE...": "with --strict: this warning is fine",
         },
     )
-    common.only_with(parser, "--strict", "--allow")
+    only_with(parser, "--strict", "--allow")
 
 
 def add_push_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for sending results to Silo."""
     group = parser.add_argument_group("back to Silo")
-    common.options(
+    add_options(
         group,
         {
             "--push": "write mass, volume and centre of mass into the items' properties",
             "--dry-run": "with --push: only show what would be written",
         },
     )
-    common.only_with(parser, "--push", "--dry-run", "--item", "--server", "--token")
+    only_with(parser, "--push", "--dry-run", "--item", "--server", "--token")
 
 
 def need_inertia_extra() -> None:
@@ -213,16 +222,16 @@ def read(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
 
     with _progress(Path(path).name) as progress:
         assembly = read_geometry(path, read_options(args, progress=progress, **more))
-    common.at("calculating")
+    set_step("calculating")
     return assembly
 
 
 @contextmanager
 def _progress(name: str) -> Iterator[Any]:
     if not sys.stderr.isatty():
-        yield lambda progress: common.at(f"{name}: {progress}")
+        yield lambda progress: set_step(f"{name}: {progress}")
         return
-    common.at("")  # the bar says it
+    set_step("")  # the bar says it
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -314,8 +323,8 @@ def push_report(
     if args.dry_run:
         _tell_plan(plan)
         return Exit.DONE
-    with common.client_of(args) as client:
-        common.at("writing masses")
+    with client_of(args) as client:
+        set_step("writing masses")
         done = push(client, plan)
     written = counted(len(done.written), "item")
     _say(f"Silo: {written} written, {len(done.unchanged)} had these numbers already.")
@@ -355,7 +364,7 @@ SNIPPETS = ("urdf", "sdf", "mjcf")
 
 
 def add_inertia(parser: argparse.ArgumentParser) -> None:
-    common.add_each(
+    add_each(
         parser,
         "assembly",
         "--report",
@@ -367,7 +376,7 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         help="a STEP, mesh or FCStd file",
     )
     group = parser.add_argument_group("links")
-    common.options(
+    add_options(
         group,
         {
             "--links MAP": "YAML map: link → instance path patterns (see docs/inertia.md)",
@@ -384,7 +393,7 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         help="frame of the numbers: the assembly's, each sub-assembly's own, or the URDF's link frames "
         "(default: urdf with --urdf, else assembly)",
     )
-    common.options(
+    add_options(
         group,
         {
             "--urdf FILE": "take names and frames of the links from this URDF, to fill it",
@@ -406,11 +415,11 @@ def add_inertia(parser: argparse.ArgumentParser) -> None:
         metavar="RHO",
         help="kg/m³ of parts that the BOM lacks (default: 1000)",
     )
-    common.options(parser, {"--density-from-step": "use densities in the file before the default one"})
+    add_options(parser, {"--density-from-step": "use densities in the file before the default one"})
     add_geometry_options(parser)
     add_result_options(parser)
     add_push_options(parser)
-    common.only_with(parser, "--urdf", "--urdf-out", "--in-place")
+    only_with(parser, "--urdf", "--urdf-out", "--in-place")
 
 
 def run_inertia(args: argparse.Namespace) -> int:
@@ -496,17 +505,15 @@ def _print_snippet(kind: str, report: InertiaReport) -> None:
 
 
 def add_links(parser: argparse.ArgumentParser) -> None:
-    common.add_each(
-        parser, "assembly", "--out", "--preview", metavar="ASSEMBLY", help="a STEP, mesh or FCStd file"
-    )
-    common.options(parser, {"--urdf FILE": "give parts to links by the names in this URDF"})
+    add_each(parser, "assembly", "--out", "--preview", metavar="ASSEMBLY", help="a STEP, mesh or FCStd file")
+    add_options(parser, {"--urdf FILE": "give parts to links by the names in this URDF"})
     parser.add_argument(
         "--clusters",
         type=int,
         metavar="N",
         help="make N links of parts that lie together, whatever their names",
     )
-    common.options(
+    add_options(
         parser,
         {
             "--preview FILE...": "write the links as a 3D scene (.glb), one colour each; may be repeated",
@@ -537,7 +544,7 @@ def run_links(args: argparse.Namespace) -> int:
     made = as_map(start, assembly)
     if args.json:
         patterns = {link.name: {"parts": list(link.patterns)} for link in made.links}
-        text = common.json_text({"links": patterns}, indent=2) + "\n"
+        text = json_text({"links": patterns}, indent=2) + "\n"
     else:
         text = as_yaml(start, assembly)
     if claim(assembly, made).members != start.members:
@@ -563,7 +570,7 @@ def run_links(args: argparse.Namespace) -> int:
 
 
 def add_mass(parser: argparse.ArgumentParser) -> None:
-    common.add_each(
+    add_each(
         parser, "top", "--report", "--preview", "--item", metavar="TOP.FCStd", help="the assembly's file"
     )
     add_bom_options(parser)
@@ -578,7 +585,7 @@ def add_mass(parser: argparse.ArgumentParser) -> None:
     add_result_options(parser)
     add_push_options(parser)
     # The index is asked only for part numbers.
-    common.only_with(parser, "--push", "--index")
+    only_with(parser, "--push", "--index")
 
 
 def run_mass(args: argparse.Namespace) -> int:
@@ -620,9 +627,9 @@ def _push(args: argparse.Namespace, report: InertiaReport) -> int:
     from silo.bom_sync import resolve
     from silo.inertia.geometry.freecad import product_key
 
-    extraction = common.read_tops(args)[0]
+    extraction = read_tops(args)[0]
     base = base_of(extraction)
-    with common.client_of(args) as client:
+    with client_of(args) as client:
         resolved = resolve(extraction, client)
     numbers = {
         product_key(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from silo import spoken
 from silo.bom.errors import Exit, UnreachableError, counted, exit_of
 from silo.bom_sync import draft_text
-from silo.cli import common
+from silo.cli.common import add_options, client_of, print_json, reach, set_sending_step, set_step
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -33,7 +33,7 @@ def add_commit(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
     _add(parser)
     parser.add_argument("-m", "--comment", metavar="TEXT", help="what changed")
-    common.options(
+    add_options(
         parser,
         {
             "--on-top": "send files that a colleague has committed since, on top of the colleague's",
@@ -47,11 +47,11 @@ def run_status(args: argparse.Namespace) -> int:
     from silo.vault.project import find_project, stand
 
     project = find_project(args.tops, args.root)
-    with common.client_of(args) as client:
-        common.reach(client)
+    with client_of(args) as client:
+        reach(client)
         belonging, standings = stand(args.tops, project, client, Store())
     if args.json:
-        common.print_json(_status_json(belonging, standings))
+        print_json(_status_json(belonging, standings))
     else:
         _show(belonging, standings)
     fine = all(standing.state.name == "SAME" for standing in standings)
@@ -79,9 +79,9 @@ def run_commit(args: argparse.Namespace) -> int:
     belonging = read_project(args.tops, find_project(args.tops, args.root))
     store = Store()
     away: UnreachableError | None = None
-    with common.client_of(args) as client:
+    with client_of(args) as client:
         try:
-            common.reach(client)
+            reach(client)
         except UnreachableError as error:
             away = error
         there = None if away else client
@@ -102,7 +102,7 @@ def run_commit(args: argparse.Namespace) -> int:
         report = (
             Report(stopped_by=away)
             if away
-            else send_all(store, client, force=True, on_progress=common.sending)
+            else send_all(store, client, force=True, on_progress=set_sending_step)
         )
         models, undrawn = (0, []) if report.stopped_by else _send_models(belonging, client)
     left = [entry for entry in store.entries() if entry.key in mine]
@@ -113,7 +113,7 @@ def run_commit(args: argparse.Namespace) -> int:
     if args.json:
         waiting = [{"path": entry.label, "reason": entry.reason} for entry in left]
         result = {"sent": sent, "waiting": waiting, "models": models, "undrawn": undrawn}
-        common.print_json({**_status_json(belonging, standings), **result})
+        print_json({**_status_json(belonging, standings), **result})
     else:
         _show_sent(report, sent, left, behind)
         _show_models(models, undrawn)
@@ -131,18 +131,18 @@ def _send_models(belonging: Belonging, client: SiloClient) -> tuple[int, list[st
         missing = 'Silo gets no models, sizes or masses of these files: pip install "silo-mod[inertia]"'
         return 0, [missing]
     files = [(Path(file.path), file.sha256) for file in belonging.files]
-    return send_models(client, files, at=common.at)
+    return send_models(client, files, at=set_step)
 
 
 def _show_models(models: int, undrawn: list[str]) -> None:
     from rich.text import Text
 
-    from silo.cli import show
+    from silo.cli.show import console, plain
 
     if models:
-        show.console().print(Text(spoken(f"Silo can show {counted(models, 'more file')} in 3D"), "dim"))
+        console().print(Text(spoken(f"Silo can show {counted(models, 'more file')} in 3D"), "dim"))
     for problem in undrawn:
-        show.console().print(Text(show.plain(spoken(f"! {problem}. The commit stands")), "yellow"))
+        console().print(Text(plain(spoken(f"! {problem}. The commit stands")), "yellow"))
 
 
 def _unsound(belonging: Belonging) -> bool:
@@ -199,15 +199,15 @@ _MARKS = {
 def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
     from rich.text import Text
 
-    from silo.cli import show
+    from silo.cli.show import console, plain
 
-    out = show.console()
-    out.print(Text(show.plain(spoken(f"Project {belonging.project.root}")), "bold"))
+    out = console()
+    out.print(Text(plain(spoken(f"Project {belonging.project.root}")), "bold"))
     for standing in standings:
         mark, style = _MARKS[standing.state.name]
         line = (
             Text(f"{mark} ", style)
-            .append(show.plain(standing.file.place))
+            .append(plain(standing.file.place))
             .append(f"  {spoken(standing.state.value)}", style)
         )
         if standing.newest is not None:
@@ -217,10 +217,10 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
             held = f"{count} items in it" if count else "a file without a part number"
             line.append(f"  {spoken(held)}", "dim")
         if standing.file.moved_from:
-            line.append(show.plain(spoken(f"  was {standing.file.moved_from}")), "cyan")
+            line.append(plain(spoken(f"  was {standing.file.moved_from}")), "cyan")
         out.print(line)
         if standing.file.problem:
-            out.print(Text(show.plain(spoken(f"  {standing.file.problem}")), "yellow"))
+            out.print(Text(plain(spoken(f"  {standing.file.problem}")), "yellow"))
     notes = [
         *(
             (f"{place}: its link {link} leads out of the project, and is not sent")
@@ -235,7 +235,7 @@ def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
         ),
     ]
     for note in notes:
-        out.print(Text(show.plain(spoken(f"! {note}")), "yellow"))
+        out.print(Text(plain(spoken(f"! {note}")), "yellow"))
 
 
 def _show_sent(
@@ -243,28 +243,28 @@ def _show_sent(
 ) -> None:
     from rich.text import Text
 
-    from silo.cli import show
+    from silo.cli.show import console, plain
 
-    out = show.console()
+    out = console()
     for row in sent:
         revision = f"revision {row['revision']}" if row["revision"] else ""
         bom = f"BOM {row['bom'].replace('_', ' ')}" if row["bom"] else ""
         text = ", ".join(filter(None, (row["part_number"], revision, bom, row["remark"])))
-        out.print(Text("✓ ", "green").append(show.plain(f"{row['path']}  {spoken(text)}")))
+        out.print(Text("✓ ", "green").append(plain(f"{row['path']}  {spoken(text)}")))
     for entry in left:
         text = spoken(f"{entry.label} waits in the queue: {entry.reason}")
-        out.print(Text("✗ ", "red").append(show.plain(text)))
+        out.print(Text("✗ ", "red").append(plain(text)))
     for late in behind:
         advice = {
             "NEWER": "was not sent: silo-mod pull fetches the newer file",
             "BOTH": "was not sent: look at the newer file (silo-mod log); --on-top sends yours on top of it",
             "NO_ITEM": "was not sent: is this the right server? Else take the identity out and register it",
         }[late.state.name]
-        out.print(Text("✗ ", "red").append(show.plain(f"{late.file.place} {spoken(advice)}")))
+        out.print(Text("✗ ", "red").append(plain(f"{late.file.place} {spoken(advice)}")))
     if report.busy:
         out.print("Another program sends the queue now; what waits goes with it", style="yellow")
     if report.stopped_by is not None:
         text = f"Stopped: {report.stopped_by}. Run it again to send the rest"
-        out.print(show.plain(text), style="red", markup=False)
+        out.print(plain(text), style="red", markup=False)
     if not (sent or left or behind):
         out.print("Nothing to send: Silo has all of it")

@@ -27,7 +27,17 @@ from silo.bom.errors import ConflictError, DocumentError, Exit, InputError, Silo
 from silo.bom.model import Extraction, walk_entries
 from silo.bom.report import base_of
 from silo.bom.resolve import Proposal, propose
-from silo.cli import common
+from silo.cli.common import (
+    add_options,
+    add_top,
+    client_of,
+    not_with,
+    only_with,
+    plan_of,
+    print_json,
+    read_tops,
+    set_step,
+)
 from silo.cli.show import plain
 from silo.files import check_writable
 from silo.freecads import open_in_any
@@ -79,7 +89,7 @@ def read_line(prompt: str) -> str | None:
     """Ask a person for a line; None at the end of the input. Asks on stderr, since standard output may be
     JSON.
     """
-    common.at("")
+    set_step("")
     print(prompt, end="", file=sys.stderr, flush=True)
     try:
         return input()
@@ -213,9 +223,9 @@ def _say(text: str) -> None:
 
 def add_register(parser: argparse.ArgumentParser) -> None:
     """Add the command."""
-    common.add_top(parser, "--plan", "--apply", "--declare", "--undeclare", "--not-a-part")
+    add_top(parser, "--plan", "--apply", "--declare", "--undeclare", "--not-a-part")
     how = parser.add_mutually_exclusive_group()
-    common.options(
+    add_options(
         how,
         {
             "--yes": "take every proposal without asking",
@@ -230,7 +240,7 @@ def add_register(parser: argparse.ArgumentParser) -> None:
         choices=("list", "archive"),
         help="the items of interrupted registrations, which no file names: list or archive them",
     )
-    common.options(
+    add_options(
         how,
         {
             "--plan FILE": "write the proposals as a table (CSV) to edit; no more",
@@ -251,7 +261,7 @@ def add_register(parser: argparse.ArgumentParser) -> None:
         help="an item may be that of a part: made by an interrupted run, or registered from this document "
         "before (which may be a copy now): ask (default), take it where only one fits, or make a new one",
     )
-    common.options(
+    add_options(
         parser,
         {
             "--declare OBJECT...": (
@@ -268,11 +278,11 @@ def add_register(parser: argparse.ArgumentParser) -> None:
         },
     )
     parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
-    common.only_with(parser, "--yes", "--duplicates")
-    common.only_with(parser, "--declare", "--apart")
-    common.not_with(parser, "--undeclare", "--declare", "--category", "--not-a-part")
-    common.not_with(parser, "--not-a-part", "--declare", "--category")
-    common.not_with(parser, "--apply", "--category")
+    only_with(parser, "--yes", "--duplicates")
+    only_with(parser, "--declare", "--apart")
+    not_with(parser, "--undeclare", "--declare", "--category", "--not-a-part")
+    not_with(parser, "--not-a-part", "--declare", "--category")
+    not_with(parser, "--apply", "--category")
 
 
 def run_register(args: argparse.Namespace) -> int:
@@ -300,7 +310,7 @@ def run_register(args: argparse.Namespace) -> int:
     rows = read_table(Path(args.apply).read_bytes(), args.apply) if args.apply else []
     extraction, unused, unread = _read(args)
     base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_of(extraction)
-    with common.client_of(args) as client:
+    with client_of(args) as client:
         schema = client.find_schema(args.schema)
         offer_made = _offer(extraction, client, schema, args)
         _tell_rules(offer_made.categories)
@@ -317,9 +327,9 @@ def run_register(args: argparse.Namespace) -> int:
 def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
     """Read the components, the files that no assembly uses, and if any file cannot be read."""
     if not os.path.isdir(args.top):
-        extraction = common.read_tops(args)[0]
+        extraction = read_tops(args)[0]
         return extraction, frozenset(), _tell_missing(extraction, base_of(extraction))
-    with common.plan_of(args) as (plan, reading, base):
+    with plan_of(args) as (plan, reading, base):
         for path, error in plan.errors.items():
             print(f"silo-mod: {relative(path, base)} is left out: {error}", file=sys.stderr)
         extraction, unused = whole_folder(plan, reading, base, hardware=not args.no_hardware)
@@ -382,7 +392,7 @@ class _Told:
         if fraction is None:
             print(f"silo-mod: {plain(detail)}", file=sys.stderr)
         elif fraction:
-            common.at(f"{detail}, {fraction:.0%}")
+            set_step(f"{detail}, {fraction:.0%}")
 
     def check(self) -> None:
         return
@@ -487,12 +497,12 @@ class _RegisterRun:
             if candidate.article is not None and not candidate.decided
         ]
         declared = {registration.proposal.entry.key for registration in self.done}
-        from silo.cli import show
+        from silo.cli.show import registrations
 
         contents = CandidateFiles()
         for candidate in self.found.candidates:
             contents.add(candidate)
-        show.registrations(
+        registrations(
             self.args,
             self.base,
             self.done,
@@ -511,7 +521,7 @@ def _declare(args: argparse.Namespace) -> int:
         if part.decided:
             what = "no part, as somebody said" if part.no_part else "a component already"
             raise InputError(f"{part.entry.label} is {what}; --undeclare takes that back")
-    with common.client_of(args) as client:
+    with client_of(args) as client:
         schema = client.find_schema(args.schema)
         categories = client.categories(schema)
         _tell_rules(categories)
@@ -546,7 +556,7 @@ def _undeclare(args: argparse.Namespace) -> int:
     names = [name for part in wanted for name in part.objects]
     taken = [name for name in names if unstamp(path, name, no_part=no_part)]
     if args.json:
-        common.print_json({"undeclared": taken})
+        print_json({"undeclared": taken})
     elif no_part:
         print(spoken(f"No part of any BOM: {', '.join(taken)} (SiloBomExclude)."))
     else:
@@ -559,7 +569,7 @@ def _orphans(args: argparse.Namespace) -> int:
     """List the items that no file names, or archive them; returns 1 if any are left."""
     journal, rows, done = Journal(), [], args.orphans == "archive"
     base = os.path.join(os.path.realpath(args.top), "")
-    with common.client_of(args) as client:
+    with client_of(args) as client:
         for record in journal.unfinished():
             if not os.path.join(record.component.rpartition("#")[0], "").startswith(base):
                 continue
@@ -571,7 +581,7 @@ def _orphans(args: argparse.Namespace) -> int:
                 journal.forget(record.component)
             rows.append({"part_number": item.part_number, "name": item.name, "component": record.component})
     if args.json:
-        common.print_json({"archived" if done else "orphans": rows})
+        print_json({"archived" if done else "orphans": rows})
     for row in rows if not args.json else ():
         print(*map(plain, (row["part_number"], row["name"], row["component"])), sep="  ")
     if rows and not done:
@@ -598,7 +608,7 @@ def _asker(how: str) -> Ask:
         print(f"{proposal.name}: is it one of these items? A copy of it is not.", file=sys.stderr)
         for number, item in enumerate(matches, start=1):
             print(f"  {number}  {item['part_number']}  {item.get('created_at') or ''}", file=sys.stderr)
-        common.at("")
+        set_step("")
         answer = input(spoken("which one is it? [number, n = make a new item] ")).strip()
         if answer.isdecimal() and 1 <= int(answer) <= len(matches):
             return matches[int(answer) - 1]

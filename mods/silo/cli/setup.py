@@ -36,7 +36,17 @@ from silo.bom.errors import (
     exit_of,
 )
 from silo.bom_sync import activity_text
-from silo.cli import common
+from silo.cli.common import (
+    a_path,
+    above_zero,
+    account_of,
+    add_options,
+    client_of,
+    json_text,
+    named_item,
+    not_with,
+    print_json,
+)
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -49,9 +59,9 @@ def add_serve(parser: argparse.ArgumentParser) -> None:
         "--host", default="127.0.0.1", help="address to listen on (default: this machine only)"
     )
     parser.add_argument("--port", type=int, default=8080, help="port; 0 takes a free one (default: 8080)")
-    common.options(parser, {"--database URL": "sqlite:///FILE or postgresql://…; default: your data folder"})
+    add_options(parser, {"--database URL": "sqlite:///FILE or postgresql://…; default: your data folder"})
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="server processes (PostgreSQL)")
-    common.options(parser, {"--reset-admin NAME": "make this user an active admin, and print a login link"})
+    add_options(parser, {"--reset-admin NAME": "make this user an active admin, and print a login link"})
     parser.set_defaults(waits=True)
 
 
@@ -84,13 +94,13 @@ def run_serve(args: argparse.Namespace) -> int:
 
 
 def add_backup(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("target", metavar="TARGET", type=common.a_path, help="a folder that is not there yet")
+    parser.add_argument("target", metavar="TARGET", type=a_path, help="a folder that is not there yet")
     _add_place(parser)
 
 
 def add_restore(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("source", metavar="SOURCE", type=common.a_path, help="the folder of a backup")
-    common.options(
+    parser.add_argument("source", metavar="SOURCE", type=a_path, help="the folder of a backup")
+    add_options(
         parser,
         {
             "--replace": "replace a database that has items; they are lost",
@@ -98,7 +108,7 @@ def add_restore(parser: argparse.ArgumentParser) -> None:
         },
     )
     _add_place(parser)
-    common.not_with(parser, "--verify", "--replace", "--database", "--files")
+    not_with(parser, "--verify", "--replace", "--database", "--files")
 
 
 def add_summaries(parser: argparse.ArgumentParser) -> None:
@@ -127,11 +137,11 @@ def run_summaries(args: argparse.Namespace) -> int:
 
 
 def _add_place(parser: argparse.ArgumentParser) -> None:
-    common.options(parser, {"--database URL": "sqlite:///FILE or postgresql://… (else SILO_DATABASE_URL)"})
+    add_options(parser, {"--database URL": "sqlite:///FILE or postgresql://… (else SILO_DATABASE_URL)"})
     parser.add_argument(
         "--files",
         metavar="FOLDER",
-        type=common.a_path,
+        type=a_path,
         help="folder of the files (else SILO_STORAGE_ROOT_DIR)",
     )
 
@@ -177,7 +187,7 @@ _CTRL_C_S = 0.5
 
 
 def add_watch(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--count", type=common.above_zero, metavar="N", help="end after N events")
+    parser.add_argument("--count", type=above_zero, metavar="N", help="end after N events")
     parser.set_defaults(ends_with_its_reader=True, waits=True)
 
 
@@ -186,11 +196,11 @@ def run_watch(args: argparse.Namespace) -> int:
     from silo.api.events import EventListener
 
     events: queue.Queue[ServerEvent | ConnectionState] = queue.Queue()
-    with common.client_of(args) as client:
+    with client_of(args) as client:
         with suppress(NotFoundError):  # a server that does not say who we are has answered anyway
             client.whoami()  # a wrong address or token is reported at once, not retried
         if args.item:
-            args.item = common.named_item(client, args.item).part_number
+            args.item = named_item(client, args.item).part_number
         mode = client.ready().mode
         print(f"[{client.base_url}: {mode}]", file=sys.stderr)
         listener = EventListener(client, on_event=events.put, on_state=events.put)
@@ -224,7 +234,7 @@ def _print_events(
         shown += 1
         if args.json:
             print(
-                common.json_text(
+                json_text(
                     {
                         "id": event.id,
                         "type": event.type,
@@ -240,14 +250,14 @@ def _print_events(
 
 
 def _show_event(client: SiloClient, event: ServerEvent) -> None:
-    from silo.cli import show
+    from silo.cli.show import activity_box, console, plain
 
-    out = show.console()
+    out = console()
     if event.merge is not None:
         url = client.web_url(event.merge.resolve_url) if event.merge.resolve_url else ""
-        out.print(show.activity_box(activity_text(event.merge.item, event.merge, resolve_url=url)))
+        out.print(activity_box(activity_text(event.merge.item, event.merge, resolve_url=url)))
         return
-    out.print(show.plain(f"{event.type}  {event.item or ''}"), markup=False)
+    out.print(plain(f"{event.type}  {event.item or ''}"), markup=False)
 
 
 LOGIN_SECONDS = 600
@@ -256,7 +266,7 @@ LOGIN_SECONDS = 600
 def add_login(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("url", metavar="URL", help="address of the Silo server")
     parser.add_argument("--token", help="API token (else the browser asks you, or standard input has it)")
-    common.options(
+    add_options(
         parser,
         {
             "--paste": "type the token at the terminal, without a browser",
@@ -276,13 +286,13 @@ def run_login(args: argparse.Namespace) -> int:
     where = resolve_server(args.url, token, args.ca, env={}, path=config_path())
     with SiloClient(where.url, where.token, verify=where.verify) as client:
         client.ready()
-        name, role = common.account_of(client)
+        name, role = account_of(client)
     path = save_config(where.url, where.token, where.verify)
     if (store := Store()).path.exists():
         store.resume(where.url, told=False)  # the pause of a wrong token
     if args.json:
         data = {"url": client.base_url, "username": name, "role": role, "configuration": str(path)}
-        common.print_json(data)
+        print_json(data)
     else:
         who = ", ".join(filter(None, (name, role))) or "this server does not say who you are"
         print(spoken(f"{client.base_url}: {who}. Kept in {path}, which only you can read."))
@@ -338,13 +348,13 @@ def run_doctor(args: argparse.Namespace) -> int:
     checks = {**_machine(), **_server(args)}
     failed = {name: value for name, value in checks.items() if isinstance(value, SiloError)}
     if args.json:
-        common.print_json({"ok": not failed, **{name: str(value) for name, value in checks.items()}})
+        print_json({"ok": not failed, **{name: str(value) for name, value in checks.items()}})
     else:
-        from silo.cli import show
+        from silo.cli.show import plain
 
         width = max(map(len, map(spoken, checks)))
         for name, value in checks.items():
-            text = f"{spoken(name):<{width}}  {show.plain(spoken(str(value)))}"
+            text = f"{spoken(name):<{width}}  {plain(spoken(str(value)))}"
             print(f"{'✗' if name in failed else ' '} {text}")
     return max((exit_of(error) for error in failed.values()), default=Exit.DONE)
 
@@ -436,7 +446,7 @@ def _server(args: argparse.Namespace) -> Rows:
 
     try:
         where = resolve_server(args.server, args.token)
-        with common.client_of(args) as client:
+        with client_of(args) as client:
             client.abilities = Abilities()  # looked at again, and kept for the other commands
             return {
                 "address": f"{client.base_url} (from {where.url_from})",
@@ -499,7 +509,7 @@ def _events(client: SiloClient) -> str:
 
 
 def add_install_addon(parser: argparse.ArgumentParser) -> None:
-    common.options(
+    add_options(
         parser,
         {
             "--freecadcmd PATH": "freecadcmd (default: found on the PATH)",
@@ -520,7 +530,7 @@ def run_install_addon(args: argparse.Namespace) -> int:
         "packages": str(install_packages(place)),
     }
     if args.json:
-        common.print_json(report)
+        print_json(report)
     else:
         text = f"{report['freecad']}\nAdd-on:   {report['addon']}\nPackages: {report['packages']}"
         print(spoken(f"{text}\nStart FreeCAD again, and choose the workbench Silo."))
@@ -536,9 +546,9 @@ def run_schema(args: argparse.Namespace) -> int:
     from silo.cli.shapes import NAMES, schema_of
 
     if args.name is not None:
-        common.print_json(schema_of(args.name))
+        print_json(schema_of(args.name))
     elif args.json:
-        common.print_json(NAMES)
+        print_json(NAMES)
     else:
         print("\n".join(NAMES))
     return Exit.DONE

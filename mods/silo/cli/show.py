@@ -23,7 +23,16 @@ from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.report import MOST_LINES, base_of, check_tree_size, diff_rows, shorten
 from silo.bom.resolve import display_name
-from silo.cli import common
+from silo.cli.common import (
+    above_zero,
+    account_of,
+    add_each,
+    add_options,
+    client_of,
+    named_item,
+    only_with,
+    print_json,
+)
 
 if TYPE_CHECKING:
     from silo.api.wire import OrderList, ProductSummary
@@ -301,7 +310,7 @@ def registrations(
 ) -> None:
     """Show each registration; ``left``: proposals that were not registered, and why."""
     if args.json:
-        common.print_json(
+        print_json(
             {
                 "registered": [proposal_json(r.proposal, base, r) for r in done if r.error is None],
                 "failed": [proposal_json(r.proposal, base, r) for r in done if r.error is not None],
@@ -342,17 +351,15 @@ def add_search(parser: argparse.ArgumentParser) -> None:
 
 
 def add_show(parser: argparse.ArgumentParser) -> None:
-    common.add_each(parser, "part_number", metavar="PART_NUMBER", help="the item")
+    add_each(parser, "part_number", metavar="PART_NUMBER", help="the item")
 
 
 def add_order(parser: argparse.ArgumentParser) -> None:
-    common.add_each(
+    add_each(
         parser, "part_number", "--revision", "--csv", "--xlsx", metavar="PRODUCT", help="its part number"
     )
-    parser.add_argument(
-        "--quantity", metavar="N", type=common.above_zero, default=1, help="for so many pieces (1)"
-    )
-    common.options(
+    parser.add_argument("--quantity", metavar="N", type=above_zero, default=1, help="for so many pieces (1)")
+    add_options(
         parser,
         {
             "--revision REVISION": "of a released revision, such as B (else of the draft)",
@@ -365,7 +372,7 @@ def add_order(parser: argparse.ArgumentParser) -> None:
     )
     kinds = ("bought", "made", "unsaid")
     parser.add_argument("--kind", choices=kinds, default="bought", help="only these parts (bought)")
-    common.only_with(parser, "--csv --xlsx", "--kind", "--supplier")
+    only_with(parser, "--csv --xlsx", "--kind", "--supplier")
 
 
 def add_completion(parser: argparse.ArgumentParser) -> None:
@@ -374,11 +381,11 @@ def add_completion(parser: argparse.ArgumentParser) -> None:
 
 def run_search(args: argparse.Namespace) -> int:
     """Print the items; 1 if there is none."""
-    with common.client_of(args) as client:
+    with client_of(args) as client:
         items = client.search_items(" ".join(args.words), limit=args.limit)
     rows = [{name: getattr(item, name) for name in ("part_number", "name", "item_type")} for item in items]
     if args.json:
-        common.print_json(rows)
+        print_json(rows)
     else:
         _print(rows or [{"part_number": spoken("No item has these words.")}])
     return Exit.DONE if rows else Exit.UNDONE
@@ -386,8 +393,8 @@ def run_search(args: argparse.Namespace) -> int:
 
 def run_show(args: argparse.Namespace) -> int:
     """Print the item and its lines."""
-    with common.client_of(args) as client:
-        item = common.named_item(client, args.part_number)
+    with client_of(args) as client:
+        item = named_item(client, args.part_number)
         lines = client.get_bom(item.part_number)
         page = client.web_url(f"/items/{item.part_number}")
     head = {name: getattr(item, name) for name in ("part_number", "name", "item_type", "current_revision")}
@@ -401,7 +408,7 @@ def run_show(args: argparse.Namespace) -> int:
         for line in lines
     ]
     if args.json:
-        common.print_json({**head, "page": page, "bom": rows})
+        print_json({**head, "page": page, "bom": rows})
         return Exit.DONE
     _print([{**head, "current_revision": spoken(f"revision {item.current_revision}")}])
     _print(rows)
@@ -418,8 +425,8 @@ def run_order(args: argparse.Namespace) -> int:
     given = {name: str(value) for name, value in asked.items() if value}
     table = {"kind": args.kind} | ({"supplier": args.supplier} if args.supplier else {})
     check_writable(*(path for path in (args.csv, args.xlsx) if path and path != "-"))
-    with common.client_of(args) as client:
-        number = common.named_item(client, args.part_number).part_number
+    with client_of(args) as client:
+        number = named_item(client, args.part_number).part_number
         for end, path in (("csv", args.csv), ("xlsx", args.xlsx)):
             data = client.get_order_table(number, end, **given, **table) if path else b""
             if end == "csv" and path == "-":
@@ -428,7 +435,7 @@ def run_order(args: argparse.Namespace) -> int:
                 with replacing(Path(path)) as file:
                     file.write(data)
         if args.json:
-            common.print_json(client.get_order(number, **given).model_dump(mode="json"))
+            print_json(client.get_order(number, **given).model_dump(mode="json"))
         elif args.csv != "-":
             _print_order(client.get_order(number, **given))
     return Exit.DONE
@@ -470,11 +477,11 @@ def run_whoami(args: argparse.Namespace) -> int:
     from silo.api.config import resolve_server
 
     where = resolve_server(args.server, args.token)
-    with common.client_of(args) as client:
-        name, role = common.account_of(client)
+    with client_of(args) as client:
+        name, role = account_of(client)
         account = {"url": client.base_url, "from": where.url_from, "username": name, "role": role}
     if args.json:
-        common.print_json(account)
+        print_json(account)
     else:
         who = ", ".join(filter(None, (name, role)))
         text = f"{account['url']} (from {account['from']}): {who or 'this server does not say who you are'}"
@@ -493,7 +500,7 @@ def run_logout(args: argparse.Namespace) -> int:
         checked_config(path)  # what is not ours stays
         remove_patiently(path)
     if args.json:
-        common.print_json({"configuration": str(path), "removed": there})
+        print_json({"configuration": str(path), "removed": there})
     else:
         print(spoken(f"{path} is removed." if there else f"There was no {path}; nothing is remembered."))
         if os.environ.get("SILO_API_TOKEN"):

@@ -22,7 +22,22 @@ from typing import TYPE_CHECKING, Any
 from silo import spoken
 from silo.batch import SyncOptions, TopResult
 from silo.bom.errors import ConfigError, Exit, InputError, SiloError, counted, exit_of
-from silo.cli import common
+from silo.cli.common import (
+    EACH,
+    above_zero,
+    add_each,
+    add_options,
+    client_of,
+    count_steps,
+    named_item,
+    only_with,
+    print_json,
+    reach,
+    reading_of,
+    refuse_assembly_of,
+    set_sending_step,
+    set_step,
+)
 from silo.files import check_writable, documents_in
 from silo.outbox.store import KEPT_ASIDE_DAYS
 
@@ -49,7 +64,7 @@ def run_sync(args: argparse.Namespace) -> int:
     from silo.batch import ReportFile, RunSummary
     from silo.vault.plan import only_job
 
-    common.refuse_assembly_of(args.tops, args.assembly)
+    refuse_assembly_of(args.tops, args.assembly)
     tops = documents_in(args.tops)
     if not tops:
         raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")
@@ -67,7 +82,7 @@ def run_sync(args: argparse.Namespace) -> int:
     with ExitStack() as stack:
         for folder in {os.path.realpath(folder): folder for folder in folders}.values():
             summary.notes += filter(None, [stack.enter_context(only_job(folder))])
-        client = stack.enter_context(common.client_of(args, NIGHT, stop=stop))
+        client = stack.enter_context(client_of(args, NIGHT, stop=stop))
         reports = [ReportFile(path) for path in args.report]
         shown = _Shown(args, many=len(tops) > 1)
         ended = None
@@ -98,27 +113,27 @@ def _results(
     from silo.vault.plan import SyncJob, make_plan
 
     begin = time.monotonic()
-    with common.reading_of(args) as reading:
+    with reading_of(args) as reading:
         if summary.base:
             reading.index.expect(summary.base)
         plan = make_plan(
             tops,
             reading,
-            assembly=None if args.assembly == common.EACH else args.assembly,
-            each=options.skip_parts or args.assembly == common.EACH,
+            assembly=None if args.assembly == EACH else args.assembly,
+            each=options.skip_parts or args.assembly == EACH,
             hardware=not args.no_hardware,
             recursive=options.recursive,
             skip_parts=options.skip_parts,
-            progress=common.count_steps(len(tops)),
+            progress=count_steps(len(tops)),
         )
         summary.parts, summary.files, summary.fine = plan.parts, plan.parts, plan.parts
         reading.index.save()
         summary.seconds["reading"] = time.monotonic() - begin
         if not plan.uuids and plan.nodes:
-            common.reach(client)
+            reach(client)
         begin = time.monotonic()
-        common.at("asking the server")
-        progress = common.count_steps(len({node.top for node in plan.nodes.values()}))
+        set_step("asking the server")
+        progress = count_steps(len({node.top for node in plan.nodes.values()}))
         for result in SyncJob(plan, reading, client, options, summary.base, stop).results():
             progress(result.top)
             yield result
@@ -165,36 +180,36 @@ def _show(result: TopResult, *, whole: bool) -> None:
     """
     from silo.batch import is_news
     from silo.bom_sync import Status
-    from silo.cli import show
+    from silo.cli.show import console, diff_table, findings_text, outcome_text, plain
 
-    out = show.console()
+    out = console()
     if result.error is not None:
         words = str(result.error)
         where = "" if os.path.basename(result.top) in words else f"{result.top}: "
-        out.print(f"✗ {show.plain(where + words)}", style="red", markup=False)
+        out.print(f"✗ {plain(where + words)}", style="red", markup=False)
         return
     for outcome in result.outcomes:
         if not whole and not is_news(outcome):
             continue
-        out.print(show.outcome_text(outcome, result.base))
+        out.print(outcome_text(outcome, result.base))
         if outcome.plan is not None and outcome.status in (Status.MERGED, Status.DRY_RUN):
-            out.print(show.diff_table(outcome.plan.diff, outcome.names))
+            out.print(diff_table(outcome.plan.diff, outcome.names))
     if whole and result.findings:
-        out.print(show.findings_text(result.findings, result.base))
+        out.print(findings_text(result.findings, result.base))
 
 
 def _show_summary(summary: RunSummary) -> None:
-    from silo.cli import show
+    from silo.cli.show import console, plain
 
-    out = show.console()
-    out.print(f"\n{show.plain(summary.sentence())}", markup=False)
+    out = console()
+    out.print(f"\n{plain(summary.sentence())}", markup=False)
     for title, lines in summary.sections():
         if lines:
             out.print(f"\n{title}", style=_STYLES.get(title, ""))
         for line, more in lines:
-            out.print(f"  {show.plain(line)}", markup=False)
+            out.print(f"  {plain(line)}", markup=False)
             for text in more:
-                out.print(f"    {show.plain(text)}", markup=False)
+                out.print(f"    {plain(text)}", markup=False)
 
 
 _STYLES = {"New since the last run": "bold", "Moved": "cyan", "Warnings": "yellow", "Errors": "bold red"}
@@ -229,11 +244,11 @@ def _revision(text: str) -> int | str:
         return text
     if not text.isdigit():
         raise argparse.ArgumentTypeError(f"{text[:50]!r} is neither a number above 0 nor a label such as B")
-    return common.above_zero(text)
+    return above_zero(text)
 
 
 def add_pull(parser: argparse.ArgumentParser) -> None:
-    common.add_each(parser, "part_number", "--revision", metavar="PART_NUMBER", help="the item")
+    add_each(parser, "part_number", "--revision", metavar="PART_NUMBER", help="the item")
     parser.add_argument(
         "--revision",
         metavar="REVISION",
@@ -241,13 +256,13 @@ def add_pull(parser: argparse.ArgumentParser) -> None:
         help="the number of a revision of the file, with the linked files as they were then; or the label of "
         "a released revision, such as B, with all files as they were frozen; else the newest of all",
     )
-    common.options(
+    add_options(
         parser, {"--replace": "replace files with edits that are not in Silo; a copy of each is kept"}
     )
 
 
 def add_log(parser: argparse.ArgumentParser) -> None:
-    common.add_each(
+    add_each(
         parser,
         "file",
         metavar="FILE",
@@ -258,9 +273,9 @@ def add_log(parser: argparse.ArgumentParser) -> None:
         "a revision of the item such as r3, or a frozen revision such as A",
         "--until POINT": "up to then (now)",
     }
-    common.options(parser, points)
-    common.only_with(parser, "--since", "--until")
-    common.options(parser, {"--changes": "what each revision changed in the BOM"})
+    add_options(parser, points)
+    only_with(parser, "--since", "--until")
+    add_options(parser, {"--changes": "what each revision changed in the BOM"})
 
 
 def add_queue(parser: argparse.ArgumentParser) -> None:
@@ -273,9 +288,9 @@ def add_queue(parser: argparse.ArgumentParser) -> None:
         "discard: forget commits, the documents stay; save: write the files of commits",
     )
     parser.add_argument(
-        "numbers", metavar="NUMBER", nargs="*", type=common.above_zero, help="commits, as list shows them"
+        "numbers", metavar="NUMBER", nargs="*", type=above_zero, help="commits, as list shows them"
     )
-    common.options(parser, {"--here": "retry: send them to the server in use instead"})
+    add_options(parser, {"--here": "retry: send them to the server in use instead"})
 
 
 def run_queue(args: argparse.Namespace) -> int:
@@ -321,8 +336,8 @@ def _retry(args: argparse.Namespace, store: Store, here: str) -> SiloError | Non
 
     for number in args.numbers:
         store.retry(number, here if args.here else None)
-    with common.client_of(args) as client:
-        report = send_all(store, client, force=True, on_progress=common.sending)
+    with client_of(args) as client:
+        report = send_all(store, client, force=True, on_progress=set_sending_step)
     for sent in report.sent:
         print(f"{sent.part_number} {sent.entry.label or sent.entry.file_name} is in Silo", file=sys.stderr)
     if report.busy:
@@ -335,7 +350,7 @@ def _show_queue(
 ) -> None:
     from rich.text import Text
 
-    from silo.cli import show
+    from silo.cli.show import console, plain, table_of
     from silo.outbox.entry import parts, pause_text, words
 
     queue_rows = [(pending, words(pending, here, is_paused=pause is not None)) for pending in left]
@@ -356,19 +371,19 @@ def _show_queue(
             }
             for pending, said in queue_rows
         ]
-        common.print_json({"pause": notice or None, "commits": rows})
+        print_json({"pause": notice or None, "commits": rows})
         return
-    out = show.console()
+    out = console()
     if notice:
-        out.print(show.plain(notice), style="yellow", markup=False)
+        out.print(plain(notice), style="yellow", markup=False)
     if not left:
         out.print("Nothing waits: every commit of this computer is in Silo.", markup=False)
         return
-    table = show.table_of("", "Commit", "What", "Since", "State", "Why")
+    table = table_of("", "Commit", "What", "Since", "State", "Why")
     for entry, said in queue_rows:
         name = " ".join(filter(None, (entry.part_number, entry.label or entry.file_name)))
         since = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.taken_at))
-        cells = (str(entry.id), show.plain(name), parts(entry), since, said.state, show.plain(said.reason))
+        cells = (str(entry.id), plain(name), parts(entry), since, said.state, plain(said.reason))
         table.add_row(*map(Text, map(spoken, cells)), style="bold" if said.urgent else "")
     out.print(table)
 
@@ -381,20 +396,20 @@ def run_pull(args: argparse.Namespace) -> int:
 
     store, into = Store(), Path(args.into)
     opened = open_in_any()
-    with common.client_of(args) as client:
+    with client_of(args) as client:
         rules = Rules(
             overwrite=args.replace,
             keep=store.keep_aside,
             is_open=lambda path: not args.even_if_open and opened.has_file(path),
             learn=lambda sha256, item, number: store.learn(client.base_url, sha256, item, number),
         )
-        number = common.named_item(client, args.part_number).part_number
-        progress = lambda name, count: common.at(f"fetching {name}, {counted(count, 'file')} so far")  # noqa: E731
+        number = named_item(client, args.part_number).part_number
+        progress = lambda name, count: set_step(f"fetching {name}, {counted(count, 'file')} so far")  # noqa: E731
         with fetched(client, number, args.revision, progress=progress) as tree:
             into.mkdir(parents=True, exist_ok=True)
             pulled = place(tree, into, rules)
     if args.json:
-        common.print_json(pulled_json(pulled, Path(os.path.realpath(into))))
+        print_json(pulled_json(pulled, Path(os.path.realpath(into))))
     else:
         _show_pulled(pulled, into)
     return Exit.DONE if pulled.complete else Exit.UNDONE
@@ -413,20 +428,20 @@ _MARKS = {
 def _show_pulled(pulled: Pulled, into: Path) -> None:
     from rich.text import Text
 
-    from silo.cli import show
+    from silo.cli.show import console, plain
 
-    out = show.console()
+    out = console()
     for file in pulled.files:
         mark, style, words = _MARKS[file.state.value]
-        text = Text(f"{mark} ", style).append(show.plain(os.path.relpath(file.path, os.path.realpath(into))))
+        text = Text(f"{mark} ", style).append(plain(os.path.relpath(file.path, os.path.realpath(into))))
         text.append(spoken(f"  {file.part_number}, revision {file.revision}"), "dim")
         if words:
             text.append(f"  {spoken(words)}{f' {file.kept}' if file.kept else ''}", style)
         out.print(text)
     for lost in pulled.lost:
         line = f"{lost.position}: {lost.path} was not fetched: {lost.reason}"
-        out.print(Text("✗ ", "bold red").append(show.plain(spoken(line)), ""))
-    out.print(Text(show.plain(spoken(f"Open {pulled.top}")), "bold"))
+        out.print(Text("✗ ", "bold red").append(plain(spoken(line)), ""))
+    out.print(Text(plain(spoken(f"Open {pulled.top}")), "bold"))
 
 
 def run_log(args: argparse.Namespace) -> int:
@@ -437,7 +452,7 @@ def run_log(args: argparse.Namespace) -> int:
 
     path = os.path.realpath(args.file)
     if args.since:
-        with common.client_of(args) as client:
+        with client_of(args) as client:
             number = args.file
             if os.path.isfile(path):
                 number = _item_of(client, args.file, _identity(args.file, path)).part_number
@@ -446,7 +461,7 @@ def run_log(args: argparse.Namespace) -> int:
     if not os.path.isfile(path):
         raise InputError(f"{args.file} is not a file. Give the path of an FCStd file.")
     identity = _identity(args.file, path)
-    with common.client_of(args) as client:
+    with client_of(args) as client:
         item = _item_of(client, args.file, identity)
         revisions = client.revisions(item.part_number)
         shown = revisions[: args.limit]
@@ -456,7 +471,7 @@ def run_log(args: argparse.Namespace) -> int:
             files = file_revisions(revisions)
             with RevisionBoms(client, item.part_number, path) as boms:
                 for number, revision in enumerate(files):
-                    common.at(f"revision {revision.revision_number}")
+                    set_step(f"revision {revision.revision_number}")
                     if revision.revision_number < shown[-1].revision_number:
                         break
                     older = files[number + 1].revision_number if number + 1 < len(files) else None
@@ -467,7 +482,7 @@ def run_log(args: argparse.Namespace) -> int:
                     except SiloError as error:
                         changes[revision.revision_number] = f"cannot be read: {error}"
     if args.json:
-        common.print_json(_log_json(item.part_number, shown, here, changes, args.changes))
+        print_json(_log_json(item.part_number, shown, here, changes, args.changes))
     else:
         _show_log(item.part_number, item.name, shown, here, changes, len(revisions))
     return Exit.DONE
@@ -494,20 +509,20 @@ def _item_of(client: SiloClient, name: str, identity: str) -> Item:
 
 def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
     if args.json:
-        common.print_json(changes.model_dump(mode="json"))
+        print_json(changes.model_dump(mode="json"))
         return
     from rich.text import Text
 
-    from silo.cli import show
+    from silo.cli.show import console, plain, table_of
 
-    out = show.console()
+    out = console()
     first, last = (when.strftime("%Y-%m-%d %H:%M") if when else "" for when in (changes.since, changes.to))
     head = f"{changes.part_number}: what changed from {first} to {last} (UTC)"
     if not changes.changes:
-        out.print(f"{show.plain(head)}: nothing on any level", markup=False)
+        out.print(f"{plain(head)}: nothing on any level", markup=False)
         return
-    out.print(Text(show.plain(spoken(head)), "bold"))
-    table = show.table_of("", "Part number", "Name", "In", "Before", "After", "By")
+    out.print(Text(plain(spoken(head)), "bold"))
+    table = table_of("", "Part number", "Name", "In", "Before", "After", "By")
     styles = {"added": "green", "removed": "red"}
     for change in changes.changes:
         when = f", {change.at:%Y-%m-%d %H:%M}" if change.at else ""
@@ -520,7 +535,7 @@ def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
             change.username + when,
         )
         what = Text(spoken(change.what), styles.get(change.what, "yellow"))
-        table.add_row(what, *(Text(show.plain(cell)) for cell in cells))
+        table.add_row(what, *(Text(plain(cell)) for cell in cells))
     out.print(table)
 
 
@@ -570,23 +585,23 @@ def _show_log(
 ) -> None:
     from rich.text import Text
 
-    from silo.cli import show
+    from silo.cli.show import console, plain
 
-    out = show.console()
-    out.print(Text(show.plain(f"{number}  {name}"), "bold"))
+    out = console()
+    out.print(Text(plain(f"{number}  {name}"), "bold"))
     if here[0] is None:
         out.print("This file is no revision in Silo, and it is not known which one it was made from.")
     for revision in shown:
         stamp = revision.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if revision.created_at else ""
         text = Text(f"{revision.revision_number:>4}  ", "cyan")
-        text.append(f"{stamp}  {show.plain(revision.created_by or '')}  ", "dim")
-        text.append(show.plain(revision.comment) or spoken("(no comment)"))
+        text.append(f"{stamp}  {plain(revision.created_by or '')}  ", "dim")
+        text.append(plain(revision.comment) or spoken("(no comment)"))
         if not (revision.file_name or revision.file_checksum):
             text.append(spoken("  properties only"), "dim")
         if revision.revision_number == here[0]:
             text.append(spoken("  ← this file, edited since" if here[1] else "  ← this file"), "green")
         out.print(text)
         if said := changes.get(revision.revision_number):
-            out.print(Text(f"      {show.plain(spoken(said))}", "yellow"))
+            out.print(Text(f"      {plain(spoken(said))}", "yellow"))
     if total > len(shown):
         out.print(Text(spoken(f"… and {total - len(shown)} older; --limit shows more"), "dim"))

@@ -20,7 +20,7 @@ from bodies import box, cylinder, placement, shape_only
 from rich.console import Console
 
 from silo.bom.errors import InputError
-from silo.cli import show
+from silo.cli.show import console
 from silo.inertia.links import ASSEMBLY_FRAME, link_map, origin_frame
 from silo.inertia.model import MassProps, combine
 from silo.inertia.output import (
@@ -343,7 +343,7 @@ def test_a_pipe_gets_every_part_each_on_one_line(assemble: Fixture, compute: Fix
     names = [f"{number}: {'a bracket of the left hand side, ' * 5}" for number in range(MAX_PART_ROWS + 5)]
     report = compute(assemble(*((f"l/{name}", box(name, 0.1, 0.1, 0.1)) for name in names)), None)
     pipe = io.StringIO()
-    show.console(pipe).print(report_tables(report, whole=True))
+    console(pipe).print(report_tables(report, whole=True))
     lines = pipe.getvalue().splitlines()
     assert [sum(f" {name.strip()} " in line and "│" in line for line in lines) for name in names] == [
         1
