@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from silo.outbox.send import Sent
     from silo.workbench.commit.flow import CommitFlow
     from silo.workbench.commit.opened import Opened
-    from silo.workbench.freecad.facts import CommitHook
+    from silo.workbench.freecad.hooks import CommitHook
     from silo.workbench.freecad.live_desk import LiveDesk, SiloGroup
     from silo.workbench.pane.activity import Action, Do
     from silo.workbench.preview.flow import PreviewFlow
@@ -311,7 +311,7 @@ class AddOn:
     def hook_commit(self, name: str) -> None:
         """Sync the BOM after this command, which is not ours."""
         if self._hook is None:
-            from silo.workbench.freecad.facts import CommitHook
+            from silo.workbench.freecad.hooks import CommitHook
 
             self._hook = CommitHook(
                 host,
@@ -324,7 +324,7 @@ class AddOn:
 
     def _find_foreign_commit(self) -> None:
         """Connect to the commands of the Kindred workbench that upload a revision."""
-        from silo.workbench.freecad.facts import FOREIGN
+        from silo.workbench.freecad.hooks import FOREIGN
         from silo.workbench.start import COMMIT, commands
 
         ours = commands(self)[COMMIT].text

@@ -9,7 +9,7 @@ import pytest
 from fakes import Doc, ForwardingLink, Obj
 
 from silo.bom.links import extract
-from silo.workbench.freecad.facts import CachedDocument, FactCache
+from silo.workbench.freecad.cached import CachedDocument, FactCache
 
 
 class Asked(Obj):

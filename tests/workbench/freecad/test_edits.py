@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from silo.workbench.freecad.facts import EditWatch, same
+from silo.workbench.freecad.edits import EditWatch, same
 
 
 @dataclass

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from silo.workbench.freecad.facts import CommitHook
+from silo.workbench.freecad.hooks import CommitHook
 
 
 class Signal:

@@ -155,7 +155,7 @@ class Pieces:
 
 
 def real(obj: Any) -> Any:
-    """Return FreeCAD's own object, also for a view of it (:mod:`silo.workbench.freecad.facts`)."""
+    """Return FreeCAD's own object, also for a view of it (:mod:`silo.workbench.freecad.cached`)."""
     return getattr(obj, "real", obj)
 
 

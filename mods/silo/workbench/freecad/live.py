@@ -36,7 +36,7 @@ from silo.bom.standard import STANDARD_PARTS
 from silo.bom.targets import is_assembly_link, is_link
 from silo.platform import Spelling, one_path
 from silo.workbench.freecad import host, saving
-from silo.workbench.freecad.facts import CachedDocument, FactCache
+from silo.workbench.freecad.cached import CachedDocument, FactCache
 
 # <XLink file="parts/b.FCStd" stamp="…" name="Box" …>, written by FreeCAD itself into memory just now.
 _XLINK = re.compile(r"<XLink\b([^>]*)>")

@@ -36,7 +36,7 @@ from silo.workbench.commit.flow import CommitAnswer, Look
 from silo.workbench.commit.opened import Opened
 from silo.workbench.commit.plan import CommitPlan, Snapshot, leaves_first
 from silo.workbench.freecad import host, live, saving
-from silo.workbench.freecad.facts import SHOWN_NUMBER, SHOWN_STATE
+from silo.workbench.freecad.edits import SHOWN_NUMBER, SHOWN_STATE
 from silo.workbench.gui import qt
 from silo.workbench.pane.activity import PaneEntry, Tone
 from silo.workbench.pane.entries import own_box

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.platform import stamp_of
 from silo.workbench.freecad import host
-from silo.workbench.freecad.facts import EditWatch
+from silo.workbench.freecad.edits import EditWatch
 
 if TYPE_CHECKING:
     from silo.fcstd.container import FcstdError
