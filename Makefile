@@ -32,7 +32,7 @@ help:
 	@echo "make test-other-disk  the tests on a disk that does not distinguish upper and lower case (Linux, FUSE)"
 	@echo "make docs   the site of the documentation, in build/site"
 	@echo "make release  build, try and list what would be published, in dist/; tags and publishes nothing"
-	@echo "make check  ruff, mypy, import directions, sizes, plain English"
+	@echo "make check  ruff, mypy, import directions, plain English"
 	@echo "make translations  bring the files for translators up to date (LANGUAGE=de begins one)"
 
 setup: $(DEV)
@@ -107,7 +107,6 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python scripts/sizes.py
 	$(BIN)/python scripts/english.py
 	$(BIN)/codespell
 

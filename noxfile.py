@@ -14,13 +14,12 @@ SPREAD = ("-n", "logical", "--maxprocesses", "8")
 
 @nox.session
 def check(session: nox.Session) -> None:
-    """ruff, mypy, import directions, sizes, plain English."""
+    """ruff, mypy, import directions, plain English."""
     session.install("--editable", ".[dev]")
     session.run("ruff", "check", ".")
     session.run("ruff", "format", "--check", ".")
     session.run("mypy")
     session.run("lint-imports")
-    session.run("python", "scripts/sizes.py")
     session.run("python", "scripts/english.py")
     session.run("codespell")
 
