@@ -256,13 +256,13 @@ def _texts_of_server(package: Path) -> Iterator[tuple[str, str, Path]]:
     from jinja2 import nodes
 
     from silo.api.wire import ItemTexts, LineTexts
-    from silo_server import schema, values
+    from silo_server import actors, schema
     from silo_server.services import releases, suppliers
     from silo_server.services.bom import imports, review
     from silo_server.web import render
 
     # Words that are stored, of columns and of the built-in schema; a site's own stay as they are.
-    stored = [*values.Role, *values.Scope, *schema.ITEM_TYPES, *review.REL_TYPES, *releases.NUMBERED, "draft"]
+    stored = [*actors.Role, *actors.Scope, *schema.ITEM_TYPES, *review.REL_TYPES, *releases.NUMBERED, "draft"]
     stored += [*suppliers.COLUMNS.values(), *imports.DELIMITERS.values()]
     for field in (*ItemTexts.model_fields.values(), *LineTexts.model_fields.values()):
         stored += [field.title or "", *schema.text_hints(field).get("options", ())]

@@ -43,6 +43,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import ConfigError, SiloError, listed
 from silo.platform import replace_patiently, replacing, scratch_folder, sync_folder
+from silo_server.actors import SYSTEM
 from silo_server.db.engine import (
     EVENT_CHANNEL,
     MIGRATION_LOCK,
@@ -65,11 +66,13 @@ from silo_server.db.tables import (
     sessions,
     users,
 )
+from silo_server.errors import cause_of
 from silo_server.events import HORIZON
 from silo_server.services import access, search
 from silo_server.services.revisions import FileStore
-from silo_server.settings import Settings, cause_of, stamp, utc_now
-from silo_server.values import SYSTEM, dumps
+from silo_server.settings import Settings
+from silo_server.times import stamp, utc_now
+from silo_server.user_json import dumps
 
 FORMAT = 1
 # When the last backup was made, and where; for the page of the system.

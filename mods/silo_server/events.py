@@ -38,9 +38,12 @@ from starlette.types import Receive, Scope, Send
 
 from silo_server.db.engine import Database, Tx, get_state, mode_of, newest_first, put_state
 from silo_server.db.tables import events, items
+from silo_server.errors import cause_of
+from silo_server.fields import from_row
 from silo_server.services import access
-from silo_server.settings import cause_of, spec_time
-from silo_server.values import Document, Item, NewEvent, Revision, dumps, from_row
+from silo_server.times import spec_time
+from silo_server.user_json import dumps
+from silo_server.values import Document, Item, NewEvent, Revision
 
 HORIZON = "event_horizon"
 

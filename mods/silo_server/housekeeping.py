@@ -66,6 +66,7 @@ from silo_server.db.tables import (
     sessions,
     users,
 )
+from silo_server.errors import cause_of
 from silo_server.events import Hub
 from silo_server.schema import find_schema
 from silo_server.services import items as item_service
@@ -75,8 +76,8 @@ from silo_server.services.bom.lines import ChangeKind, LineRecord, history_row
 from silo_server.services.bom.review import keep_looks
 from silo_server.services.bom.summary import keep_summaries
 from silo_server.services.revisions import FileStore
-from silo_server.settings import cause_of, stamp
-from silo_server.values import dumps
+from silo_server.times import stamp
+from silo_server.user_json import dumps
 
 logger = logging.getLogger("silo_server.housekeeping")
 

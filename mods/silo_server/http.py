@@ -45,8 +45,10 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
 )
+from silo_server.errors import InDoubtError, TooManyAttemptsError, cause_of
 from silo_server.housekeeping import Metrics
-from silo_server.settings import MIB, InDoubtError, Settings, TooManyAttemptsError, cause_of, stamp, utc_now
+from silo_server.settings import MIB, Settings
+from silo_server.times import stamp, utc_now
 
 request_logger = logging.getLogger("silo_server.requests")
 

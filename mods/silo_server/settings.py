@@ -1,112 +1,21 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What a server needs to know before it starts; one frozen value, passed in, never read from a global.
-
-The server's additions to the error tree: the same faults, with the HTTP status that is exact for them.
-"""
+"""What a server needs to know before it starts; one frozen value, passed in, never read from a global."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import (
     ConfigError,
-    ConflictError,
-    RejectedError,
-    RemoteError,
-    UnreachableError,
-    VersionConflictError,
-    listed,
 )
 from silo.bom.numbers import yes_or_no
 from silo.platform import data_folder
-
-Clock = Callable[[], datetime]
-
-
-def utc_now() -> datetime:
-    """Return the present time, in UTC."""
-    return datetime.now(UTC)
-
-
-def stamp(when: datetime) -> str:
-    """Write a time as it is stored (``2026-02-08T22:15:00.000000Z``): text order is time order."""
-    return when.astimezone(UTC).replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"
-
-
-def wire(stored: str | None) -> str | None:
-    """Write a stored time as clients get it, to the microsecond: when it comes back, it means the same.
-
-    Without the fraction if that is 0, as in the spec (``2026-02-08T22:15:00Z``).
-    """
-    return None if stored is None else stored.replace(".000000Z", "Z")
-
-
-def spec_time(stored: str) -> str:
-    """Write a time as the spec's events have it: whole seconds (``2026-02-08T22:15:00Z``)."""
-    return stored[:19] + "Z"
-
-
-class TooLargeError(RejectedError):
-    """413: more than the server takes in one request; the message names the limit."""
-
-    status_hint = 413
-    code = "too_large"
-
-
-class TooManyAttemptsError(RemoteError):
-    """429: too many failed logins; ``retry_after`` seconds until the next try is looked at."""
-
-    status_hint = 429
-    code = "too_many_attempts"
-
-    def __init__(self, message: str, retry_after: int) -> None:
-        super().__init__(message)
-        self.retry_after = retry_after
-
-
-class InDoubtError(UnreachableError):
-    """503 without ``Retry-After``: it is not known whether the change was stored."""
-
-    status_hint = 503
-    code = "unavailable"
-
-
-class DuplicateError(ConflictError):
-    """409: there is one already."""
-
-    code = "duplicate"
-
-
-class LinesChangedError(VersionConflictError):
-    """Lines are no longer as the person saw them, who therefore decides again; ``line_ids`` names them."""
-
-    def __init__(self, message: str, line_ids: Sequence[str]) -> None:
-        super().__init__(message)
-        self.line_ids = tuple(line_ids)
-
-
-class ArchivedPartsError(ConflictError):
-    """A state of a BOM would bring archived parts back, and nobody said that it may."""
-
-    def __init__(self, part_numbers: Sequence[str]) -> None:
-        super().__init__(
-            f"nothing was restored: archived parts would come back ({listed(part_numbers, 10)}); say that "
-            "they may (with_archived)"
-        )
-        self.part_numbers = tuple(part_numbers)
-
-
-def cause_of(error: BaseException) -> str:
-    """Return what the database's driver or the operating system said, in one line; no SQL and no values."""
-    return str(getattr(error, "orig", None) or error).strip().partition("\n")[0] or type(error).__name__
-
 
 MIB = 1024 * 1024
 

@@ -17,12 +17,12 @@ from server_testing import Answer, Api, Databases, bom
 from web_visitor import enter
 
 from silo.bom.errors import ConflictError
+from silo_server.actors import SYSTEM, Role
 from silo_server.db.engine import Database
 from silo_server.run import Greeting, RunningServer, prepare, running_server
 from silo_server.services import access
 from silo_server.services.access import shown_prefix
 from silo_server.settings import Settings
-from silo_server.values import SYSTEM, Role
 
 pytestmark = BOTH
 

@@ -27,15 +27,17 @@ from hypothesis.stateful import (
 from server_testing import Databases, merge_body
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
+from silo_server.actors import Actor, Role
 from silo_server.db.engine import Database
+from silo_server.errors import DuplicateError
 from silo_server.run import prepare
 from silo_server.services.bom import history, review
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge import merge_bom, preview_merge, read_merge_order
 from silo_server.services.bom.review import Decision, ReviewAction, open_conflicts, resolve
 from silo_server.services.items import NewItem, create_item, get_item
-from silo_server.settings import DuplicateError, Settings
-from silo_server.values import Actor, LineState, Role
+from silo_server.settings import Settings
+from silo_server.values import LineState
 
 PARTS = ["P-1", "P-2", "P-3", "P-4", "P-5"]
 part = st.sampled_from(PARTS)

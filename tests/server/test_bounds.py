@@ -25,13 +25,14 @@ from silo.bom.errors import BusyError, RejectedError
 from silo.bom.headers import Heading
 from silo_server.db.engine import Database, Turnstile, Tx, insert_rows
 from silo_server.db.tables import bom_lines, items
+from silo_server.errors import TooLargeError
 from silo_server.run import RunningServer, running_server
 from silo_server.services.bom import imports, review, tree
 from silo_server.services.bom.lines import state_columns
 from silo_server.services.bom.merge import merge_bom, read_merge_order, remember_refusal
 from silo_server.services.bom.summary import keep_all
 from silo_server.services.items import NewItem, archive_item, create_item, get_item
-from silo_server.settings import Settings, TooLargeError
+from silo_server.settings import Settings
 from silo_server.values import LineState
 
 PARENTS = 66_000  # more than PostgreSQL takes as parameters of one statement

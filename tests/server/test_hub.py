@@ -16,7 +16,8 @@ from silo_server import events as log
 from silo_server.db.engine import Database
 from silo_server.events import RING_EVENTS
 from silo_server.run import RunningServer, running_server
-from silo_server.values import NewEvent, dumps
+from silo_server.user_json import dumps
+from silo_server.values import NewEvent
 
 pytestmark = over("sqlite")
 TOKEN = "silo_hub"

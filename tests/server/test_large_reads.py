@@ -18,13 +18,13 @@ from openpyxl import load_workbook
 from server_testing import Answer, Api, sqlite_database, wait_until
 
 from silo.bom.errors import BusyError
+from silo_server.actors import SYSTEM
 from silo_server.db.engine import Turnstile, Tx
 from silo_server.routes.bom import file_of
 from silo_server.routes.context import Call, Server
 from silo_server.run import RunningServer, running_server
 from silo_server.services.bom.transfer import Export, Row, View, to_csv, to_json, to_xlsx
 from silo_server.services.items import get_item
-from silo_server.values import SYSTEM
 
 ITEM = "/api/items/{number}"
 LARGE = [

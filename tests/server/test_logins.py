@@ -15,16 +15,17 @@ from server_testing import Databases
 from sqlalchemy import func, select
 
 from silo.bom.errors import AuthError, BusyError, ConfigError
+from silo_server.actors import Actor, Role
 from silo_server.db.engine import Database
 from silo_server.db.tables import api_tokens, login_attempts
+from silo_server.errors import TooManyAttemptsError
 from silo_server.housekeeping import tidy
 from silo_server.run import prepare
 from silo_server.services import access
 from silo_server.services.access import actor_by_token, check_configured_secret, log_in
 from silo_server.services.items import NewItem, create_item
 from silo_server.services.revisions import FileStore
-from silo_server.settings import Settings, TooManyAttemptsError
-from silo_server.values import Actor, Role
+from silo_server.settings import Settings
 
 RIGHT, WRONG = "the right password", "a wrong password"
 OFFICE, HOME, STRANGER = "10.0.0.1", "10.0.0.2", "10.6.6.6"

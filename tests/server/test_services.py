@@ -19,8 +19,10 @@ from sqlalchemy import select, update
 
 from silo.bom.errors import AuthError, ConflictError, RejectedError
 from silo.bom.headers import plain_cell, safe_cell
+from silo_server.actors import SYSTEM, Actor, Role
 from silo_server.db.engine import Database, insert_rows, one_of, update_rows
 from silo_server.db.tables import answers, items, users
+from silo_server.fields import from_row, to_wire
 from silo_server.services.access import (
     Token,
     actor_by_session,
@@ -39,8 +41,9 @@ from silo_server.services.bom.review import check_state, edited_state
 from silo_server.services.bom.transfer import _numbered
 from silo_server.services.bom.tree import positive_number
 from silo_server.services.items import NewItem, create_item
-from silo_server.settings import stamp, utc_now, wire
-from silo_server.values import SYSTEM, Actor, LineState, Role, dumps, from_row, to_wire
+from silo_server.times import stamp, utc_now, wire_time
+from silo_server.user_json import dumps
+from silo_server.values import LineState
 
 text = st.text(max_size=20)
 states = st.builds(
@@ -200,8 +203,8 @@ def test_times_sort_as_they_read() -> None:
     first, second = stamp(utc_now()), stamp(utc_now())
     assert first <= second
     assert len(first) == len("2026-02-08T22:15:00.000000Z")
-    assert wire("2026-02-08T22:15:00.123456Z") == "2026-02-08T22:15:00.123456Z"
-    assert wire(None) is None
+    assert wire_time("2026-02-08T22:15:00.123456Z") == "2026-02-08T22:15:00.123456Z"
+    assert wire_time(None) is None
 
 
 def test_many_rows_go_in_and_change_in_one_statement_each(db: Database) -> None:

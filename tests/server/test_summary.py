@@ -23,6 +23,7 @@ from server_testing import Databases, merge_body
 from silo.bom.errors import BusyError, SiloError
 from silo.cli.main import main
 from silo_server import events
+from silo_server.actors import Actor, Role
 from silo_server.db.engine import Database, Tx
 from silo_server.db.tables import product_summaries
 from silo_server.run import prepare
@@ -51,7 +52,7 @@ from silo_server.services.items import (
     unarchive_item,
 )
 from silo_server.settings import Settings
-from silo_server.values import Actor, LineState, Role
+from silo_server.values import LineState
 
 pytestmark = over("sqlite")
 ASSEMBLIES, PARTS = 4, 4

@@ -18,7 +18,8 @@ from silo_server.services.bom.merge import merge_bom, read_merge_order
 from silo_server.services.bom.review import add_line, change_line
 from silo_server.services.items import ItemChange, NewItem, change_item, create_item, get_item
 from silo_server.services.revisions import list_revisions
-from silo_server.settings import Clock, Settings, utc_now
+from silo_server.settings import Settings
+from silo_server.times import Clock, utc_now
 from silo_server.values import LineState
 
 WRITERS, EACH = 10, 6

@@ -66,9 +66,11 @@ from sqlalchemy.dialects.postgresql import ARRAY
 
 from silo.bom.errors import BusyError, ConflictError, ReadOnlyError
 from silo.platform import data_folder, private_file, private_folder
+from silo_server.actors import SYSTEM, Actor
 from silo_server.db.tables import answers, bom_lines, events, items, product_summaries, server_state
-from silo_server.settings import Clock, Settings, stamp, utc_now
-from silo_server.values import SYSTEM, Actor, NewEvent
+from silo_server.settings import Settings
+from silo_server.times import Clock, stamp, utc_now
+from silo_server.values import NewEvent
 
 
 class Turnstile:

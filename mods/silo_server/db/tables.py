@@ -4,11 +4,11 @@
 Rules of this module:
 
 * JSON is kept as text and written by us, so that both databases give back what was stored;
-* times are ISO 8601 text in UTC with microseconds (``clock.stamp``), which sorts as it reads on both;
+* times are ISO 8601 text in UTC with microseconds (``times.stamp``), which sorts as it reads on both;
 * `*_key` columns hold the case-folded form that is unique and looked up by;
 * the search index (``item_search``) is none of them: each database has its own form (``services.search``);
 * history (``bom_changes``, ``bom_change_lines``) and ``audit`` are only ever inserted into, but for what
-  ``operation.housekeeping`` no longer keeps.
+  housekeeping no longer keeps.
 """
 
 from __future__ import annotations

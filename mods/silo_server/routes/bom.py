@@ -23,6 +23,7 @@ from silo.api.wire import MergeResult
 from silo.bom.errors import CycleError, RejectedError
 from silo.bom.numbers import plain, whole_number
 from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer
+from silo_server.fields import to_wire
 from silo_server.routes import context, models
 from silo_server.routes.context import (
     FORM_TYPES,
@@ -77,8 +78,9 @@ from silo_server.services.bom.summary import Summary, standing_alone, summary_of
 from silo_server.services.bom.transfer import View
 from silo_server.services.items import get_by_numbers, get_item
 from silo_server.services.revisions import clean_name
-from silo_server.settings import stamp, wire
-from silo_server.values import Item, LineState, dumps, to_wire
+from silo_server.times import stamp, wire_time
+from silo_server.user_json import dumps
+from silo_server.values import Item, LineState
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"], responses=READ_ERRORS)
 several = APIRouter(prefix="/api", tags=["bom"], responses=READ_ERRORS)
@@ -295,7 +297,7 @@ def get_summary(call: Viewer, part_number: str) -> dict[str, Any]:
         "mass_missing": {"count": summary.no_mass, "first": list(summary.mass_missing)},
         "cost_missing": {"count": summary.no_cost, "first": list(summary.cost_missing)},
         "last_change": {
-            "at": wire(summary.changed.at),
+            "at": wire_time(summary.changed.at),
             "user": summary.changed.username,
             "item": summary.changed.part_number,
         },
@@ -468,7 +470,7 @@ def get_review(call: Viewer, part_number: str) -> Response:
                 "child_name": conflict.line.child_name,
                 "assembly_quantity": plain(conflict.cad_quantity),
                 "server_quantity": plain(conflict.line.state.quantity),
-                "since": wire(conflict.since),
+                "since": wire_time(conflict.since),
                 "override": conflict.line.state.override,
             }
             for conflict in open_lines.conflicts
@@ -729,9 +731,9 @@ def get_changes(call: Viewer, part_number: str, since: Since, to: Moment = "") -
         first, last, happenings = changes_of(tx, item, since, to)
     return {
         "part_number": item.part_number,
-        "from": wire(first),
-        "to": wire(last),
-        "changes": [change._asdict() | {"at": wire(change.at or None)} for change in happenings],
+        "from": wire_time(first),
+        "to": wire_time(last),
+        "changes": [change._asdict() | {"at": wire_time(change.at or None)} for change in happenings],
     }
 
 

@@ -26,6 +26,7 @@ from silo.api.wire import RELEASE_LABEL, ErrorBody, MergeRequest
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
 from silo.bom.numbers import LARGEST_QUANTITY, whole_number
 from silo.bom.resolve import REFUSED_CHARACTERS
+from silo_server.actors import Actor, Role
 from silo_server.db.engine import Database, Turnstile, Tx
 from silo_server.events import Hub
 from silo_server.housekeeping import Probe
@@ -42,7 +43,7 @@ from silo_server.services.bom.merge import text_problem
 from silo_server.services.items import NUMBER_FORM, RESERVED
 from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
-from silo_server.values import MAX_KEY, MAX_NUMBER, Actor, Role
+from silo_server.user_json import MAX_KEY, MAX_NUMBER
 
 SESSION_COOKIE = "silo_session"
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -195,7 +196,7 @@ _MASKED = "m."
 def json_answer(value: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
     """Answer with ``value`` as JSON, written by pydantic's fast writer.
 
-    It writes all that :mod:`silo_server.values` lets in. Call it before the commit: an answer that
+    It writes all that :mod:`silo_server.user_json` lets in. Call it before the commit: an answer that
     cannot be written must not leave anything behind.
     """
     return raw_json(pydantic_core.to_json(value), status, headers)

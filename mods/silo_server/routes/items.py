@@ -24,6 +24,7 @@ from silo.api.wire import FactSource, HeldItem, ItemTexts, LinkedFile
 from silo.bom.errors import NotFoundError, RejectedError
 from silo.bom.numbers import whole_number
 from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer
+from silo_server.fields import to_wire
 from silo_server.routes import context
 from silo_server.routes.context import (
     READ_ERRORS,
@@ -66,7 +67,7 @@ from silo_server.services.bom.merge import (
 from silo_server.services.bom.tree import where_used
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin, revision_to_wire
-from silo_server.values import Document, Item, Revision, to_wire
+from silo_server.values import Document, Item, Revision
 
 router = APIRouter(prefix="/api", tags=["items"], responses=READ_ERRORS)
 

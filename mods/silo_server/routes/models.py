@@ -49,7 +49,7 @@ Source = Annotated[Short, WithJsonSchema({"type": "string", "enum": list(SOURCES
 Brief = Annotated[Short, WithJsonSchema(context.text(32))]
 
 
-# What may be in it is one rule for all ways in, which the services keep (silo_server.values).
+# What may be in it is one rule for all ways in, which the services keep (silo_server.user_json).
 Properties = Annotated[dict[str, Any], WithJsonSchema(context.JSON_OBJECT)]
 
 

@@ -16,6 +16,7 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import LONGEST, as_decimal, read_number
 from silo_server.db.engine import Tx
+from silo_server.fields import to_wire
 from silo_server.routes import context
 from silo_server.routes.bom import CSV, IMPORT_BODY, XLSX, content_of, file_of, uploaded
 from silo_server.routes.context import (
@@ -35,7 +36,6 @@ from silo_server.services.bom import imports, transfer
 from silo_server.services.items import get_item
 from silo_server.services.orders import NewOrder, OrderRequest, OrderRow, Recorded
 from silo_server.services.suppliers import decimal_text
-from silo_server.values import to_wire
 
 router = APIRouter(prefix="/api", tags=["orders"], responses=READ_ERRORS)
 

@@ -11,13 +11,13 @@ from starlette.responses import Response
 
 from silo.api import wire
 from silo_server.db.engine import Tx
+from silo_server.fields import to_wire
 from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Call, Editor, Viewer, json_answer
 from silo_server.routes.models import RequestBody, Text
 from silo_server.services import releases
 from silo_server.services.bom import frozen
 from silo_server.services.items import get_item
 from silo_server.services.releases import Release
-from silo_server.values import to_wire
 
 router = APIRouter(prefix="/api/items/{part_number}/releases", tags=["releases"], responses=READ_ERRORS)
 

@@ -19,8 +19,10 @@ from starlette.responses import Response
 from silo.api.wire import ErrorBody
 from silo.bom.errors import RejectedError
 from silo_server import events
+from silo_server.actors import Role, Scope
 from silo_server.db.engine import mode_of
 from silo_server.events import EventResponse
+from silo_server.fields import to_wire
 from silo_server.housekeeping import (
     HEALTH_SECONDS,
     READY_SECONDS,
@@ -45,7 +47,6 @@ from silo_server.routes.context import (
 )
 from silo_server.routes.models import RequestBody, Short, Text
 from silo_server.services import access
-from silo_server.values import Role, Scope, to_wire
 
 router = APIRouter(tags=["system"])
 EVENT_ID = re.compile(r"(?P<number>[0-9]{1,18})(?:-(?P<tag>[0-9a-f]{8}))?")

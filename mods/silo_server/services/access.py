@@ -31,10 +31,12 @@ from silo.bom.errors import (
     NotFoundError,
     RejectedError,
 )
+from silo_server.actors import Actor, Role, Scope
 from silo_server.db.engine import ADMIN_LOCK, LOGIN_LOCK, Database, Turnstile, Tx, newest_first, update_rows
 from silo_server.db.tables import api_tokens, audit, login_attempts, login_links, sessions, users
-from silo_server.settings import DuplicateError, TooManyAttemptsError, stamp, wire
-from silo_server.values import Actor, Role, Scope, from_row
+from silo_server.errors import DuplicateError, TooManyAttemptsError
+from silo_server.fields import from_row
+from silo_server.times import stamp, wire_time
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,8 +231,8 @@ def check_lasting(tx: Tx, what: str) -> None:
     """Raise ForbiddenError for a token that ends: it must not let anybody in for longer than itself."""
     if tx.actor.expires_at is not None:
         raise ForbiddenError(
-            f"a token that ends on {wire(tx.actor.expires_at)} cannot {what}, which would last longer; log "
-            "in in a browser for that"
+            f"a token that ends on {wire_time(tx.actor.expires_at)} cannot {what}, which would last longer; "
+            "log in in a browser for that"
         )
 
 
@@ -364,7 +366,7 @@ def create_own_token(
     if actor.expires_at is not None:
         if forever or (expires is not None and expires > actor.expires_at):
             raise ForbiddenError(
-                f"a token that ends on {wire(actor.expires_at)} cannot make one that lives longer; "
+                f"a token that ends on {wire_time(actor.expires_at)} cannot make one that lives longer; "
                 "log in in a browser for that"
             )
         expires = expires or actor.expires_at
@@ -445,9 +447,9 @@ def take_configured_token(tx: Tx, user_id: int, secret: str) -> str:
     if row is None:
         create_token(tx, user_id, CONFIGURED, secret=secret)
     elif row.revoked_at is not None:
-        return f"it was revoked on {wire(row.revoked_at)}"
+        return f"it was revoked on {wire_time(row.revoked_at)}"
     elif not row.active or (row.expires_at is not None and row.expires_at <= tx.stamp):
-        return "its user is not active" if not row.active else f"it ended on {wire(row.expires_at)}"
+        return "its user is not active" if not row.active else f"it ended on {wire_time(row.expires_at)}"
     others = (api_tokens.c.name == CONFIGURED) & (api_tokens.c.token_hash != secret_hash(secret))
     gone = update(api_tokens).where(others, api_tokens.c.revoked_at.is_(None)).values(revoked_at=tx.stamp)
     if tx.conn.execute(gone).rowcount:

@@ -26,11 +26,13 @@ from silo.bom.resolve import REFUSED_CHARACTERS, character_problem
 from silo_server import events
 from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer, one_of
 from silo_server.db.tables import items, number_counters
+from silo_server.errors import DuplicateError
+from silo_server.fields import names_of
 from silo_server.schema import ITEM_TYPES, Category, Schema, find_schema
 from silo_server.services import revisions
 from silo_server.services.search import index_item, search_for
-from silo_server.settings import DuplicateError
-from silo_server.values import Item, check_json, dumps, merge_patch, names_of
+from silo_server.user_json import check_json, dumps, merge_patch
+from silo_server.values import Item
 
 # Words that stand where a part number stands in a path.
 RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})

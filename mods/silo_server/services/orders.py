@@ -21,6 +21,7 @@ from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted
 from silo.bom.numbers import counts_pieces, exact_product, exact_sum, plain
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import document_items, documents, items, orders, revisions
+from silo_server.fields import from_row
 from silo_server.services import access
 from silo_server.services.bom.frozen import frozen_product
 from silo_server.services.bom.summary import Summary, own_worth, summary_of
@@ -35,8 +36,8 @@ from silo_server.services.suppliers import (
     rates_of,
     supplier_parts_of,
 )
-from silo_server.settings import wire
-from silo_server.values import Item, from_row
+from silo_server.times import wire_time
+from silo_server.values import Item
 
 MOST_PIECES = 1_000_000
 MOST_SPARES = 1000
@@ -232,7 +233,7 @@ def _state(
 ) -> tuple[str, list[str]]:
     """Describe what the list is of, and what a reader must know first."""
     if release is not None:
-        state = f"Revision {release.label}, {release.status}, frozen at {wire(release.frozen_at)}"
+        state = f"Revision {release.label}, {release.status}, frozen at {wire_time(release.frozen_at)}"
         warnings = (
             []
             if release.status == "released"

@@ -25,6 +25,7 @@ from silo.api.wire import RELEASE_LABEL, ItemTexts
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
 from silo.bom.resolve import character_problem
 from silo_server import events
+from silo_server.actors import Role, Scope
 from silo_server.db.engine import Tx, insert_rows, one_of
 from silo_server.db.tables import (
     frozen_items,
@@ -33,10 +34,12 @@ from silo_server.db.tables import (
     releases,
     users,
 )
+from silo_server.errors import TooLargeError
+from silo_server.fields import from_row
 from silo_server.services import access
 from silo_server.services.items import get_item
-from silo_server.settings import TooLargeError
-from silo_server.values import Item, Role, Scope, dumps, from_row
+from silo_server.user_json import dumps
+from silo_server.values import Item
 
 # Letters that are read as digits are left out.
 _LETTERS = "ABCDEFGHJKLMNPQRSTUVWXYZ"

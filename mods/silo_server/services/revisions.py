@@ -37,9 +37,12 @@ from silo.platform import no_device_name, remove_patiently, replace_patiently, s
 from silo_server import events
 from silo_server.db.engine import Tx, insert_rows, one_of
 from silo_server.db.tables import document_items, document_links, documents, items, revisions
+from silo_server.errors import DuplicateError
+from silo_server.fields import from_row, to_wire
 from silo_server.services.search import index_item
-from silo_server.settings import DuplicateError, spec_time
-from silo_server.values import Document, Item, Revision, check_json, dumps, from_row, to_wire
+from silo_server.times import spec_time
+from silo_server.user_json import check_json, dumps
+from silo_server.values import Document, Item, Revision
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,9 +27,10 @@ from silo.bom.resolve import character_problem
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import document_items, documents, models, revisions
 from silo_server.db.tables import items as item_rows
+from silo_server.errors import TooLargeError
 from silo_server.services import items
 from silo_server.services.revisions import FileStore, get_revision, newest_file, with_file
-from silo_server.settings import MIB, TooLargeError
+from silo_server.settings import MIB
 from silo_server.values import Item
 
 Part = Literal["geometry", "structure"]

@@ -38,12 +38,14 @@ from silo.bom.resolve import character_problem
 from silo_server import events
 from silo_server.db.engine import Tx, get_state, one_of, put_state
 from silo_server.db.tables import items, supplier_changes
+from silo_server.fields import from_row
 from silo_server.services import access
 from silo_server.services.bom.imports import Layout, Record, Table
 from silo_server.services.bom.tree import DEFAULT_CURRENCY, RolledItem, currency_of, positive_number
 from silo_server.services.items import get_by_numbers, get_item
 from silo_server.services.search import index_item
-from silo_server.values import Item, dumps, from_row
+from silo_server.user_json import dumps
+from silo_server.values import Item
 
 # The columns of the table in which people edit supplier parts, paste them and import them.
 COLUMNS: Mapping[str, str] = {

@@ -20,7 +20,9 @@ from starlette.responses import RedirectResponse, Response
 from silo.api.wire import login_code
 from silo.bom.errors import AuthError, ConflictError, ForbiddenError, RejectedError, SiloError
 from silo_server import events
+from silo_server.actors import Actor, Role, Scope
 from silo_server.db.engine import mode_of
+from silo_server.errors import TooManyAttemptsError
 from silo_server.housekeeping import last_run, standing
 from silo_server.routes.context import (
     FORM_TYPES,
@@ -38,8 +40,6 @@ from silo_server.routes.context import (
 )
 from silo_server.routes.system import login_path, revoke, set_session_cookie
 from silo_server.services import access
-from silo_server.settings import TooManyAttemptsError
-from silo_server.values import Actor, Role, Scope
 from silo_server.web.forms import (
     MOST_KEPT,
     Form,

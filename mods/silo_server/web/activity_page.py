@@ -20,6 +20,7 @@ from starlette.responses import Response
 
 from silo.bom.errors import NotFoundError, RejectedError, VersionConflictError
 from silo_server import events
+from silo_server.errors import ArchivedPartsError
 from silo_server.events import EventQuery, LoggedEvent
 from silo_server.routes.context import Call, PageFrom
 from silo_server.services import revisions
@@ -28,7 +29,6 @@ from silo_server.services.bom.frozen import changes_of
 from silo_server.services.bom.review import last_look
 from silo_server.services.items import get_by_uuids, get_item
 from silo_server.services.releases import NUMBERED, list_releases
-from silo_server.settings import ArchivedPartsError
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import Form, back, text, whole

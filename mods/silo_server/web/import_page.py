@@ -21,13 +21,13 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
 from silo.bom.headers import Heading
 from silo.bom.numbers import Mark
+from silo_server.errors import TooLargeError
 from silo_server.routes.context import Call
 from silo_server.schema import find_schema
 from silo_server.services.bom import imports
 from silo_server.services.bom.imports import NOTHING, Allowed, Layout
 from silo_server.services.items import get_item
 from silo_server.services.revisions import clean_name
-from silo_server.settings import TooLargeError
 from silo_server.web.accounts import Writer
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.line_form import changes

@@ -23,6 +23,8 @@ from starlette.responses import Response
 from silo.bom.errors import BusyError, ConflictError, NotFoundError
 from silo.bom.numbers import as_decimal
 from silo_server.db.engine import Tx
+from silo_server.errors import TooLargeError
+from silo_server.fields import names_of
 from silo_server.routes.items import told_of
 from silo_server.schema import ITEM_TYPES, find_schema
 from silo_server.services import revisions
@@ -43,8 +45,7 @@ from silo_server.services.bom.summary import (
 )
 from silo_server.services.bom.tree import RolledItem
 from silo_server.services.items import ItemQuery, get_item, list_items
-from silo_server.settings import TooLargeError
-from silo_server.values import Item, Line, names_of
+from silo_server.values import Item, Line
 from silo_server.web.accounts import Reader
 from silo_server.web.item_edit_page import shown_properties
 from silo_server.web.releases_page import state_of

@@ -25,6 +25,7 @@ from silo.bom.errors import (
 from silo.bom.numbers import whole_number
 from silo_server import events
 from silo_server.db.engine import Tx
+from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.routes.context import Call
 from silo_server.schema import text_hints
 from silo_server.services.bom import history, review
@@ -35,7 +36,6 @@ from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
 from silo_server.services.revisions import files_until, has_file
 from silo_server.services.search import fits
-from silo_server.settings import DuplicateError, LinesChangedError
 from silo_server.values import Line, LineState
 from silo_server.web import line_form
 from silo_server.web.accounts import Reader, Writer

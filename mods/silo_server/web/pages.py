@@ -19,9 +19,9 @@ from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from silo_server.actors import Actor
 from silo_server.http import SECURITY_HEADERS
 from silo_server.routes.context import SAFE_METHODS, find_actor
-from silo_server.values import Actor
 from silo_server.web import (
     accounts,
     activity_page,

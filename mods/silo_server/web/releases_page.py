@@ -14,6 +14,7 @@ from starlette.responses import Response
 from silo.bom.errors import ConflictError, SiloError
 from silo.bom.numbers import as_decimal
 from silo_server.db.engine import Tx
+from silo_server.errors import TooLargeError
 from silo_server.routes.context import Call
 from silo_server.routes.releases import frozen_now
 from silo_server.services import releases
@@ -23,7 +24,6 @@ from silo_server.services.bom.frozen import ProductContent, frozen_product
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
 from silo_server.services.releases import Release
-from silo_server.settings import TooLargeError
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer
 from silo_server.web.forms import Form, back, text

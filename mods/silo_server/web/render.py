@@ -37,11 +37,11 @@ from starlette.responses import HTMLResponse, Response
 
 import silo
 from silo.bom.numbers import as_decimal, whole_number
+from silo_server.actors import Actor, Role
 from silo_server.db.engine import mode_of
 from silo_server.routes.context import Call, masked, server_of
 from silo_server.services.bom.review import badge, waiting_count
-from silo_server.settings import wire
-from silo_server.values import Actor, Role
+from silo_server.times import wire_time
 
 # The key of a notice in the address of the page that shows it, and the cookies (one for each key) it is in.
 NOTICE, NOTICE_COOKIE = "said", "silo_notice"
@@ -250,7 +250,7 @@ def when(stamp: str | None) -> Markup | str:
     """Write a time: ``2026-02-08 22:15`` (UTC), with its full form for machines; a dash if there is none."""
     if not stamp:
         return "–"
-    return Markup('<time datetime="{}">{}</time>').format(wire(stamp), stamp[:16].replace("T", " "))
+    return Markup('<time datetime="{}">{}</time>').format(wire_time(stamp), stamp[:16].replace("T", " "))
 
 
 def size(count: int | None) -> str:

@@ -38,7 +38,8 @@ from silo_server.services.bom.summary import MassAndCost, OpenBom, Summary, summ
 from silo_server.services.bom.tree import Graph, RolledItem, load_graph, order_of, with_supplier
 from silo_server.services.items import by_ids
 from silo_server.services.releases import FrozenProduct, Release, find_release, item_of, read_records
-from silo_server.values import Item, Line, bought, dumps
+from silo_server.user_json import dumps
+from silo_server.values import Item, Line, bought
 
 
 class ProductContent(NamedTuple):

@@ -23,6 +23,8 @@ from silo.bom.errors import ConflictError, NotFoundError, RejectedError
 from silo.bom.numbers import plain, whole_number
 from silo_server.db.engine import Tx, newest_first, one_of
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts, items, revisions
+from silo_server.errors import ArchivedPartsError
+from silo_server.fields import from_row, names_of
 from silo_server.services.bom.lines import (
     ChangeKind,
     ChangeNote,
@@ -35,8 +37,8 @@ from silo_server.services.bom.lines import (
     stored_state,
 )
 from silo_server.services.items import by_ids
-from silo_server.settings import ArchivedPartsError, stamp
-from silo_server.values import Item, Line, LineState, from_row, names_of
+from silo_server.times import stamp
+from silo_server.values import Item, Line, LineState
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,6 +45,7 @@ from silo.bom.numbers import (
 )
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import items
+from silo_server.errors import TooLargeError
 from silo_server.schema import find_schema
 from silo_server.services.bom.lines import (
     ChangeKind,
@@ -66,7 +67,6 @@ from silo_server.services.items import (
     get_item,
     list_items,
 )
-from silo_server.settings import TooLargeError
 from silo_server.values import Item, Line, LineState
 
 # What a line says; then what identifies a part without a number, or describes a new one.

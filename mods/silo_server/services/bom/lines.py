@@ -26,9 +26,11 @@ from silo.bom.numbers import plain
 from silo_server import events
 from silo_server.db.engine import STRUCTURE_LOCK, Tx, insert_rows, one_of, update_rows
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_lines, items
+from silo_server.errors import TooLargeError
+from silo_server.fields import names_of, to_wire
 from silo_server.services.items import get_item
-from silo_server.settings import TooLargeError
-from silo_server.values import Item, Line, LineState, dumps, names_of, to_wire
+from silo_server.user_json import dumps
+from silo_server.values import Item, Line, LineState
 
 # "override" as the number that SQLite has: making a bool of it costs more than all the rest of the row.
 STATE_COLUMNS = [

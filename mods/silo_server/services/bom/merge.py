@@ -45,6 +45,8 @@ from silo_server.db.engine import (
     one_of,
 )
 from silo_server.db.tables import bom_conflicts, bom_last_syncs, items
+from silo_server.errors import TooLargeError
+from silo_server.fields import from_row, names_of
 from silo_server.services.bom.history import state_at
 from silo_server.services.bom.lines import (
     ChangeKind,
@@ -60,8 +62,9 @@ from silo_server.services.bom.lines import (
 from silo_server.services.items import get_item
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import check_document
-from silo_server.settings import TooLargeError, spec_time, wire
-from silo_server.values import Item, Line, LineState, dumps, from_row, names_of
+from silo_server.times import spec_time, wire_time
+from silo_server.user_json import dumps
+from silo_server.values import Item, Line, LineState
 
 # An event goes to every listener: beyond this many unchanged lines it only says how many there are.
 EVENT_UNCHANGED_LINES = 500
@@ -314,7 +317,7 @@ class LastSync:
 
     def to_wire(self) -> dict[str, Any]:
         """Return the last sync as the API sends it."""
-        return {"at": wire(self.at), "left_out": self.gaps}
+        return {"at": wire_time(self.at), "left_out": self.gaps}
 
 
 NEVER = LastSync()

@@ -31,6 +31,7 @@ from silo.bom.numbers import counts_pieces, plain
 from silo.bom.report import Reason
 from silo.bom.resolve import character_problem
 from silo_server import events
+from silo_server.actors import Actor, Role
 from silo_server.db.engine import Database, Tx, insert_rows, one_of
 from silo_server.db.tables import (
     INCOMPLETE,
@@ -45,6 +46,7 @@ from silo_server.db.tables import (
     users,
 )
 from silo_server.db.tables import events as event_log
+from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.schema import text_hints
 from silo_server.services import access
 from silo_server.services.bom.history import Change, last_merge
@@ -66,8 +68,8 @@ from silo_server.services.bom.merge import quantity_problem
 from silo_server.services.bom.summary import LastChange, Summary, at_once
 from silo_server.services.bom.tree import Graph, Told, conflicts_in
 from silo_server.services.items import get_by_uuids, get_item
-from silo_server.settings import DuplicateError, LinesChangedError
-from silo_server.values import Actor, Item, Line, LineState, Role, json_problem
+from silo_server.user_json import json_problem
+from silo_server.values import Item, Line, LineState
 
 REL_TYPES = ("component", "alternate", "reference")
 SOURCES = ("manual", "assembly")

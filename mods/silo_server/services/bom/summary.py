@@ -45,6 +45,7 @@ from silo_server.db.tables import (
     product_summaries,
 )
 from silo_server.db.tables import events as event_log
+from silo_server.fields import names_of
 from silo_server.services.bom.lines import newer_exists, select_lines, to_line
 from silo_server.services.bom.merge import NEVER, last_syncs
 from silo_server.services.bom.tree import (
@@ -55,8 +56,9 @@ from silo_server.services.bom.tree import (
     currency_of,
     positive_number,
 )
-from silo_server.settings import stamp
-from silo_server.values import Item, Line, dumps, names_of
+from silo_server.times import stamp
+from silo_server.user_json import dumps
+from silo_server.values import Item, Line
 
 # So many items without a value are named; the others are counted.
 MOST_NAMED = 12

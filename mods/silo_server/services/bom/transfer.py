@@ -56,8 +56,9 @@ from silo_server.services.items import (
 )
 from silo_server.services.releases import get_release
 from silo_server.services.revisions import png_size
-from silo_server.settings import wire
-from silo_server.values import Item, Line, dumps
+from silo_server.times import wire_time
+from silo_server.user_json import dumps
+from silo_server.values import Item, Line
 
 
 class View(StrEnum):
@@ -154,7 +155,7 @@ def export(
         fitting = sought(words, item_type, frozen.parts)
     elif filtered:
         fitting = found_below(tx, graph, words, item_type)
-    notes = [f"Revision {of.label}, {of.status}, frozen at {wire(of.frozen_at)}"] if of else []
+    notes = [f"Revision {of.label}, {of.status}, frozen at {wire_time(of.frozen_at)}"] if of else []
     notes += [f"For {pieces} pieces of {root.part_number} {root.name}"] if pieces > 1 else []
     if filtered:
         asked = f"“{words}”" if words else ""
@@ -228,7 +229,7 @@ def export_changes(tx: Tx, part_number: str, since: str, until: str) -> Export:
     root = get_item(tx, part_number)
     first, last, happenings = changes_of(tx, root, since, until)
     rows = ({title: getattr(change, name) for name, title in _CHANGES.items()} for change in happenings)
-    notes = [f"{root.part_number} {root.name}: what changed from {wire(first)} to {wire(last)}"]
+    notes = [f"{root.part_number} {root.name}: what changed from {wire_time(first)} to {wire_time(last)}"]
     return Export(root, View.INDENTED, rows, notes, columns=tuple(_CHANGES.values()))
 
 
@@ -391,7 +392,7 @@ def _row(bare: _BareColumns, part: RolledItem, amount: Exact, *, of_a_line: bool
             "Reference designators": " ".join(state.reference_designators) or None,
             **{title: getattr(state, name) for name, title in _LINE_TEXTS.items()},
             "Revision": state.child_revision,
-            "Unreferenced since": wire(state.unreferenced_since),
+            "Unreferenced since": wire_time(state.unreferenced_since),
         }
     for column, name in PROPERTIES.items():
         value = properties.get(name)

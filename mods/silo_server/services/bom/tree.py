@@ -25,10 +25,10 @@ from silo.bom.errors import ConflictError, CycleError
 from silo.bom.numbers import as_decimal, exact_product, exact_sum, plain, read_number
 from silo_server.db.engine import Tx, among, one_of
 from silo_server.db.tables import bom_conflicts, bom_lines, items
+from silo_server.errors import TooLargeError
 from silo_server.services.bom.lines import child_of, select_lines, to_line
 from silo_server.services.items import by_ids
 from silo_server.services.search import fits
-from silo_server.settings import TooLargeError
 from silo_server.values import Item, Line, bought
 
 MAX_DEPTH = 20
