@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from silo.batch import JUnit, Markdown, RunSummary, SyncOptions, TopResult, cell, stopped_by, sync_top
-from silo.bom.compare import MergePlan
+from silo.bom.compare.merge import MergePlan
 from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
 from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
 from silo.bom.report import diff_rows

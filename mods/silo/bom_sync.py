@@ -44,7 +44,8 @@ from silo.api.wire import (
     Revision,
     SourceDocument,
 )
-from silo.bom.compare import MergePlan, diff_bom, plan_merge
+from silo.bom.compare.difference import diff_bom
+from silo.bom.compare.merge import MergePlan, plan_merge
 from silo.bom.document import relative
 from silo.bom.errors import SiloError, Translate, english
 from silo.bom.findings import Finding, FindingCode, Severity

@@ -5,9 +5,10 @@ What :class:`silo.testing.FakeSilo` holds, and how it changes: items, revisions,
 
 ``FakeSilo``: a Silo in memory with the methods of ``SiloClient``, for tests without a server.
 
-It follows the same rules (the merge is :func:`silo.bom.compare.plan_merge`, which the server uses too), and
-one contract suite runs over it and over the embedded server. ``before`` and ``after`` are called with the
-method's name around each change: raise there what the network or a crash would do, before or after it acted.
+It follows the same rules (the merge is :func:`silo.bom.compare.merge.plan_merge`, which the server uses
+too), and one contract suite runs over it and over the embedded server. ``before`` and ``after`` are called
+with the method's name around each change: raise there what the network or a crash would do, before or after
+it acted.
 """
 
 from __future__ import annotations
@@ -42,7 +43,9 @@ from silo.api.wire import (
     ServerState,
     User,
 )
-from silo.bom.compare import apply_merge, base_of, plan_merge, summary, would_undo
+from silo.bom.compare.answer import summary
+from silo.bom.compare.base_revision import base_of, would_undo
+from silo.bom.compare.merge import apply_merge, plan_merge
 from silo.bom.errors import (
     ConflictError,
     CycleError,
@@ -55,7 +58,7 @@ from silo.bom.errors import (
     VersionConflictError,
 )
 from silo.bom.model import as_uuid
-from silo.bom.numbers import counts_pieces
+from silo.bom.quantities import counts_pieces
 from silo.bom.report import Reason, remembered
 from silo.bom.resolve import name_key
 

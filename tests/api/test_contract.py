@@ -15,7 +15,7 @@ import pytest
 from silo.api.client import SiloClient
 from silo.api.files import DocumentId, Origin
 from silo.api.wire import HeldItem, LinkedFile, MergeEntry, MergeRequest, MergeResult, SourceDocument
-from silo.bom.compare import diff_bom
+from silo.bom.compare.difference import diff_bom
 from silo.bom.errors import (
     ConflictError,
     CycleError,

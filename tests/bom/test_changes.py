@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.bom.compare import ComparedAssembly, changes_json, compare_assemblies, compare_three
+from silo.bom.compare.states import ComparedAssembly
+from silo.bom.compare.three_states import compare_three
+from silo.bom.compare.two_states import changes_json, compare_assemblies
 from silo.bom.model import BomEntry
 
 

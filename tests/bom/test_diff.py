@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from silo.bom import BomDiff, BomEntry, FindingCode, Severity, diff_bom
-from silo.bom.compare import as_number, same_quantity
+from silo.bom.quantities import as_number, same_quantity
 
 
 def local(**quantities: Any) -> list[BomEntry]:

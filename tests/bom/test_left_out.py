@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from silo.bom.compare import apply_merge, diff_bom, plan_merge
+from silo.bom.compare.difference import diff_bom
+from silo.bom.compare.merge import apply_merge, plan_merge
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry
 from silo.bom.report import LeftOut, Reason, components_of, in_words, left_out_of, remembered

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 from silo.bom import apply_merge, plan_merge
-from silo.bom.compare import summary
+from silo.bom.compare.answer import summary
 
 NOW = "2026-02-08T22:15:00Z"
 

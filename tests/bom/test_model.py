@@ -20,7 +20,7 @@ from silo.bom import (
     QuantityChange,
     Severity,
 )
-from silo.bom.compare import MergePlan
+from silo.bom.compare.merge import MergePlan
 from silo.bom.model import rows_as_dicts
 
 FINDING = Finding(FindingCode.CYCLE, Severity.ERROR, "a ring", (Place("/v/a.FCStd", "A"),))

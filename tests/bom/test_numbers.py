@@ -11,17 +11,14 @@ from hypothesis import strategies as st
 
 from silo.bom.numbers import (
     Mark,
-    as_decimal,
     common_mark,
-    exact_product,
-    exact_sum,
     parse_number,
-    plain,
     read_number,
     read_quantity,
     whole_number,
     yes_or_no,
 )
+from silo.bom.quantities import as_decimal, exact_product, exact_sum, plain
 
 READ = [
     ("4", "4"), ("1.5", "1.5"), ("1,5", "1.5"), ("1,234.5", "1234.5"), ("1.234,5", "1234.5"),

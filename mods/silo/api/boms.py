@@ -34,7 +34,9 @@ from silo.api.wire import (
     Quantity,
     QuantityLine,
 )
-from silo.bom.compare import answer_of, conflict_warning, is_manual, plan_merge, same_quantity, says_the_same
+from silo.bom.compare.answer import answer_of, conflict_warning
+from silo.bom.compare.merge import plan_merge
+from silo.bom.compare.owner import is_manual
 from silo.bom.errors import (
     ConflictError,
     CycleError,
@@ -49,6 +51,7 @@ from silo.bom.errors import (
     listed,
 )
 from silo.bom.model import BomDiff, QuantityChange
+from silo.bom.quantities import same_quantity, says_the_same
 
 UNCLEAR = "answer_not_understood"
 """The warning of a merge whose answer was not understood, and that the BOM shows anyway."""

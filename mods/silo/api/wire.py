@@ -29,7 +29,7 @@ from pydantic import (
 )
 
 from silo.bom.headers import designators
-from silo.bom.numbers import plain
+from silo.bom.quantities import plain
 
 Source = Literal["assembly", "manual"]
 

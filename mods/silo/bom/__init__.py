@@ -10,7 +10,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from silo.bom.compare import MergePlan, apply_merge, diff_bom, plan_merge
+    from silo.bom.compare.difference import diff_bom
+    from silo.bom.compare.merge import MergePlan, apply_merge, plan_merge
     from silo.bom.findings import Finding, FindingCode, Place, Severity
     from silo.bom.links import extract, extract_bom_links
     from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
     from silo.bom.roots import choose_assembly
 
 _HOME = {
-    "compare": ("MergePlan", "apply_merge", "diff_bom", "plan_merge"),
+    "compare.difference": ("diff_bom",),
+    "compare.merge": ("MergePlan", "apply_merge", "plan_merge"),
     "findings": ("Finding", "FindingCode", "Place", "Severity"),
     "links": ("extract", "extract_bom_links"),
     "model": ("BomChange", "BomDiff", "BomEntry", "Extraction", "QuantityChange"),

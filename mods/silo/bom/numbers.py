@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Numbers as people and spreadsheets write them, in both decimal conventions, and exact sums of them.
+"""Numbers as people and spreadsheets write them, in both decimal conventions.
 
 The one parser of the project: for quantities in forms, CSV files and API texts, for masses and densities. It
 is pure text; units belong to the callers. The rules:
@@ -25,20 +25,15 @@ import re
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
-from decimal import Context, Decimal
+from decimal import Decimal
 from enum import StrEnum
 from fractions import Fraction
-from functools import reduce
-from math import isfinite
-from typing import NamedTuple, overload
+from typing import NamedTuple
+
+from silo.bom.quantities import LARGEST_QUANTITY, PIECE_WORDS, plain
 
 LONGEST = 40
 """[characters] no number that a person types is longer."""
-
-LARGEST_QUANTITY = 1e9
-"""The most pieces (or metres, or litres) of a BOM line."""
-
-_WIDE = Context(prec=80)
 
 
 class Mark(StrEnum):
@@ -101,9 +96,7 @@ class NumberReading(NamedTuple):
 _SPACES = re.compile(r"(?<=\d)[\s'’_\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 _SHAPE = re.compile(r"(?P<sign>[+\-−]?)(?P<body>[0-9][0-9.,]*|[.,][0-9]+)(?:[eE](?P<exp>[+\-−]?[0-9]{1,3}))?")
 _FRACTION = re.compile(r"(?P<sign>[+\-−]?)(?P<whole>[0-9]*)\s?(?P<part>[¼-¾⅐-⅞])")
-_PIECES = r"(?:pcs?|pieces?|ea|each|units?|stk|stck|st|stück|pz|шт|個|个|件)\.?"
-_PIECE = re.compile(_PIECES, re.IGNORECASE)
-_COUNT_WORD = re.compile(rf"(?P<number>.*?[0-9¼-¾⅐-⅞.,])\s*(?:x|×|{_PIECES})", re.IGNORECASE)
+_COUNT_WORD = re.compile(rf"(?P<number>.*?[0-9¼-¾⅐-⅞.,])\s*(?:x|×|{PIECE_WORDS})", re.IGNORECASE)
 
 
 def parse_number(text: str, mark: Mark | None = None) -> Number | None:
@@ -157,11 +150,6 @@ def read_count(text: str, mark: Mark | None = None, *, points_are_decimal: bool 
     return read_number(counted["number"] if counted else text, mark, points_are_decimal=points_are_decimal)
 
 
-def counts_pieces(unit: str | None) -> bool:
-    """Return True for no unit and for "pcs" or the like, in which CAD counts."""
-    return not unit or not unit.strip() or _PIECE.fullmatch(unit.strip()) is not None
-
-
 def read_quantity(text: str, mark: Mark | None = None, *, points_are_decimal: bool = False) -> NumberReading:
     """Read the quantity of a BOM line: a number above 0 and at most 1e9."""
     reading = read_count(text, mark, points_are_decimal=points_are_decimal)
@@ -190,40 +178,6 @@ def _plain_character(character: str) -> str:
     if unicodedata.numeric(character, None) is None:
         return unicodedata.normalize("NFKC", character)
     return str(unicodedata.decimal(character, character))
-
-
-def as_decimal(value: float | int | Decimal) -> Decimal:
-    """Return the number that ``value`` shows: 0.1 is one tenth. ValueError if it is not finite."""
-    if isinstance(value, Decimal):
-        return value
-    if isinstance(value, float):
-        if not isfinite(value):
-            raise ValueError(f"wanted a finite number, got {value}")
-        return Decimal(repr(value))
-    return Decimal(value)
-
-
-def exact_sum(values: Iterable[float | int | Decimal]) -> Decimal:
-    """Sum the values as they are written: 0.1 + 0.2 is 0.3. Exact to 80 digits."""
-    return reduce(_WIDE.add, map(as_decimal, values), Decimal(0))
-
-
-def exact_product(values: Iterable[float | int | Decimal]) -> Decimal:
-    """Multiply the values as they are written: 3 × 0.1 is 0.3. Exact to 80 digits."""
-    return reduce(_WIDE.multiply, map(as_decimal, values), Decimal(1))
-
-
-@overload
-def plain(value: None) -> None: ...
-@overload
-def plain(value: float | Decimal) -> int | float: ...
-def plain(value: float | Decimal | None) -> int | float | None:
-    """Return ``value`` as JSON and people have it: a count as a count (12, not 12.0); None stays None."""
-    if isinstance(value, float):
-        return int(value) if value.is_integer() and abs(value) < 1e16 else value
-    if isinstance(value, Decimal):
-        return int(value) if value == value.to_integral_value() and abs(value) < 10**16 else float(value)
-    return value
 
 
 def whole_number(text: str, digits: int = 15) -> int | None:

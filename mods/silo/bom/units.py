@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
 
-from silo.bom.numbers import exact_product
+from silo.bom.quantities import exact_product
 
 
 class UnitKind(StrEnum):

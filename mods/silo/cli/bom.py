@@ -56,7 +56,7 @@ from silo.files import check_writable, documents_in
 from silo.platform import replacing, scratch_folder
 
 if TYPE_CHECKING:
-    from silo.bom.compare import AssemblyChange, LineChange
+    from silo.bom.compare.two_states import AssemblyChange, LineChange
     from silo.bom_sync import Resolved
     from silo.vault.plan import FolderBoms
 
@@ -589,7 +589,7 @@ def run_bom_diff(args: argparse.Namespace) -> int:
     """Print the comparison. Returns 1 if a BOM could not be read completely, and with ``--check`` if one
     changed.
     """
-    from silo.bom.compare import compare_assemblies
+    from silo.bom.compare.two_states import compare_assemblies
 
     check_writable(*args.report)
     old, new = _two_states(args)
@@ -754,7 +754,7 @@ def _markdown(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderB
 
 
 def _changes_json(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderBoms) -> dict[str, object]:
-    from silo.bom.compare import changes_json
+    from silo.bom.compare.two_states import changes_json
 
     def state(boms: FolderBoms) -> dict[str, object]:
         return {

@@ -47,7 +47,7 @@ from silo.api.wire import (
     Revision,
     SourceDocument,
 )
-from silo.bom.compare import MergePlan
+from silo.bom.compare.merge import MergePlan
 from silo.bom.errors import (
     CancelledError,
     ConflictError,

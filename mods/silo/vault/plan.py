@@ -29,7 +29,7 @@ from uuid import uuid4
 from silo.api.policy import ends_run
 from silo.api.wire import SourceDocument
 from silo.batch import SyncOptions, TopResult, source_document, suggest_by_identity
-from silo.bom.compare import ComparedAssembly
+from silo.bom.compare.states import ComparedAssembly
 from silo.bom.document import relative
 from silo.bom.errors import CancelledError, DocumentError, InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity

@@ -35,7 +35,9 @@ from typing import TYPE_CHECKING, Any
 from silo.api.files import DocumentId, Standing, checksum_of, download_revision, has_file
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import Item, LinkedFile, Release, Revision
-from silo.bom.compare import ComparedAssembly, LineChange, ThreeLines, compare_assemblies, compare_three
+from silo.bom.compare.states import ComparedAssembly
+from silo.bom.compare.three_states import ThreeLines, compare_three
+from silo.bom.compare.two_states import LineChange, compare_assemblies
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError, listed
 from silo.bom.links import extract
 from silo.bom.model import Extraction

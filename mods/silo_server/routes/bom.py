@@ -21,7 +21,8 @@ from starlette.responses import Response, StreamingResponse
 
 from silo.api.wire import MergeResult
 from silo.bom.errors import CycleError, RejectedError
-from silo.bom.numbers import plain, whole_number
+from silo.bom.numbers import whole_number
+from silo.bom.quantities import plain
 from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer
 from silo_server.fields import to_wire
 from silo_server.routes import context, models

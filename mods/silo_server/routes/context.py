@@ -24,7 +24,8 @@ from starlette.responses import Response
 
 from silo.api.wire import RELEASE_LABEL, ErrorBody, MergeRequest
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
-from silo.bom.numbers import LARGEST_QUANTITY, whole_number
+from silo.bom.numbers import whole_number
+from silo.bom.quantities import LARGEST_QUANTITY
 from silo.bom.resolve import REFUSED_CHARACTERS
 from silo_server.actors import Actor, Role
 from silo_server.db.engine import Database, Turnstile, Tx

@@ -17,7 +17,8 @@ from pydantic import (
 )
 
 from silo.api import wire
-from silo.bom.numbers import LARGEST_QUANTITY, read_quantity
+from silo.bom.numbers import read_quantity
+from silo.bom.quantities import LARGEST_QUANTITY
 from silo.bom.resolve import character_problem
 from silo_server.routes import context
 from silo_server.schema import text_hints

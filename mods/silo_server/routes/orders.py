@@ -14,7 +14,8 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
-from silo.bom.numbers import LONGEST, as_decimal, read_number
+from silo.bom.numbers import LONGEST, read_number
+from silo.bom.quantities import as_decimal
 from silo_server.db.engine import Tx
 from silo_server.fields import to_wire
 from silo_server.routes import context

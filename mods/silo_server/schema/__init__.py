@@ -18,7 +18,8 @@ from pydantic.fields import FieldInfo
 
 from silo.api.wire import ItemTexts
 from silo.bom.errors import ConfigError, InputError, NotFoundError, RejectedError
-from silo.bom.numbers import plain, read_number
+from silo.bom.numbers import read_number
+from silo.bom.quantities import plain
 from silo.bom.resolve import CategoryRule
 
 DEFAULT_SCHEMA = "kindred-rd"

@@ -31,7 +31,7 @@ from typing import IO, Any
 from sqlalchemy import ColumnElement, Row, delete, func, insert, select, update
 
 from silo.api.wire import FACTS, FactSource
-from silo.bom.compare import base_of, would_undo
+from silo.bom.compare.base_revision import base_of, would_undo
 from silo.bom.errors import NewerRevisionError, NotFoundError, RejectedError
 from silo.platform import no_device_name, remove_patiently, replace_patiently, sync_folder
 from silo_server import events
@@ -345,7 +345,7 @@ def _check_base(tx: Tx, of: Item | Document, base: int | None, checksum: str | N
 
 def check_document(tx: Tx, item: Item, base: int | None, checksum: str | None) -> None:
     """Raise :class:`NewerRevisionError` if a BOM is that of an older file and would undo the newest one's,
-    :class:`MissingRevisionError` if its file is not here (:func:`silo.bom.compare.base_of`)."""
+    :class:`MissingRevisionError` if its file is not here (:func:`silo.bom.compare.base_revision.base_of`)."""
     same = select(func.max(revisions.c.revision_number)).where(
         revisions.c.item_id == item.id, revisions.c.file_checksum == checksum
     )

@@ -21,7 +21,7 @@ from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
 from silo.bom.errors import BusyError, ConflictError, NotFoundError
-from silo.bom.numbers import as_decimal
+from silo.bom.quantities import as_decimal
 from silo_server.db.engine import Tx
 from silo_server.errors import TooLargeError
 from silo_server.fields import names_of

@@ -15,10 +15,10 @@ from typing import Any
 from starlette.datastructures import FormData
 
 from silo.api.wire import LineTexts
-from silo.bom.compare import same_quantity
 from silo.bom.errors import RejectedError
 from silo.bom.headers import designators
-from silo.bom.numbers import counts_pieces, read_quantity
+from silo.bom.numbers import read_quantity
+from silo.bom.quantities import counts_pieces, same_quantity
 from silo_server.db.engine import Tx
 from silo_server.schema import text_hints
 from silo_server.services.bom import history

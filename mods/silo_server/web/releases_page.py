@@ -12,7 +12,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from silo.bom.errors import ConflictError, SiloError
-from silo.bom.numbers import as_decimal
+from silo.bom.quantities import as_decimal
 from silo_server.db.engine import Tx
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import Call

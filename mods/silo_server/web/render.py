@@ -36,7 +36,8 @@ from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import HTMLResponse, Response
 
 import silo
-from silo.bom.numbers import as_decimal, whole_number
+from silo.bom.numbers import whole_number
+from silo.bom.quantities import as_decimal
 from silo_server.actors import Actor, Role
 from silo_server.db.engine import mode_of
 from silo_server.routes.context import Call, masked, server_of

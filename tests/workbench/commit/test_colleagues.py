@@ -17,7 +17,7 @@ from fcstd_writer import locals_, part
 
 from silo.api.files import Origin
 from silo.api.wire import Revision
-from silo.bom.compare import ThreeLines
+from silo.bom.compare.three_states import ThreeLines
 from silo.bom.errors import ServerFaultError
 from silo.bom.model import BomEntry
 from silo.outbox.entry import UNKNOWN, Commit, State

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from silo.bom.errors import InputError, counted
 from silo.bom.headers import Heading, find_clashes
-from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
+from silo.bom.numbers import Mark, read_count
+from silo.bom.quantities import LARGEST_QUANTITY
 from silo.inertia.bom import (
     FORCE_UNITS,
     BomCode,

@@ -28,7 +28,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from silo.bom.errors import ConfigError, InputError
-from silo.bom.numbers import LONGEST, parse_number, plain, plain_text, read_number
+from silo.bom.numbers import LONGEST, parse_number, plain_text, read_number
+from silo.bom.quantities import plain
 from silo.freecads import material_folders
 from silo.inertia.bom import MASS_UNITS
 from silo.inertia.matching import Suggester

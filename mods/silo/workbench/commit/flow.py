@@ -36,7 +36,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from silo.bom.compare import ComparedAssembly, ThreeLines
+from silo.bom.compare.states import ComparedAssembly
+from silo.bom.compare.three_states import ThreeLines
 from silo.bom.errors import DocumentError, NotFoundError, RouteMissingError, SiloError
 from silo.bom.findings import Finding, FindingCode
 from silo.bom.model import Extraction, walk_entries

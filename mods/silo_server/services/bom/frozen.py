@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import select
 
 from silo.api.wire import ItemTexts
-from silo.bom.numbers import plain
+from silo.bom.quantities import plain
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import document_items, document_links, documents, revisions
 from silo_server.services.bom.history import (

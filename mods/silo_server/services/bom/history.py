@@ -20,7 +20,8 @@ from sqlalchemy import func, select
 
 from silo.api.wire import RELEASE_LABEL
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError
-from silo.bom.numbers import plain, whole_number
+from silo.bom.numbers import whole_number
+from silo.bom.quantities import plain
 from silo_server.db.engine import Tx, newest_first, one_of
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts, items, revisions
 from silo_server.errors import ArchivedPartsError

@@ -35,14 +35,8 @@ from silo.bom.headers import (
     plain_cell,
     second_columns,
 )
-from silo.bom.numbers import (
-    Mark,
-    common_mark,
-    exact_sum,
-    parse_number,
-    read_quantity,
-    whole_number,
-)
+from silo.bom.numbers import Mark, common_mark, parse_number, read_quantity, whole_number
+from silo.bom.quantities import exact_sum
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import items
 from silo_server.errors import TooLargeError

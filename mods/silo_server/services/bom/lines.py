@@ -22,7 +22,7 @@ from typing import Any
 from sqlalchemy import Integer, Select, delete, func, insert, literal_column, select, type_coerce, update
 
 from silo.bom.errors import ConflictError, CycleError, NotFoundError, VersionConflictError
-from silo.bom.numbers import plain
+from silo.bom.quantities import plain
 from silo_server import events
 from silo_server.db.engine import STRUCTURE_LOCK, Tx, insert_rows, one_of, update_rows
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_lines, items

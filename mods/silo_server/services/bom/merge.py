@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The merge of an assembly into its BOM (spec bom-sync §5): check, plan, apply, announce; one transaction.
 
-The rules are those of :mod:`silo.bom.compare`; here is what a server adds: who may change which row is
+The rules are those of :mod:`silo.bom.compare.merge`; here is what a server adds: who may change which row is
 enforced on the stored rows, a ``sync_id`` gives the same answer again, a version mismatch is refused, a
 person's decision on a conflict is remembered until the assembly says something else.
 
@@ -28,10 +28,12 @@ from typing import Any
 
 from sqlalchemy import delete, insert, select, update
 
-from silo.bom.compare import MergePlan, answer_of, is_manual, plan_merge, summary
+from silo.bom.compare.answer import answer_of, summary
+from silo.bom.compare.merge import MergePlan, plan_merge
+from silo.bom.compare.owner import is_manual
 from silo.bom.errors import RejectedError
 from silo.bom.model import BomDiff, QuantityChange
-from silo.bom.numbers import LARGEST_QUANTITY, as_decimal, plain
+from silo.bom.quantities import LARGEST_QUANTITY, as_decimal, plain
 from silo.bom.report import Reason, in_words, remembered
 from silo.bom.resolve import character_problem
 from silo_server import events

@@ -25,9 +25,8 @@ from typing import Any, NamedTuple
 from sqlalchemy import ColumnElement, delete, func, insert, or_, select, text, true, union, update
 
 from silo.api.wire import LineTexts
-from silo.bom.compare import same_quantity
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError, VersionConflictError
-from silo.bom.numbers import counts_pieces, plain
+from silo.bom.quantities import counts_pieces, plain, same_quantity
 from silo.bom.report import Reason
 from silo.bom.resolve import character_problem
 from silo_server import events

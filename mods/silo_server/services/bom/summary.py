@@ -34,7 +34,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import delete, select
 
 from silo.bom.errors import BusyError, CycleError, counted
-from silo.bom.numbers import as_decimal, exact_product, exact_sum
+from silo.bom.quantities import as_decimal, exact_product, exact_sum
 from silo_server import events
 from silo_server.db.engine import EVENT_LOCK, Database, Tx, insert_rows, one_of, uses_of
 from silo_server.db.tables import (

@@ -27,10 +27,7 @@ from silo.api.wire import LineTexts
 from silo.bom.headers import (
     safe_cell,
 )
-from silo.bom.numbers import (
-    as_decimal,
-    plain,
-)
+from silo.bom.quantities import as_decimal, plain
 from silo.bom.resolve import with_allowed_characters
 from silo.platform import scratch_folder
 from silo_server.db.engine import Tx

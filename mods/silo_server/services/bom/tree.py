@@ -20,9 +20,9 @@ from typing import Any, NamedTuple, TypeVar
 
 from sqlalchemy import ColumnElement, Select, func, literal, select
 
-from silo.bom.compare import says_the_same
 from silo.bom.errors import ConflictError, CycleError
-from silo.bom.numbers import as_decimal, exact_product, exact_sum, plain, read_number
+from silo.bom.numbers import read_number
+from silo.bom.quantities import as_decimal, exact_product, exact_sum, plain, says_the_same
 from silo_server.db.engine import Tx, among, one_of
 from silo_server.db.tables import bom_conflicts, bom_lines, items
 from silo_server.errors import TooLargeError
