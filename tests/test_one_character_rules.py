@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from fcstd_writer import Doc, part
 
-from silo.api.config import canonical
+from silo.api.address import canonical
 from silo.bom.compare.merge import plan_merge
 from silo.bom.document import relative
 from silo.bom.errors import DocumentError

@@ -23,11 +23,14 @@ from pathlib import Path
 from typing import Any, Self
 from uuid import uuid4
 
-from silo.api.boms import LineBody, result_of
-from silo.api.client import ItemBody, ItemChanges, LookAlike
-from silo.api.events import MERGE, STATE, ServerEvent
-from silo.api.files import DocumentId, Origin, Progress
-from silo.api.transport import Cancel, as_json, body, stop_if
+from silo.api.boms import LineBody
+from silo.api.caller import as_json, body
+from silo.api.files import DocumentId, Origin
+from silo.api.items import ItemBody, ItemChanges, LookAlike
+from silo.api.merging import result_of
+from silo.api.multipart import Progress
+from silo.api.sse import MERGE, STATE, ServerEvent
+from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
     BomLine,
     Document,

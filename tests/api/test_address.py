@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from silo.api.config import ServerAddress, may_carry_token, origin_of
+from silo.api.address import ServerAddress, may_carry_token, origin_of
 from silo.bom.errors import ConfigError, InputError
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from real_silo import TOKEN, Moods, real_silo
 
+from silo.api.abilities import KEPT_S, Abilities, load_abilities, save_abilities
 from silo.api.client import SiloClient
-from silo.api.transport import KEPT_S, Abilities, load_abilities, save_abilities
 from silo.cli.main import main
 
 NOBODY = "00000000-0000-4000-8000-000000000000"

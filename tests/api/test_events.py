@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.config import Pause
-from silo.api.events import SELDOM, Connection, ConnectionState, EventListener, Pauses, ServerEvent
+from silo.api.events import SELDOM, Connection, ConnectionState, EventListener, Pauses
+from silo.api.pause import Pause
 from silo.api.policy import Backoff
+from silo.api.sse import ServerEvent
 from silo.bom.errors import AuthError, ServerFaultError, UnreachableError
 from silo.testing import FakeSilo
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from silo.api.boms import UNCLEAR
 from silo.api.client import SiloClient
+from silo.api.merging import UNCLEAR
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import ServerFaultError
 

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.api.policy import Reply, WebPageError, Where, complaint, error_of
+from silo.api.foreign import Where
+from silo.api.replies import Reply, WebPageError, complaint, error_of
 from silo.api.wire import BomLine, Item
 from silo.bom.errors import (
     AuthError,

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from silo.api.files import MayHaveArrivedError, SentFile, find_arrived, is_there
+from silo.api.arrived import MayHaveArrivedError, SentFile, find_arrived, is_there
 from silo.api.wire import Revision
 from silo.bom.errors import NotFoundError, UnreachableError
 from silo.outbox.entry import Commit, State

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.api.events import ServerEvent, SseParser
+from silo.api.sse import ServerEvent, SseParser
 from silo.bom.errors import ServerFaultError
 
 MERGE = {

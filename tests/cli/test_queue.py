@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from silo.api.config import Pause
+from silo.api.pause import Pause
 from silo.outbox.entry import Commit, State
 from silo.outbox.store import Store
 from silo.workbench.pane.activity import rows

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from silo.api.config import canonical
-from silo.api.files import Origin, other_name
+from silo.api.address import canonical
+from silo.api.files import Origin
+from silo.api.revisions import other_name
 from silo.api.wire import Revision
 from silo.bom.errors import RejectedError, RouteMissingError, UnreachableError
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from silo.api.config import Pause
-from silo.api.policy import Reply, Where, error_of
+from silo.api.foreign import Where
+from silo.api.pause import Pause
+from silo.api.replies import Reply, error_of
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import (
     AuthError,

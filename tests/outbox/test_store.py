@@ -23,8 +23,8 @@ from typing import Any
 import pytest
 from other_disk import other_disk
 
-from silo.api.config import Pause
-from silo.api.files import standing
+from silo.api.pause import Pause
+from silo.api.revisions import standing
 from silo.api.wire import Revision
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction

@@ -7,18 +7,12 @@ The file is TOML, readable by its owner only::
     url = "https://silo.example.com"
     token = "silo_…"
     verify = true            # or false, or the path of a file with certificate authorities
-
-Where a server is: the base URL rule, the paths below it, and which other addresses are the same server.
-
-``http(s)://host[:port]`` means REST under ``/api``. An address with a path of its own is used as it is: so
-``https://host/silo/api`` works behind a proxy (the older workbench reads both the same way).
 """
 
 from __future__ import annotations
 
 import json
 import logging
-import math
 import os
 import re
 import stat
@@ -27,134 +21,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
-from urllib.parse import SplitResult, quote, urljoin, urlsplit
 
-from silo.bom.errors import ConfigError, InputError, did_you_mean
+from silo.api.address import ServerAddress, same_server
+from silo.bom.errors import ConfigError, did_you_mean
 from silo.bom.numbers import yes_or_no
 from silo.platform import MODES_COUNT, config_folder, replacing
-
-_DEFAULT_PORTS = {"http": 80, "https": 443}
-_LOOPBACK = ("localhost", "::1")
-_ADVICE = "write it like https://silo.example.com or http://127.0.0.1:8080"
-
-Origin = tuple[str, str, int]
-
-
-def origin_of(url: str) -> Origin:
-    """Return (scheme, host, port) of an absolute URL, in lower case, always with the port.
-
-    Raises :class:`ConfigError` if it is no http(s) URL.
-    """
-    parts = _http(url)
-    return (parts.scheme, parts.hostname or "", parts.port or _DEFAULT_PORTS[parts.scheme])
-
-
-def may_carry_token(sender: Origin, receiver: Origin) -> bool:
-    """Return True if a redirect from ``sender`` to ``receiver`` may take the token along.
-
-    True only for the same server, and for its own http → https upgrade on the standard ports.
-    """
-    upgrade = sender[0] == "http" and sender[2] == 80 and receiver == ("https", sender[1], 443)
-    return sender == receiver or upgrade
-
-
-def canonical(url: str) -> str:
-    """Return the one spelling of all addresses of a server, by which the outbox finds what waits for it.
-
-    A text that is no address is returned unchanged.
-    """
-    try:
-        address = ServerAddress.parse(url)
-        scheme, host, port = address.origin
-    except ConfigError:
-        return url.strip()
-    bare = f"[{host}]" if ":" in host else host
-    return f"{scheme}://{bare}:{port}{urlsplit(address.api_root).path}"
-
-
-@dataclass(frozen=True)
-class ServerAddress:
-    """A Silo server: ``api_root`` for requests, ``web_root`` for pages and ``/ready``, without end slash."""
-
-    api_root: str
-    web_root: str
-
-    @classmethod
-    def parse(cls, text: str) -> ServerAddress:
-        """Read an address as a person writes it; raises :class:`ConfigError` with what to write instead.
-
-        All spellings of one address give the same value: capitals in the host, the scheme's own port, slashes
-        at the end or doubled. The outbox finds what waits for a server by this form.
-        """
-        text = text.strip()
-        # People type a server on their own computer without a scheme; for any other it is not guessed.
-        here = re.match(r"(localhost|127\.[\d.]+|\[::1\])(:\d+)?(/|$)", text, re.IGNORECASE)
-        text = f"http://{text}" if here else text
-        parts = _http(text)
-        if any(ord(c) <= 32 or ord(c) == 127 for c in text) or parts.query or parts.fragment:
-            raise ConfigError(f"{text!r}: a server address has no blanks, no ? and no #; {_ADVICE}")
-        path = re.sub("/+", "/", parts.path).rstrip("/")
-        host = (parts.hostname or "").rstrip(".")
-        port = f":{parts.port}" if parts.port not in (None, _DEFAULT_PORTS[parts.scheme]) else ""
-        bare = f"{parts.scheme}://[{host}]{port}" if ":" in host else f"{parts.scheme}://{host}{port}"
-        if not path:
-            return cls(api_root=bare + "/api", web_root=bare)
-        return cls(api_root=bare + path, web_root=bare + path.removesuffix("/api"))
-
-    @property
-    def origin(self) -> Origin:
-        """Return (scheme, host, port)."""
-        return origin_of(self.web_root)
-
-    @property
-    def host(self) -> str:
-        """Return ``host`` or ``host:port``, for messages."""
-        return urlsplit(self.web_root).netloc
-
-    @property
-    def is_loopback(self) -> bool:
-        """Return True if the address is this computer."""
-        name = self.origin[1]
-        return name in _LOOPBACK or name.startswith("127.")
-
-    def api(self, *segments: str) -> str:
-        """Return the URL of an API path; each segment is quoted, also the slash in a part number."""
-        for text in segments:
-            # Every HTTP library resolves "." and "..": such a part number would ask for something else.
-            if not text.strip(".") or not text.strip():
-                raise InputError(
-                    f"{text!r} cannot be a part number or an identity: the server could not be asked for it"
-                )
-        return "/".join((self.api_root, *(quote(text, safe="") for text in segments)))
-
-    def web(self, path: str) -> str:
-        """Return the full URL of a page such as ``resolve_url``. Raises :class:`InputError` for a page of
-        another server.
-        """
-        url = urljoin(self.web_root + "/", path) if path.startswith(("http:", "https:", "//")) else None
-        if url is None:
-            return f"{self.web_root}/{path.lstrip('/')}"
-        if origin_of(url) != self.origin:
-            raise InputError(f"{url}: this page is not on {self.host}; it is not opened")
-        return url
-
-
-def _http(url: str) -> SplitResult:
-    """Split an http(s) URL. Raises ConfigError if it is none, or if it holds a user name."""
-    try:
-        parts = urlsplit(url)
-        port_is_valid = parts.port is None or parts.port > 0
-    except ValueError:
-        raise ConfigError(f"the server address cannot be read; {_ADVICE}") from None
-    if parts.username is not None or parts.password is not None:
-        # Never quoted in the message: it holds a password.
-        raise ConfigError(
-            f"the server address holds a user name; leave it out, a token says who you are; {_ADVICE}"
-        )
-    if parts.scheme not in _DEFAULT_PORTS or not parts.hostname or not port_is_valid:
-        raise ConfigError(f"{url!r} is not a server address; {_ADVICE}")
-    return parts
-
 
 log = logging.getLogger("silo.api")
 
@@ -318,18 +189,6 @@ def first_of(
     return None, None
 
 
-def same_server(url: str, other: str | None) -> bool:
-    """Return True if two addresses, as people write them, are one server; a token for one is valid for the
-    other.
-    """
-    if not url or not other:
-        return False
-    try:
-        return ServerAddress.parse(url).origin == ServerAddress.parse(other).origin
-    except InputError:  # a text that is no address has no token
-        return False
-
-
 def _verify(option: bool | str | None, variable: str | None, stored: Any, path: Path) -> bool | str:
     for source, value in (("verify", option), (VERIFY, variable), (f"server.verify in {path}", stored)):
         if isinstance(value, bool):
@@ -348,34 +207,3 @@ def verify_of(source: str, text: str) -> bool | str:
             f"{source}: wanted true, false or a file with certificate authorities; {text} is not a file"
         )
     return str(Path(text).expanduser())
-
-
-LONGEST_TOLD = 3600.0
-"""Seconds: a server that names a longer pause is asked again after this one."""
-
-
-@dataclass(frozen=True)
-class Pause:
-    """Why nothing is sent to a server, or nothing of one item, before ``until``.
-
-    until
-        seconds since 1970; infinite: until a person acts.
-    code
-        of the error.
-    failures
-        how often it failed in a row.
-    told
-        the server itself named the time: only a person shortens it.
-    """
-
-    until: float
-    reason: str
-    code: str = ""
-    failures: int = 1
-    told: bool = False
-
-    def left(self, now: float) -> float:
-        """Return how many seconds of the pause remain; 0 if it is over."""
-        # A pause that is longer than any of ours was noted before the clock was set back.
-        left = self.until - now
-        return left if 0 < left <= LONGEST_TOLD or math.isinf(left) else 0.0

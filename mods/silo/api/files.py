@@ -1,165 +1,30 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Files of items over HTTP: streamed both ways, checked by SHA-256, never in memory, never half-written.
-
-What an item's revisions say about a file of ours: what it was made from, and whether it arrived already.
-
-An upload whose answer was lost is not sent again before this is known: it would make a second revision.
-"""
+"""Files of items over HTTP: streamed both ways, checked by SHA-256, never in memory, never half-written."""
 
 from __future__ import annotations
 
 import gzip
 import hashlib
-import os
-import secrets
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urljoin
 
-from silo.api.policy import error_of
-from silo.api.transport import (
-    LISTS,
-    MAX_ERROR,
-    ApiCall,
-    Caller,
-    Cancel,
-    Params,
-    Transport,
-    as_json,
-    stop_if,
-)
+from silo.api.caller import LISTS, Caller, Params, as_json
+from silo.api.multipart import FileBody, FileForm, Progress
+from silo.api.replies import error_of
+from silo.api.revisions import checksum_of
+from silo.api.transport import MAX_ERROR, ApiCall, Cancel, Transport
 from silo.api.wire import Document, HeldItem, LinkedFile, Release, Revision, Scene, Wire
-from silo.bom.errors import (
-    ConflictError,
-    DocumentError,
-    NewerRevisionError,
-    NotFoundError,
-    RejectedError,
-    RouteMissingError,
-    ServerFaultError,
-)
+from silo.bom.errors import ConflictError, DocumentError, RejectedError, RouteMissingError, ServerFaultError
 from silo.bom.numbers import whole_number
 from silo.bom.resolve import with_allowed_characters
-from silo.files import bare_checksum, seen_as
-from silo.platform import no_device_name, remove_patiently, replacing, scratch_folder
+from silo.platform import remove_patiently, replacing
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-
-
-@dataclass(frozen=True)
-class Standing:
-    """How a file stands to its item's revisions.
-
-    base
-        the revision that it was made from; None where it is none of them.
-    newest
-        the newest revision with a file; None where there is none.
-    """
-
-    base: Revision | None
-    newest: Revision | None
-
-    @property
-    def newer(self) -> Revision | None:
-        """Return the revision that committing the file would undo; None if it would undo nothing."""
-        if self.newest is None or self.newest.revision_number <= self.base_number:
-            return None
-        return self.newest
-
-    @property
-    def base_number(self) -> int:
-        """Return the base's number; -1 if it is not known, so that any revision is newer."""
-        return self.base.revision_number if self.base is not None else -1
-
-    def check(self, part_number: str) -> None:
-        """Raise NewerRevisionError if committing the file would undo a newer revision."""
-        if (newest := self.newer) is None:
-            return
-        made = (
-            f"revision {self.base_number}" if self.base is not None else "a file that is no revision in Silo"
-        )
-        raise NewerRevisionError(
-            f"{newest.created_by or 'Somebody'} committed revision {newest.revision_number} of {part_number}"
-            f"{f' ({newest.comment})' if newest.comment else ''}, and this was made from {made}. "
-            "Sending it would undo that. Look at theirs; then send yours on top of it, or discard it and "
-            "take theirs",
-            newest.model_dump(mode="json", exclude={"properties", "links"}),
-        )
-
-
-def has_file(revision: Revision) -> bool:
-    """Return True if the revision has a file; a revision without one only changes properties."""
-    return bool(revision.file_checksum or revision.file_name or revision.file_key or revision.file_size)
-
-
-def standing(
-    revisions: Iterable[Revision], origin: str, known: int | None = None, seen: str = ""
-) -> Standing:
-    """Compare a file that was made from ``origin`` (a SHA-256) with the revisions of its item.
-
-    known
-        the number of that revision, for a server that keeps no checksums. Otherwise the checksum decides,
-        since a server that was restored from a backup gives the same numbers to other files.
-    seen
-        the newest revision that a person has seen and decided about: its number and its checksum.
-    """
-    files = sorted((r for r in revisions if has_file(r)), key=lambda r: r.revision_number)
-    mine = [
-        r
-        for r in files
-        if seen == seen_as(r.revision_number, r.file_checksum)
-        or (checksum_of(r) == origin if checksum_of(r) else r.revision_number == known)
-    ]
-    base = max(mine, key=lambda r: r.revision_number, default=None)
-    return Standing(base, files[-1] if files else None)
-
-
-def newest_number(revisions: Iterable[Revision]) -> int:
-    """Return the number of the newest revision; 0 if there is none."""
-    return max((revision.revision_number for revision in revisions), default=0)
-
-
-def is_newest(sha256: str, revisions: Iterable[Revision]) -> bool:
-    """Return True if the newest revision is this very file. An older one does not count: a person may go back
-    to it.
-    """
-    newest = max(revisions, key=lambda revision: revision.revision_number, default=None)
-    return newest is not None and checksum_of(newest) == sha256
-
-
-def other_name(path: str, revisions: Iterable[Revision]) -> str:
-    """Return the name of the item's newest file if ``path`` has another name; "" if it has the same.
-
-    "Save As" copies the identity along.
-    """
-    named = [revision for revision in revisions if revision.file_name]
-    if not named:
-        return ""
-    newest = max(named, key=lambda revision: revision.revision_number)
-    old_name = os.path.basename(str(newest.file_name))
-    file_name, other = (no_device_name(os.path.basename(name)).casefold() for name in (old_name, path))
-    return old_name if file_name != other else ""
-
-
-REPACKED = (".kc",)
-"""Files that a server packs again: what comes down differs from what went up."""
-
-
-def is_there(revisions: Iterable[Revision], file_name: str, sha256: str, number: int | None) -> bool:
-    """Return True if a file that became revision ``number`` is among these. The checksum decides if it is
-    that of the file as it was sent; a revision without a file decides nothing.
-    """
-    by_number = Path(file_name).suffix.lower() in REPACKED
-    revisions_here = list(revisions)
-    files = [r for r in revisions_here if has_file(r)] or revisions_here  # some servers say nothing of files
-    return any(
-        checksum_of(r) == sha256 or (r.revision_number == number and (by_number or not checksum_of(r)))
-        for r in files
-    )
 
 
 def download_revision(
@@ -187,87 +52,6 @@ def download_revision(
     return result
 
 
-class MayHaveArrivedError(ConflictError):
-    """Nothing shows whether one of these revisions is the file. ``newest``: the last of them."""
-
-    def __init__(self, part_number: str, sent: SentFile, revisions: Sequence[int]) -> None:
-        numbers = ", ".join(map(str, revisions))
-        super().__init__(
-            f"{part_number}: {sent.file_name} may have arrived already, as revision {numbers}; this server "
-            "keeps no checksum to compare. Look at it in Silo: Retry sends the file, Discard does not"
-        )
-        self.newest = max(revisions)
-
-
-@dataclass(frozen=True)
-class SentFile:
-    """The file that was sent. ``base``: the newest revision that the item had before the first try."""
-
-    file_name: str
-    sha256: str
-    size: int
-    base: int
-
-
-def find_arrived(
-    client: SiloClient,
-    part_number: str,
-    sent: SentFile,
-    revisions: Sequence[Revision],
-    *,
-    cancelled: Cancel | None = None,
-) -> Revision | None:
-    """Find the revision that holds the file already; None if there is none, so that the file may be sent.
-
-    Compares the server's checksum; if it keeps none, the size, and then the content of the revision's file.
-    Raises :class:`MayHaveArrivedError` if even that decides nothing: a person looks before it is sent a
-    second time.
-    """
-    doubtful: list[Revision] = []
-    for revision in sorted(revisions, key=lambda other: other.revision_number):
-        if revision.revision_number <= sent.base:
-            continue
-        if checksum := checksum_of(revision):
-            if checksum == sent.sha256:
-                return revision
-            continue
-        same = _same_content(client, part_number, revision, sent, cancelled)
-        if same:
-            return revision
-        if same is None:
-            doubtful.append(revision)
-    if doubtful:
-        raise MayHaveArrivedError(part_number, sent, [revision.revision_number for revision in doubtful])
-    return None
-
-
-def checksum_of(revision: Revision) -> str:
-    """Return the SHA-256 of a revision's file in lower-case hex; "" if the server names none."""
-    return bare_checksum(revision.file_checksum)
-
-
-def _same_content(
-    client: SiloClient, part_number: str, revision: Revision, sent: SentFile, cancelled: Cancel | None
-) -> bool | None:
-    """Return True or False if the server shows whether the revision holds the file; None if nothing
-    shows it.
-    """
-    repacked = Path(sent.file_name).suffix.lower() in REPACKED
-    if revision.file_size is not None and revision.file_size != sent.size and not repacked:
-        return False
-    with scratch_folder("silo-") as folder:
-        try:
-            stored = client.download_file(
-                part_number, Path(folder) / "file", revision.revision_number, cancelled=cancelled
-            )
-        except NotFoundError:
-            # A revision without a file is a change of properties; one that names a file cannot be read.
-            return None if revision.file_key or revision.file_size else False
-    if stored == sent.sha256:
-        return True
-    return None if repacked else False
-
-
 class DocumentId(str):
     """The UUID of a document, wherever the part number of an item may stand: its file, its revisions."""
 
@@ -280,10 +64,6 @@ def _path_of(of: str) -> tuple[str, str]:
 
 MAX_DOWNLOAD = 4 << 30
 _PAGE = 1000  # revisions in one answer
-_BLOCK = 1 << 18
-
-Progress = Callable[[int, int], object]
-"""Called with (bytes done, bytes in all)."""
 
 
 class Origin(Wire):
@@ -577,117 +357,3 @@ def _write(path: Path, pieces: Iterator[bytes], total: int, on_progress: Progres
     except OSError as error:
         raise DocumentError(str(path), f"cannot be written ({error.strerror or error})") from error
     return digest.hexdigest()
-
-
-class FileForm:
-    """The body of a multipart upload; a readable of known length, as :mod:`requests` wants a stream.
-
-    fields
-        text parts, sent before the file.
-    on_progress
-        called with the bytes of the file that were taken so far; a pure observer.
-
-    Raises :class:`DocumentError` where the file cannot be read or changes under our hands.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        fields: Mapping[str, str],
-        file_name: str,
-        on_progress: Progress | None = None,
-        cancelled: Cancel | None = None,
-    ) -> None:
-        self._path = path
-        self._progress, self._cancelled = on_progress, cancelled
-        self._boundary = secrets.token_hex(16)
-        # The quoting that browsers use for file names (WHATWG HTML, multipart/form-data encoding).
-        quoted = file_name.replace('"', "%22").replace("\r", "%0D").replace("\n", "%0A")
-        begin, disposition = f"--{self._boundary}\r\n", "Content-Disposition: form-data; name="
-        parts = [
-            f'{begin}{disposition}"{name}"\r\nContent-Type: text/plain; charset=utf-8\r\n\r\n{text}\r\n'
-            for name, text in fields.items()
-        ]
-        parts.append(f'{begin}{disposition}"file"; filename="{quoted}"\r\n')
-        parts.append("Content-Type: application/octet-stream\r\n\r\n")
-        self._begin = "".join(parts).encode("utf-8", "replace")
-        self._end = f"\r\n--{self._boundary}--\r\n".encode()
-        try:
-            self._file: BinaryIO = path.open("rb")
-        except OSError as error:
-            raise _unreadable(path, error) from error
-        self.file_size = os.fstat(self._file.fileno()).st_size
-        # `requests` takes the length of a stream from this attribute and sends it as Content-Length.
-        self.len = len(self._begin) + self.file_size + len(self._end)
-        self.rewound()
-
-    @property
-    def content_type(self) -> str:
-        return f"multipart/form-data; boundary={self._boundary}"
-
-    @property
-    def sha256(self) -> str:
-        """Return the hash of the bytes of the file that were read so far; it is the file's when the form is
-        read to its end.
-        """
-        return self._hash.hexdigest()
-
-    def rewound(self) -> Self:
-        """Go back to the beginning of the form, for a redirect, and return it."""
-        self._head, self._tail, self._left = self._begin, self._end, self.file_size
-        self._hash = hashlib.sha256()
-        self._file.seek(0)
-        return self
-
-    def read(self, size: int = -1) -> bytes:
-        """Read the next bytes of the form."""
-        stop_if(self._cancelled)
-        if self._head:
-            size = len(self._head) if size < 0 else size
-            block, self._head = self._head[:size], self._head[size:]
-            return block
-        if self._left:
-            return self._take_file(size)
-        tail, self._tail = self._tail, b""
-        return tail
-
-    def __iter__(self) -> Self:
-        return self
-
-    def __next__(self) -> bytes:
-        block = self.read(_BLOCK)
-        if not block:
-            raise StopIteration
-        return block
-
-    def close(self) -> None:
-        self._file.close()
-
-    def _take_file(self, size: int) -> bytes:
-        try:
-            block = self._file.read(min(self._left, size if size > 0 else _BLOCK))
-        except OSError as error:
-            raise _unreadable(self._path, error) from error
-        if not block:
-            raise DocumentError(
-                str(self._path), "the file became shorter while it was sent; save it, then try again"
-            )
-        self._hash.update(block)
-        self._left -= len(block)
-        if self._progress is not None:
-            self._progress(self.file_size - self._left, self.file_size)
-        return block
-
-
-class FileBody(FileForm):
-    """The bare bytes of a file as the body of a request."""
-
-    def __init__(self, path: Path, on_progress: Progress | None, cancelled: Cancel | None) -> None:
-        super().__init__(path, {}, path.name, on_progress, cancelled)
-        self._begin = self._end = b""
-        self.len = self.file_size
-        self.rewound()
-
-
-def _unreadable(path: Path, error: OSError) -> DocumentError:
-    return DocumentError(str(path), f"the file cannot be read ({error.strerror or error}); nothing was sent")

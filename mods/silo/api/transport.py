@@ -7,49 +7,35 @@ The rules of this module:
 * the token goes to the configured server only, never along a redirect to another, never from https to http;
 * a changing request (POST, PUT) follows a redirect only within the configured server and with its body;
 * an answer has an upper size and an upper duration, however slowly it drips.
-
-What the calls of a client share: how a question becomes a request, and what was learned of the server.
 """
 
 from __future__ import annotations
 
-import json
-import logging
-import re
 import time
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 from urllib.parse import urljoin, urlsplit
 
 import requests
 import urllib3
-from pydantic import BaseModel, ValidationError
 from requests.adapters import HTTPAdapter
 from requests.auth import AuthBase
 
-from silo.api.config import Origin, ServerAddress, may_carry_token, origin_of
-from silo.api.policy import Reply, Retries, Where, error_of, translated
+from silo.api.address import Origin, ServerAddress, may_carry_token, origin_of
+from silo.api.foreign import Where, translated
+from silo.api.policy import Retries
+from silo.api.replies import Reply, error_of
 from silo.bom.errors import (
     AuthError,
-    BusyError,
     CancelledError,
     ConfigError,
-    ForbiddenError,
-    InputError,
-    NotFoundError,
-    ReadOnlyError,
-    RejectedError,
     ServerFaultError,
     SiloError,
     UnreachableError,
 )
 from silo.bom.numbers import whole_number
-from silo.bom.resolve import character_problem, with_allowed_characters
-from silo.platform import cache_folder, read_memory, write_memory
 
 MAX_REDIRECTS = 5
 MAX_ERROR = 1 << 20
@@ -256,28 +242,6 @@ class Transport:
             stop_if(cancelled)
 
 
-def as_json(data: object) -> bytes:
-    """Write the data as strict JSON. Raises :class:`InputError` for NaN, bytes, or a value that holds itself.
-
-    A character that no server takes, as in the name of a file, becomes U+FFFD.
-    """
-    try:
-        written = json.dumps(data, ensure_ascii=False, allow_nan=False)
-        if "\\u00" in written or character_problem(written):
-            written = json.dumps(_sendable(json.loads(written)), ensure_ascii=False)
-        return written.encode()
-    except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(f"this cannot be sent as JSON: {error}") from error
-
-
-def _sendable(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {with_allowed_characters(key): _sendable(below) for key, below in value.items()}
-    if isinstance(value, list):
-        return [_sendable(below) for below in value]
-    return with_allowed_characters(value) if isinstance(value, str) else value
-
-
 def read_some(response: requests.Response) -> bytes:
     """Read and decode what has arrived. Waits only for the first byte; b"" at the end."""
     # `iter_content` waits until a chunk is full, so a slow server could delay us without end.
@@ -376,270 +340,3 @@ def _new_session(patience: float) -> requests.Session:
     # The token is the only thing that says who we are; a session cookie would outlive its withdrawal.
     session.cookies.set_policy(DefaultCookiePolicy(allowed_domains=[]))
     return session
-
-
-log = logging.getLogger("silo.api")
-
-KEPT_S = 24 * 3600.0
-
-
-class Abilities(BaseModel):
-    """What a server can do, kept for a day, so that each run need not try it again; None: nobody tried yet.
-
-    Rights and modes are not kept, they change.
-
-    batch
-        many identities in one question.
-    boms
-        the BOMs of many items in one question.
-    look_alikes
-        the items that many components may be already, in one question.
-    strict
-        it refuses keys that it does not know.
-    keeps_item_ids
-        a new item gets the UUID that the client proposes.
-    schemas
-        the part-number schema that is taken for a wanted one.
-    """
-
-    batch: bool | None = None
-    boms: bool | None = None
-    look_alikes: bool | None = None
-    strict: bool = False
-    keeps_item_ids: bool = False
-    schemas: dict[str, str] = {}
-
-
-class _KeptAbilities(Abilities):
-    learned_at: float
-
-
-def abilities_path() -> Path:
-    """Return the file in which this user's programs keep what they learned about servers."""
-    return cache_folder() / "servers.json"
-
-
-def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time.time) -> Abilities:
-    """Read what is known of a server; nothing if that is older than a day."""
-    try:
-        memory = _KeptAbilities.model_validate(read_memory(path).get(server), strict=True)
-    except ValidationError:
-        return Abilities()
-    fresh = 0 <= clock() - memory.learned_at < KEPT_S
-    return Abilities(**memory.model_dump(exclude={"learned_at"})) if fresh else Abilities()
-
-
-def save_abilities(
-    path: Path, server: str, abilities: Abilities, *, clock: Callable[[], float] = time.time
-) -> None:
-    """Write what is known of a server into one small JSON file for all servers. Ignores a failed write.
-
-    It is only a memory: a file that is lost, old or damaged costs some requests, never an answer.
-    """
-    content = {**read_memory(path), server: {**abilities.model_dump(), "learned_at": clock()}}
-    if (error := write_memory(path, content)) is not None:
-        log.info("%s: what was learned about %s is not kept (%s)", path, server, error)
-
-
-T = TypeVar("T")
-K = TypeVar("K", bound=Hashable)
-Body = TypeVar("Body", bound=BaseModel)
-
-LISTS = ("items", "entries", "lines", "bom", "results", "data")
-"""The keys under which servers put a list that is not bare."""
-
-MAX_IN_BATCH = 1000
-"""Things in one batch question."""
-
-MAX_WORKERS = 8
-"""Questions at once where the server has no batch look-up."""
-
-_UNKNOWN_KEY = re.compile(
-    r"(unknown|unrecogni[sz]ed|unexpected|additional|extra|unsupported)\s+(json\s+)?"
-    r"(fields?|keys?|propert|inputs?|parameters?|attributes?)|not permitted",
-    re.IGNORECASE,
-)
-
-Params = Mapping[str, str | int]
-
-
-class Caller:
-    """Base of the client's parts: an address and a transport."""
-
-    _address: ServerAddress
-    _transport: Transport
-    abilities: Abilities
-    _refused: frozenset[str] = frozenset()  # batch requests, for this token and mode
-
-    def _get(self, subject: str, *segments: str, params: Params | None = None) -> Reply:
-        """Send a GET request, which may be repeated freely."""
-        return self._transport.send(
-            ApiCall(
-                "GET",
-                self._address.api(*segments),
-                subject,
-                params=params or {},
-                headers={"Accept": "application/json"},
-                repeatable=True,
-            )
-        )
-
-    def _all(
-        self, kind: type[Body], subject: str, *segments: str, keys: Sequence[str] = (), **params: str | int
-    ) -> Iterator[tuple[list[Body], int]]:
-        """Yield the rows of a list to its end, page by page, each page with the total number of rows.
-
-        Raises :class:`ServerFaultError` if the server has more rows and does not show them: an incomplete
-        list is no answer.
-        """
-        more, rows, last = dict(params), 0, list[Body]()
-        while True:
-            reply = self._get(subject, *segments, params=more)
-            page = reply.models(kind, *keys, *LISTS)
-            fresh = [] if page == last else page  # a server that knows no pages sends the same once more
-            rows, following = rows + len(fresh), reply.next if page else {}
-            total = max(reply.total, rows + bool(following))
-            yield fresh, total
-            if rows >= total:
-                return
-            if not fresh:
-                raise ServerFaultError(
-                    f"{subject}: {self._address.host} has more of them than the {rows} that it shows, "
-                    "whatever page is asked for. Its administrator can make the pages of lists larger"
-                )
-            last, more = page, {**params, **(following or {"offset": rows})}
-
-    def _ask(self, subject: str, *segments: str, cancelled: Cancel | None = None, **asked: Any) -> Reply:
-        """Ask a question that is too long for an address: a POST that may be repeated freely."""
-        return self._change("POST", subject, *segments, body=asked, repeatable=True, cancelled=cancelled)
-
-    def _change(
-        self,
-        method: str,
-        subject: str,
-        *segments: str,
-        body: BaseModel | Mapping[str, Any],
-        headers: Mapping[str, str] | None = None,
-        repeatable: bool = False,
-        cancelled: Cancel | None = None,
-        extensions: Sequence[str] = (),
-    ) -> Reply:
-        """Send a model, or the values for one, as JSON.
-
-        extensions
-            keys that only our own server knows, also inside lists of objects. A strict server refuses them:
-            it gets the request once more without them, and never gets any again.
-        """
-        # Not pydantic's own JSON, which writes NaN as null: a value that JSON lacks is an error, not a gap.
-        values = body.model_dump(by_alias=True, exclude_none=True) if isinstance(body, BaseModel) else body
-        bare = _without(values, extensions)
-
-        def send(data: Any) -> Reply:
-            content = as_json(data)
-            return self._transport.send(
-                ApiCall(
-                    method,
-                    self._address.api(*segments),
-                    subject,
-                    body=lambda: content,
-                    headers={
-                        "Accept": "application/json",
-                        "Content-Type": "application/json",
-                        **(headers or {}),
-                    },
-                    repeatable=repeatable,
-                    cancelled=cancelled,
-                )
-            )
-
-        if self.abilities.strict or bare == values:
-            return send(bare)
-        try:
-            return send(values)
-        except RejectedError as error:
-            if not _UNKNOWN_KEY.search(f"{error} {' '.join(error.problems)}"):
-                raise
-        reply = send(bare)
-        self.abilities.strict = True
-        return reply
-
-    def _many(
-        self,
-        ability: str,
-        keys: Iterable[K],
-        batch: Callable[[Sequence[K]], Mapping[K, T]],
-        single: Callable[[K], T | None],
-        cancelled: Cancel | None = None,
-    ) -> dict[K, T]:
-        """Ask about many things: in few requests if the server can answer these, else one by one in a bounded
-        pool.
-
-        ability
-            the field of :class:`Abilities` that says if the server has such a request.
-        """
-        wanted = list(dict.fromkeys(keys))
-        answers: dict[K, T] = {}
-        chunks = [wanted[start : start + MAX_IN_BATCH] for start in range(0, len(wanted), MAX_IN_BATCH)]
-        while chunks:
-            stop_if(cancelled)
-            chunk = chunks.pop(0)
-            answer = None
-            if ability not in self._refused and getattr(self.abilities, ability) is not False:
-                try:
-                    answer = batch(chunk)
-                    setattr(self.abilities, ability, True)
-                except NotFoundError:
-                    setattr(self.abilities, ability, False)
-                except (ForbiddenError, ReadOnlyError, BusyError):
-                    # No POST for viewers and on a read-only server: GET is allowed anyway.
-                    self._refused = self._refused | {ability}
-                except RejectedError:
-                    # Too many at once, or a malformed key, which spoils the batch: alone, it is unknown.
-                    if len(chunk) > 1:
-                        half = len(chunk) // 2
-                        chunks[:0] = [chunk[:half], chunk[half:]]
-                        continue
-            answers.update(_one_by_one(chunk, single, cancelled) if answer is None else answer)
-        return answers
-
-    def _delete(self, subject: str, *segments: str) -> None:
-        self._transport.send(ApiCall("DELETE", self._address.api(*segments), subject))
-
-
-def body(kind: type[Body], values: Mapping[str, Any], thing: str) -> Body:
-    """Make a request from the values. :class:`InputError` lists all values that do not fit."""
-    unknown = sorted(set(values) - set(kind.model_fields) - {"schema"})
-    if unknown:
-        text = ", ".join(kind.model_fields)
-        raise InputError(f"{', '.join(unknown)}: no field of {thing}; wanted some of {text}")
-    try:
-        return kind.model_validate(values)
-    except ValidationError as error:
-        wrong = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
-        raise InputError(f"these values do not fit {thing}: {wrong}") from error
-
-
-def _one_by_one(keys: Sequence[K], single: Callable[[K], T | None], cancelled: Cancel | None) -> dict[K, T]:
-    def one(key: K) -> T | None:
-        stop_if(cancelled)
-        return single(key)
-
-    with ThreadPoolExecutor(min(MAX_WORKERS, len(keys)), "silo-lookup") as pool:
-        try:
-            results = list(pool.map(one, keys))
-        except BaseException:
-            # One failed, so the rest is no longer needed.
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return {key: value for key, value in zip(keys, results, strict=True) if value is not None}
-
-
-def _without(data: Any, keys: Sequence[str]) -> Any:
-    """Return the data without these keys, here and in lists of objects; other values stay as they are."""
-    if not keys or not isinstance(data, dict):
-        return data
-    return {
-        key: [_without(member, keys) for member in value] if isinstance(value, list) else value
-        for key, value in data.items()
-        if key not in keys
-    }

@@ -261,10 +261,11 @@ def client_of(
     stop
         once it is set, nobody waits for the server any more.
     """
+    from silo.api.abilities import abilities_path
     from silo.api.client import SiloClient
     from silo.api.config import resolve_server
     from silo.api.policy import Retries
-    from silo.api.transport import abilities_path, stop_if
+    from silo.api.transport import stop_if
 
     stopped = stop or threading.Event()
 

@@ -50,7 +50,8 @@ from silo.cli.common import (
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.api.events import ConnectionState, ServerEvent
+    from silo.api.events import ConnectionState
+    from silo.api.sse import ServerEvent
     from silo.freecads import Installation
 
 
@@ -441,8 +442,8 @@ def _listed(texts: Iterable[str]) -> str:
 
 
 def _server(args: argparse.Namespace) -> Rows:
+    from silo.api.abilities import Abilities
     from silo.api.config import resolve_server
-    from silo.api.transport import Abilities
 
     try:
         where = resolve_server(args.server, args.token)

@@ -217,7 +217,7 @@ _STATUS = {
 
 def outcome_text(outcome: Outcome, base: str) -> Text:
     """Write which assembly it was, what became of it, and its file relative to ``base``."""
-    from silo.api.boms import unusual
+    from silo.api.merging import unusual
     from silo.batch import STATUS_WORDS
     from silo.bom_sync import draft_text
 

@@ -43,7 +43,7 @@ from silo.outbox.store import KEPT_ASIDE_DAYS
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.api.config import Pause
+    from silo.api.pause import Pause
     from silo.api.wire import Item, ProductChanges, Revision
     from silo.batch import RunSummary
     from silo.outbox.entry import Entry
@@ -297,7 +297,8 @@ def run_queue(args: argparse.Namespace) -> int:
     """Show the queue, after doing what ``args.do`` says. Returns 1 if something waits or is held; 2 or 3 if
     the server stops a retry.
     """
-    from silo.api.config import canonical, resolve_server
+    from silo.api.address import canonical
+    from silo.api.config import resolve_server
     from silo.outbox.store import Store
 
     store, here = Store(), ""
@@ -543,7 +544,7 @@ def _revision_on_disk(
     store: Store, sha256: str, identity: str, server: str, revisions: list[Revision]
 ) -> tuple[int | None, bool]:
     """Return the revision that the file is or was made from, and if it has edits since."""
-    from silo.api.files import standing
+    from silo.api.revisions import standing
 
     for content, edited in ((sha256, False), (store.origin_of(sha256), True)):
         number = store.known_revision(server, content, identity)

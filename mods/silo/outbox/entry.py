@@ -30,7 +30,7 @@ from typing import Any
 from urllib.parse import urlsplit
 from uuid import uuid4
 
-from silo.api.config import Pause
+from silo.api.pause import Pause
 from silo.bom.errors import Translate, duration, english
 from silo.bom.model import Extraction
 from silo.files import seen_as
@@ -155,7 +155,7 @@ class Entry(Said):
     """A row of the outbox.
 
     server
-        the server that it is meant for, in :func:`silo.api.config.canonical` form; "" until it is first
+        the server that it is meant for, in :func:`silo.api.address.canonical` form; "" until it is first
         tried.
     file_left, bom_left
         what is still to be sent.

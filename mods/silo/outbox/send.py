@@ -20,23 +20,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from silo.api.address import canonical
+from silo.api.arrived import MayHaveArrivedError, SentFile, find_arrived, is_there
 from silo.api.client import SiloClient
-from silo.api.config import Pause, canonical
-from silo.api.files import (
-    DocumentId,
-    MayHaveArrivedError,
-    Origin,
-    SentFile,
-    Standing,
-    checksum_of,
-    find_arrived,
-    is_newest,
-    is_there,
-    newest_number,
-    other_name,
-    standing,
-)
+from silo.api.files import DocumentId, Origin
+from silo.api.pause import Pause
 from silo.api.policy import QUEUE_PAUSES, Backoff, ErrorScope, Then, is_certain, judge, pause_after
+from silo.api.revisions import Standing, checksum_of, is_newest, newest_number, other_name, standing
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
     HeldItem,

@@ -31,7 +31,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from silo.api.config import Pause, canonical
+from silo.api.address import canonical
+from silo.api.pause import Pause
 from silo.bom.errors import ConflictError, DocumentError, InputError, counted
 from silo.bom.report import to_plain
 from silo.files import content_hash, folder_lock

@@ -24,7 +24,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
-from silo.api.files import other_name
+from silo.api.revisions import other_name
 from silo.bom.document import label_of, located, object_name, own
 from silo.bom.errors import (
     CancelledError,

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from silo.api.files import DocumentId, checksum_of
+from silo.api.files import DocumentId
+from silo.api.revisions import checksum_of
 from silo.api.wire import Revision
 from silo.bom.errors import (
     DocumentError,

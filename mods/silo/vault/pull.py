@@ -32,7 +32,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.api.files import DocumentId, Standing, checksum_of, download_revision, has_file
+from silo.api.files import DocumentId, download_revision
+from silo.api.revisions import Standing, checksum_of, has_file
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import Item, LinkedFile, Release, Revision
 from silo.bom.compare.states import ComparedAssembly

@@ -519,7 +519,7 @@ class Buttons:
 
     def open_page(self, url: str) -> None:
         """Open a page of the server in use; if no browser opens, put the address on the clipboard."""
-        from silo.api.config import ServerAddress
+        from silo.api.address import ServerAddress
         from silo.bom.errors import SiloError
 
         try:

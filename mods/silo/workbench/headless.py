@@ -289,7 +289,7 @@ def _in_words(result: TopResult) -> str:
 
 
 def _outcome_words(outcome: Outcome) -> str:
-    from silo.api.boms import unusual
+    from silo.api.merging import unusual
     from silo.bom_sync import blocking
 
     text = f"{outcome.assembly.part_number or outcome.assembly.label} {outcome.status.value}"

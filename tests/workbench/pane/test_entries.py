@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from activities import activity_of, entry_text
 
-from silo.api.boms import NOT_ATOMIC
-from silo.api.events import ServerEvent
+from silo.api.merging import NOT_ATOMIC
+from silo.api.sse import ServerEvent
 from silo.api.wire import CostTotal, Draft, Lacking, MergeDiff, MergeWarning, ProductSummary, Revision
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity

@@ -15,8 +15,8 @@ from desk import Office
 from fcstd_writer import Doc
 from server_testing import wait_until
 
-from silo.api.config import Pause
-from silo.api.events import MERGE, RESET, ServerEvent
+from silo.api.pause import Pause
+from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeEvent, MergeResult
 from silo.bom.errors import SiloError, UnreachableError
 from silo.bom_sync import Status

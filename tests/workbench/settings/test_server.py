@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 from desk import Group
 
-from silo.api.config import same_server
+from silo.api.address import same_server
 from silo.bom.errors import ConfigError
 from silo.workbench.settings import DEFAULTS, Preferences
 from silo.workbench.settings.server import (

@@ -65,7 +65,7 @@ from silo.workbench.words import counted, filled, plain, quantity, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.api.files import Standing
+    from silo.api.revisions import Standing
     from silo.api.transport import Cancel
     from silo.bom.objects import Key
     from silo.outbox.entry import Entry as QueueEntry
@@ -264,7 +264,7 @@ def gone(client: SiloClient, announced: Mapping[str, Newer], cancelled: Cancel |
     """Find the items of which the server no longer has the announced commit. For a worker: one request for
     each.
     """
-    from silo.api.files import newest_number
+    from silo.api.revisions import newest_number
     from silo.api.transport import stop_if
 
     identities = []
@@ -289,7 +289,7 @@ def look_held(
 
     Raises SiloError if the server does not answer, or a file cannot be read.
     """
-    from silo.api.config import canonical
+    from silo.api.address import canonical
     from silo.bom.report import from_plain
     from silo.vault.pull import top_of
 
@@ -314,7 +314,7 @@ class _CommitFile:
 
     def standing(self, client: SiloClient, outbox: Store) -> Standing | None:
         """Compare the file with the item's revisions; None if committing it would undo nothing."""
-        from silo.api.files import is_newest, standing
+        from silo.api.revisions import is_newest, standing
 
         # The newest one decides it nearly always; an item may have hundreds.
         if is_newest(self.origin, client.revisions(self.part_number, newest=1)):

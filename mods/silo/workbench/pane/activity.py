@@ -19,13 +19,13 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from silo.api.config import canonical
+from silo.api.address import canonical
 from silo.outbox.entry import ASKED, State, host_of, parts, words
 from silo.outbox.entry import Entry as QueueEntry
 from silo.workbench.words import counted, plain, spoken, translate
 
 if TYPE_CHECKING:
-    from silo.api.config import Pause
+    from silo.api.pause import Pause
     from silo.workbench.commit.flow import Theirs
     from silo.workbench.session.session import Newer, PaneState
 

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import Any
 
-from silo.api.boms import unusual
-from silo.api.events import MERGE, RESET, ServerEvent
+from silo.api.merging import unusual
+from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
 from silo.bom.document import saved_by
 from silo.bom.errors import SiloError

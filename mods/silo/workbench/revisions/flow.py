@@ -377,7 +377,7 @@ class RevisionFlow:
         outbox = self._session.outbox
 
         def run(client: SiloClient, _control: Control) -> ItemHistory:
-            from silo.api.files import standing
+            from silo.api.revisions import standing
             from silo.bom.errors import NotFoundError
 
             item = client.get_item_by_uuid(identity)

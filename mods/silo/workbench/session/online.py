@@ -11,8 +11,10 @@ from time import monotonic
 from typing import Any
 
 from silo.api.client import SiloClient
-from silo.api.config import Pause, resolve_server
-from silo.api.events import RESET, Connection, EventListener, Pauses, ServerEvent
+from silo.api.config import resolve_server
+from silo.api.events import Connection, EventListener, Pauses
+from silo.api.pause import Pause
+from silo.api.sse import RESET, ServerEvent
 from silo.bom.errors import ConfigError, InputError
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.send import Report, Sent, send_all

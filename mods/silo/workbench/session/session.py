@@ -27,7 +27,7 @@ from silo.workbench.words import spoken, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.api.config import Pause
+    from silo.api.pause import Pause
     from silo.outbox.send import Sent
     from silo.workbench.commit.flow import Theirs
     from silo.workbench.commit.opened import Base

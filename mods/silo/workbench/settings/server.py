@@ -156,7 +156,8 @@ def choose_server(
         what :func:`silo.api.config.resolve_server` found in the configuration file (``url``, ``token``,
         ``verify``), or None.
     """
-    from silo.api.config import TOKEN, URL, first_of, same_server  # not before FreeCAD's window stands
+    from silo.api.address import same_server
+    from silo.api.config import TOKEN, URL, first_of
 
     file_url, file_token = (file_server.url, file_server.token) if file_server is not None else (None, None)
     url, url_from = first_of(

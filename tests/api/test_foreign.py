@@ -14,7 +14,7 @@ import pytest
 import requests.exceptions
 import urllib3.exceptions
 
-from silo.api.policy import FOREIGN, TABLE, Where, translate, translated
+from silo.api.foreign import FOREIGN, TABLE, Where, translate, translated
 from silo.bom.errors import NotFoundError, ServerFaultError, SiloError, UnreachableError
 
 WHERE = Where("silo.example.com", "item F01-0001", 5, 30)
