@@ -21,12 +21,13 @@ COMMITS = 6
 
 def commits(one: Any, doc: Any) -> None:
     """The first commit imports modules, once per FreeCAD; it is reported apart."""
-    from silo.workbench.freecad import live_desk
+    from silo.workbench import live_desk
+    from silo.workbench.freecad import saving
 
     pulse = Pulse()
     saves: list[Times] = []
     walks: list[Times] = []
-    live_desk.LiveDocuments.save = staticmethod(pulse.timed(live_desk.saving.save, saves))
+    live_desk.LiveDocuments.save = staticmethod(pulse.timed(saving.save, saves))
     desk = one.commits._desk
     desk.snapshot = pulse.timed(desk.snapshot, walks)
     told = []

@@ -56,7 +56,7 @@ def test_freecad_draws_what_the_kernel_draws(version: str, tmp_path: Path) -> No
     code = (
         f"import sys; sys.path[:] = [one for one in sys.path if one not in {sys.path!r}]; "
         f"sys.path += {[str(MODS), str(freecad.dependencies)]!r}; "
-        "from silo.workbench.freecad.drawing import main; main()"
+        "from silo.workbench.freecad.drawer import main; main()"
     )
     sent = send_models(silo, [(path, content_hash(path))], command=[freecad.command, "-c", code])
     assert sent == (1, [])

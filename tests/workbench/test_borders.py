@@ -65,6 +65,8 @@ def test_workers_and_flows_know_neither_freecad_nor_widgets(name: str) -> None:
         "silo.workbench.gui.qt",
         "silo.workbench.freecad.saving",
         "silo.workbench.freecad.live",
+        "silo.workbench.freecad.modified",
+        "silo.workbench.freecad.opening",
     }
     assert not forbidden & set(imports(WORKBENCH / f"{name}.py"))
 
@@ -125,8 +127,8 @@ def test_the_start_loads_next_to_nothing() -> None:
 
 def test_differences_have_the_colours_of_the_pages() -> None:
     """A ghost in FreeCAD's window means what it means in a browser: their files say the same."""
-    drawing = (WORKBENCH / "freecad" / "drawing.py").read_text(encoding="utf-8")
-    names, values = re.search(r"^(LIT, .*?) = (.*)$", drawing, re.MULTILINE).groups()
+    overlay = (WORKBENCH / "freecad" / "overlay.py").read_text(encoding="utf-8")
+    names, values = re.search(r"^(LIT, .*?) = (.*)$", overlay, re.MULTILINE).groups()
     mine = dict(zip(names.split(", "), ast.literal_eval(values), strict=True))
     pages = (MODS / "silo_server" / "web" / "static" / "model.js").read_text(encoding="utf-8")
     viewer = (MODS / "silo" / "viewer" / "viewer.js").read_text(encoding="utf-8")

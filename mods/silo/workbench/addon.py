@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from silo.workbench.commit.flow import CommitFlow
     from silo.workbench.commit.opened import Opened
     from silo.workbench.freecad.hooks import CommitHook
-    from silo.workbench.freecad.live_desk import LiveDesk, SiloGroup
+    from silo.workbench.freecad.silo_group import SiloGroup
+    from silo.workbench.live_desk import LiveDesk
     from silo.workbench.pane.activity import Action, Do
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
@@ -45,7 +46,7 @@ DRAW_MS = 60
 # The project view looks at its files this long after a commit arrived.
 REFRESH_MS = 1500
 # What a commit needs and that a worker may import.
-WITHOUT_WIDGETS = ("freecad.live", "freecad.live_desk", "commit.flow")
+WITHOUT_WIDGETS = ("freecad.live", "live_desk", "commit.flow")
 
 
 class AddOn:
@@ -72,9 +73,9 @@ class AddOn:
 
     def begin(self) -> None:
         """Continue the start after the window has opened."""
-        from silo.workbench.freecad import saving
+        from silo.workbench.freecad.modified import watch_edits
 
-        saving.watch_edits()
+        watch_edits()
         qt.later(BEGIN_AFTER_MS, self._begin)
 
     def _begin(self) -> None:
@@ -120,7 +121,7 @@ class AddOn:
         )
 
     def _guard_newer_files(self) -> None:
-        from silo.workbench.freecad.live_desk import LossGuard
+        from silo.workbench.freecad.loss_guard import LossGuard
         from silo.workbench.gui.widgets import confirm
 
         def ask(title: str, text: str) -> bool:
@@ -148,7 +149,7 @@ class AddOn:
         from silo.workbench.settings.server import Keyring, read_known
 
         def drawing() -> list[str]:
-            from silo.workbench.freecad.drawing import command
+            from silo.workbench.freecad.drawer import command
 
             return command()
 
@@ -164,7 +165,7 @@ class AddOn:
     @cached_property
     def desk(self) -> LiveDesk:
         """Make the desk: FreeCAD as the flows see it."""
-        from silo.workbench.freecad.live_desk import LiveDesk
+        from silo.workbench.live_desk import LiveDesk
 
         return LiveDesk(self.opened, lambda: self.preferences.flag("CountHardware"))
 
@@ -213,7 +214,7 @@ class AddOn:
     @cached_property
     def group(self) -> SiloGroup:
         """Make the observer that shows Silo's facts about components in the property editor."""
-        from silo.workbench.freecad.live_desk import SiloGroup
+        from silo.workbench.freecad.silo_group import SiloGroup
 
         return SiloGroup()
 

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from silo.batch import TopResult
     from silo.bom.model import Extraction
     from silo.bom_sync import Outcome
-    from silo.workbench.freecad.live import SolidCount
+    from silo.workbench.freecad.witness import SolidCount
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,9 +141,9 @@ def _write_lines(job: HeadlessJob, out: TextIO) -> int:
     seen: list[SolidCount] = []
 
     def look(extraction: Extraction) -> None:
-        from silo.workbench.freecad import live
+        from silo.workbench.freecad import witness
 
-        seen[:] = live.accounts(extraction, hardware=not job.no_hardware) if job.verify else []
+        seen[:] = witness.accounts(extraction, hardware=not job.no_hardware) if job.verify else []
 
     extractions = _extractions(tops, job, look)
     for top in tops:

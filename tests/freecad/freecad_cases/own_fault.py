@@ -9,7 +9,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "mods"))
 
 from silo.workbench import headless
-from silo.workbench.freecad import live
+from silo.workbench.freecad import witness
 
 
 def accounts(extraction: object, *, hardware: bool) -> list[object]:
@@ -19,5 +19,5 @@ def accounts(extraction: object, *, hardware: bool) -> list[object]:
     return []
 
 
-live.accounts = accounts  # type: ignore[assignment]
+witness.accounts = accounts  # type: ignore[assignment]
 headless.main()

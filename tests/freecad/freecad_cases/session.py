@@ -25,6 +25,7 @@ from silo.bom.model import Extraction  # noqa: E402
 from silo.bom.roots import choose_assembly  # noqa: E402
 from silo.fcstd import Library  # noqa: E402
 from silo.workbench.freecad import host, live, saving  # noqa: E402
+from silo.workbench.freecad.opening import open_fully  # noqa: E402
 
 CASES = Path(os.environ["SILO_CASES"]) / "asm4"
 
@@ -42,14 +43,14 @@ def add_bolt(doc: Any, bolt: Any, name: str) -> None:
 
 
 def unsaved_edits() -> dict[str, Any]:
-    doc = saving.open_fully(str(CASES / "plain_link" / "top.FCStd"))
+    doc = open_fully(str(CASES / "plain_link" / "top.FCStd"))
     add_bolt(doc, doc.getObject("Link").LinkedObject, "Second")
     return told(live.extract_live(doc))
 
 
 def found_open_by_another_path() -> dict[str, Any]:
     folder = CASES / "array_of_one"
-    doc = saving.open_fully(str(folder / "top.FCStd"))
+    doc = open_fully(str(folder / "top.FCStd"))
     add_bolt(doc, doc.getObject("Row").LinkedObject, "Second")
     other = folder.parent / "by_another_path"
     other.symlink_to(folder, target_is_directory=True)
@@ -59,17 +60,17 @@ def found_open_by_another_path() -> dict[str, Any]:
 
 def broken_document_is_not_reloaded() -> dict[str, Any]:
     path = str(CASES / "missing_file" / "top.FCStd")
-    doc = saving.open_fully(path)
+    doc = open_fully(path)
     add_bolt(doc, doc.getObject("Link").LinkedObject, "Second")
     return told(live.read(path))
 
 
 def part_document_is_completed() -> dict[str, Any]:
-    top = saving.open_fully(str(CASES / "partial_part_document" / "top.FCStd"))
+    top = open_fully(str(CASES / "partial_part_document" / "top.FCStd"))
     path = str(CASES / "partial_part_document" / "kit.FCStd")
     before = host.find_document(path)
     partial, objects = host.is_partial(before), len(before.Objects)
-    after = saving.open_fully(path)
+    after = open_fully(path)
     return {
         "partial": [partial, host.is_partial(after)],
         "more objects": len(after.Objects) > objects,
@@ -79,7 +80,7 @@ def part_document_is_completed() -> dict[str, Any]:
 
 
 def closed_part() -> dict[str, Any]:
-    doc = saving.open_fully(str(CASES / "plain_link" / "top.FCStd"))
+    doc = open_fully(str(CASES / "plain_link" / "top.FCStd"))
     App.closeDocument(doc.getObject("Link").LinkedObject.Document.Name)
     found = live.extract_live(doc)
     return {**told(found), "message": found.findings[0].message}
@@ -157,11 +158,11 @@ def damaged_files() -> list[dict[str, Any]]:
             answer: dict[str, Any] = {"damage": damage.__name__, "file": name, "from file": None}
             answer["from file"] = _from_file(folder / "top.FCStd")
             try:
-                doc = saving.open_fully(str(folder / "top.FCStd"))
+                doc = open_fully(str(folder / "top.FCStd"))
                 found = live.extract_live(doc)
                 answer["live"] = told(found)
                 answer["messages"] = [finding.message for finding in found.findings]
-                damaged = doc if name == "top.FCStd" else saving.open_fully(str(folder / name))
+                damaged = doc if name == "top.FCStd" else open_fully(str(folder / name))
                 saving.save(damaged)
             except SiloError as error:
                 answer["refused"] = str(error)
@@ -174,7 +175,7 @@ def damaged_files() -> list[dict[str, Any]]:
 def lost_original() -> dict[str, Any]:
     folder = CASES / "copy_on_change"
     (folder / "bolt.FCStd").unlink()
-    found = live.extract_live(saving.open_fully(str(folder / "top.FCStd")))
+    found = live.extract_live(open_fully(str(folder / "top.FCStd")))
     return {**told(found), "message": found.findings[0].message}
 
 

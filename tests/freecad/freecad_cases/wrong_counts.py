@@ -22,7 +22,7 @@ import Part
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "mods"))
 
 from silo.bom import links, objects, roles, roots, targets
-from silo.workbench.freecad import host, live
+from silo.workbench.freecad import host, live, witness
 
 
 def document(folder: Path, name: str) -> Any:
@@ -164,7 +164,7 @@ LINES: dict[str, Any] = {
 
 def said(path: str, change: Any = lambda lines: lines) -> list[dict[str, Any]]:
     found = live.read_checked(path)
-    told = [one.as_dict() for one in live.accounts(replace(found, entries=change(found.entries)))]
+    told = [one.as_dict() for one in witness.accounts(replace(found, entries=change(found.entries)))]
     host.close_all()
     return told
 

@@ -177,9 +177,9 @@ def of_each_kind() -> None:
 
 def edited(doc: Any) -> list[str]:
     """What differs from the file."""
-    from silo.workbench.freecad import saving
+    from silo.workbench.freecad.modified import watch_edits
 
-    return sorted(saving.watch_edits().differences(doc))
+    return sorted(watch_edits().differences(doc))
 
 
 def recompute() -> None:

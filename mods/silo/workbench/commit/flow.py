@@ -17,7 +17,7 @@ What a colleague did to a file since it was opened here: the look at Silo, and i
 
 The look belongs in a worker; what it finds are values.
 
-What the flows need of FreeCAD and of the person in front of it; :mod:`silo.workbench.freecad.live_desk`
+What the flows need of FreeCAD and of the person in front of it; :mod:`silo.workbench.live_desk`
 has it.
 
 With a desk of a test's own the flows run without FreeCAD and Qt. All calls are made in the GUI thread.
@@ -369,7 +369,7 @@ class CommitAnswer:
 
 
 class CountedSolids(Protocol):
-    """One assembly's solids (:class:`silo.workbench.freecad.live.SolidCount`)."""
+    """One assembly's solids (:class:`silo.workbench.freecad.witness.SolidCount`)."""
 
     @property
     def doc_path(self) -> str: ...

@@ -93,7 +93,7 @@ MOST_S = 0.08
 
 
 class Documents(Protocol):
-    """What a commit needs of FreeCAD; :mod:`silo.workbench.freecad.saving` has it."""
+    """What a commit needs of FreeCAD; :class:`silo.workbench.live_desk.LiveDocuments` has it."""
 
     def linked(self, doc: Any, /) -> Iterable[Any]: ...
 

@@ -21,7 +21,7 @@ _ABSENT = object()
 # FreeCAD writes these by itself.
 _OWN = frozenset(("LastModifiedDate", "LastModifiedBy", "_LinkTouched", "_ChildCache", "TipName"))
 
-# Shown in the property editor, and not written into the file (:mod:`silo.workbench.freecad.live_desk`).
+# Shown in the property editor, and not written into the file (:mod:`silo.workbench.freecad.silo_group`).
 SHOWN_NUMBER, SHOWN_STATE = "SiloNumber", "SiloState"
 
 _SHOWN = (SHOWN_NUMBER, SHOWN_STATE)
