@@ -33,7 +33,8 @@ from silo_server.errors import DuplicateError
 from silo_server.run import prepare
 from silo_server.services.bom import history, review
 from silo_server.services.bom.lines import lines_of
-from silo_server.services.bom.merge import merge_bom, preview_merge, read_merge_order
+from silo_server.services.bom.merge import merge_bom, preview_merge
+from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.review import Decision, ReviewAction, open_conflicts, resolve
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
@@ -81,11 +82,11 @@ class Silo(RuleBasedStateMachine):
     def merge(self, entries: dict[str, float], who: str) -> None:
         """A sync from CAD; its preview says the same first."""
         sync_id = f"{self.parent}-{len(self.syncs)}"
-        order = read_merge_order(merge_body(entries, sync_id=sync_id), 100)
+        request = read_merge_request(merge_body(entries, sync_id=sync_id), 100)
         with self.db.read() as tx:
-            preview = preview_merge(tx, self.parent, order, None)
+            preview = preview_merge(tx, self.parent, request, None)
         before = copy.deepcopy(self.model)
-        outcome = self.do(who, lambda tx: merge_bom(tx, self.parent, order, None))
+        outcome = self.do(who, lambda tx: merge_bom(tx, self.parent, request, None))
         self._merge_in_the_model(entries)
         assert outcome.answer == preview.answer
         self.syncs[sync_id] = (entries, outcome.answer)
@@ -115,8 +116,8 @@ class Silo(RuleBasedStateMachine):
         """The same request again, however late and by whatever version: the same answer, nothing changes."""
         sync_id = data.draw(st.sampled_from(sorted(self.syncs)))
         entries, answer = self.syncs[sync_id]
-        order = read_merge_order(merge_body(entries, sync_id=sync_id), 100)
-        outcome = self.do("ann", lambda tx: merge_bom(tx, self.parent, order, -1))
+        request = read_merge_request(merge_body(entries, sync_id=sync_id), 100)
+        outcome = self.do("ann", lambda tx: merge_bom(tx, self.parent, request, -1))
         assert outcome.answer == answer
 
     @rule(number=part, amount=quantity, who=user)

@@ -28,8 +28,10 @@ from silo_server.db.tables import bom_lines, items
 from silo_server.errors import TooLargeError
 from silo_server.run import RunningServer, running_server
 from silo_server.services.bom import imports, review, tree
+from silo_server.services.bom.last_sync import record_refusal
 from silo_server.services.bom.lines import state_columns
-from silo_server.services.bom.merge import merge_bom, read_merge_order, remember_refusal
+from silo_server.services.bom.merge import merge_bom
+from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.summary import keep_all
 from silo_server.services.items import NewItem, archive_item, create_item, get_item
 from silo_server.settings import Settings
@@ -268,24 +270,24 @@ def test_what_waits_is_listed_and_counted_without_reading_all_lines(db: Database
             merge_bom(
                 tx,
                 top,
-                read_merge_order({**body, "document": {"file": "T.FCStd", "folder": "robot/arm"}}, 9),
+                read_merge_request({**body, "document": {"file": "T.FCStd", "folder": "robot/arm"}}, 9),
                 None,
             )
-        merge_bom(tx, "T0", read_merge_order(merge_body({"C1": 2}), 9), None)
+        merge_bom(tx, "T0", read_merge_request(merge_body({"C1": 2}), 9), None)
         review.change_line(tx, "T1", "C0", {"quantity": 3})
-        merge_bom(tx, "T1", read_merge_order(merge_body({"C0": 5, "C1": 2}), 9), None)
+        merge_bom(tx, "T1", read_merge_request(merge_body({"C0": 5, "C1": 2}), 9), None)
         gaps = [{"reason": reason, "name": reason} for reason in ("missing", "unregistered", "unregistered")]
         body = {**merge_body(dict.fromkeys(parts, 2)), "left_out": gaps}
         for top in ("T2", "T3"):
-            merge_bom(tx, top, read_merge_order(body, 9), None)
-        remember_refusal(tx, get_item(tx, "T2"), "no such part")
+            merge_bom(tx, top, read_merge_request(body, 9), None)
+        record_refusal(tx, get_item(tx, "T2"), "no such part")
         archive_item(tx, "T3")
         # Settled: the one by a person's edit, the other by a decision.
         for child in ("C2", "C3"):
             create_item(tx, NewItem(part_number=child, name="Part"))
             review.add_line(tx, "T4", child, LineState(3.0, "manual"))
         cad = merge_body({**dict.fromkeys(parts, 2), "C2": 5, "C3": 5})
-        merge_bom(tx, "T4", read_merge_order(cad, 9), None)
+        merge_bom(tx, "T4", read_merge_request(cad, 9), None)
         assert [one.conflicts for one in review.waiting(tx) if one.part_number == "T4"] == [2]
         review.change_line(tx, "T4", "C2", {"quantity": 5.0})
         assert [one.conflicts for one in review.waiting(tx) if one.part_number == "T4"] == [1]

@@ -21,7 +21,8 @@ from silo.bom.errors import CycleError
 from silo_server.db.engine import Database, Tx
 from silo_server.run import prepare
 from silo_server.services.bom import history, review
-from silo_server.services.bom.merge import merge_bom, read_merge_order
+from silo_server.services.bom.merge import merge_bom
+from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
 from silo_server.values import LineState
@@ -79,8 +80,8 @@ def test_two_merges_of_one_assembly_come_one_after_the_other(pg: Database) -> No
     """The second plans on what the first left: versions count up, nothing is added twice or lost."""
 
     def merge(entries: dict[str, float]) -> Callable[[Tx], Any]:
-        order = read_merge_order(merge_body(entries), 100)
-        return lambda tx: merge_bom(tx, "TOP", order, None)
+        request = read_merge_request(merge_body(entries), 100)
+        return lambda tx: merge_bom(tx, "TOP", request, None)
 
     assert one_waits_for_the_other(pg, merge({"A": 1}), merge({"B": 2})) == []
     with pg.read() as tx:

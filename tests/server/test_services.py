@@ -36,10 +36,11 @@ from silo_server.services.access import (
     use_login_link,
 )
 from silo_server.services.bom.lines import state_to_json, stored_state
-from silo_server.services.bom.merge import quantity_problem, read_merge_order
+from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.review import check_state, edited_state
 from silo_server.services.bom.transfer import _numbered
 from silo_server.services.bom.tree import positive_number
+from silo_server.services.field_checks import quantity_problem
 from silo_server.services.items import NewItem, create_item
 from silo_server.times import stamp, utc_now, wire_time
 from silo_server.user_json import dumps
@@ -145,8 +146,8 @@ def test_no_body_breaks_the_reader(body: Any) -> None:
     """Whatever JSON comes, it is read or refused in words."""
     for candidate in (body, {"entries": body}, {"entries": [body], "document": body, "sync_id": body}):
         with suppress(RejectedError):
-            order = read_merge_order(candidate, 100)
-            assert len(order.entries) + len(order.problems) >= len(candidate["entries"])
+            request = read_merge_request(candidate, 100)
+            assert len(request.entries) + len(request.problems) >= len(candidate["entries"])
 
 
 @given(st.text(max_size=30))

@@ -28,7 +28,9 @@ from silo_server.db.engine import Database, Tx
 from silo_server.db.tables import product_summaries
 from silo_server.run import prepare
 from silo_server.services.bom import history, review, transfer, tree
-from silo_server.services.bom.merge import merge_bom, read_merge_order, remember_refusal
+from silo_server.services.bom.last_sync import record_refusal
+from silo_server.services.bom.merge import merge_bom
+from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.summary import (
     LONGEST_CHANGE,
     MOST_NAMED,
@@ -82,11 +84,11 @@ def merge(tx: Tx, numbers: list[str], dice: random.Random) -> None:
     inside = dice.sample(numbers[parent + 1 :], k=dice.randrange(4))
     body = merge_body({number: dice.choice([1, 2, 0.5]) for number in inside})
     gaps = [GAP] if dice.random() < 0.2 else []
-    merge_bom(tx, numbers[parent], read_merge_order({**body, "left_out": gaps}, 100), None)
+    merge_bom(tx, numbers[parent], read_merge_request({**body, "left_out": gaps}, 100), None)
 
 
 def refuse(tx: Tx, numbers: list[str], dice: random.Random) -> None:
-    remember_refusal(tx, get_item(tx, dice.choice(numbers[:ASSEMBLIES]), lock=True), "no such part")
+    record_refusal(tx, get_item(tx, dice.choice(numbers[:ASSEMBLIES]), lock=True), "no such part")
 
 
 def add(tx: Tx, numbers: list[str], dice: random.Random) -> None:
@@ -212,7 +214,7 @@ def test_a_look_changes_nothing_and_is_kept(db: Database) -> None:
     top, sub, other, _, part, *_ = numbers
     with db.write() as tx:
         for parent, child in ((sub, part), (top, sub), (other, numbers[-1])):
-            merge_bom(tx, parent, read_merge_order(merge_body({child: 2}), 100), None)
+            merge_bom(tx, parent, read_merge_request(merge_body({child: 2}), 100), None)
     with db.read() as tx:
         ids = {number: get_item(tx, number).id for number in numbers}
         summaries(tx, [ids[top], ids[other]])
@@ -237,8 +239,8 @@ def test_what_changed_meanwhile_is_not_kept(db: Database) -> None:
     top, sub, *_ = numbers
     part = numbers[-1]
     with db.write() as tx:
-        merge_bom(tx, sub, read_merge_order(merge_body({part: 2}), 100), None)
-        merge_bom(tx, top, read_merge_order(merge_body({sub: 2}), 100), None)
+        merge_bom(tx, sub, read_merge_request(merge_body({part: 2}), 100), None)
+        merge_bom(tx, top, read_merge_request(merge_body({sub: 2}), 100), None)
     with db.read() as tx:
         summary_of(tx, get_item(tx, sub))
     keep_summaries(db)
@@ -257,8 +259,8 @@ def test_an_assembly_that_states_its_mass_stands_for_parts_without(db: Database)
     numbers = seed(db)
     top, sub, part = numbers[0], numbers[1], numbers[-1]
     with db.write() as tx:
-        merge_bom(tx, sub, read_merge_order(merge_body({part: 2}), 100), None)
-        merge_bom(tx, top, read_merge_order(merge_body({sub: 3}), 100), None)
+        merge_bom(tx, sub, read_merge_request(merge_body({part: 2}), 100), None)
+        merge_bom(tx, top, read_merge_request(merge_body({sub: 3}), 100), None)
         patch_properties(tx, sub, {"mass_kg": 1.5})
     with db.read() as tx:
         above, itself = (summary_of(tx, get_item(tx, number)) for number in (top, sub))
@@ -270,7 +272,7 @@ def test_the_command_sums_all_up(db: Database, capsys: pytest.CaptureFixture[str
     """All assemblies, on the database of the server; how many is said."""
     top, *_, part = seed(db)
     with db.write() as tx:
-        merge_bom(tx, top, read_merge_order(merge_body({part: 2}), 100), None)
+        merge_bom(tx, top, read_merge_request(merge_body({part: 2}), 100), None)
     assert main(["summaries", "--database", db.settings.database_url, "--json"]) == 0
     assert capsys.readouterr().out == f'{{"assemblies": {ASSEMBLIES}}}\n'
     assert len(kept_ids(db)) == ASSEMBLIES
@@ -282,7 +284,7 @@ def test_a_product_that_no_read_can_sum_up_is_made_in_parts(db: Database) -> Non
     top, sub, other, *_, part = numbers
     with db.write() as tx:
         for parent, children in ((sub, numbers[5:]), (other, numbers[5:]), (top, [sub, other, part])):
-            merge_bom(tx, parent, read_merge_order(merge_body(dict.fromkeys(children, 2)), 100), None)
+            merge_bom(tx, parent, read_merge_request(merge_body(dict.fromkeys(children, 2)), 100), None)
     small = Database(replace(db.settings, max_expanded_rows=4))
     with pytest.raises(BusyError, match=r"more than 4 .* ask again in a minute"), small.read() as tx:
         summary_of(tx, get_item(tx, top))
@@ -310,10 +312,10 @@ def test_a_list_marks_what_is_open_in_products(db: Database, monkeypatch: pytest
     top, sub, _, _, *parts = numbers
     with db.write() as tx:
         body = {**merge_body(dict.fromkeys(parts, 2)), "left_out": [GAP]}
-        merge_bom(tx, sub, read_merge_order(body, 100), None)
-        merge_bom(tx, top, read_merge_order(merge_body({sub: 1}), 100), None)
+        merge_bom(tx, sub, read_merge_request(body, 100), None)
+        merge_bom(tx, top, read_merge_request(merge_body({sub: 1}), 100), None)
         welded = create_item(tx, NewItem(category="F01", name="A part with a BOM"))[0].part_number
-        merge_bom(tx, welded, read_merge_order(body, 100), None)
+        merge_bom(tx, welded, read_merge_request(body, 100), None)
         numbers.append(welded)
 
     def marks() -> dict[str, list[str]]:
@@ -338,7 +340,7 @@ def one_level(db: Database) -> tuple[str, str]:
     """An assembly with two of a part; a look at it is not kept yet."""
     top, *_, part = seed(db)
     with db.write() as tx:
-        merge_bom(tx, top, read_merge_order(merge_body({part: 2}), 100), None)
+        merge_bom(tx, top, read_merge_request(merge_body({part: 2}), 100), None)
     with db.read() as tx:
         summary_of(tx, get_item(tx, top))
     return top, part
@@ -349,7 +351,7 @@ def test_a_refusal_that_began_before_the_look_is_not_forgotten(db: Database) -> 
     top, _ = one_level(db)
     with db.write() as tx:
         tx.at -= timedelta(seconds=LONGEST_CHANGE - 10)
-        remember_refusal(tx, get_item(tx, top), "no such part")
+        record_refusal(tx, get_item(tx, top), "no such part")
     keep_summaries(db)
     assert kept_ids(db) == set()
 
@@ -370,7 +372,7 @@ def test_who_made_the_bom_what_it_is_is_named(db: Database) -> None:
     top, part = one_level(db)
     for name, quantity in (("ann", 3), ("bob", 3)):
         with db.write(Actor(name, Role.EDITOR)) as tx:
-            merge_bom(tx, top, read_merge_order(merge_body({part: quantity}), 100), None)
+            merge_bom(tx, top, read_merge_request(merge_body({part: quantity}), 100), None)
     with db.read() as tx:
         assert summary_of(tx, get_item(tx, top)).changed[1:] == ("ann", top)
 
@@ -382,8 +384,8 @@ def test_a_deep_product_with_many_unknown_masses(db: Database) -> None:
         chain = [create_item(tx, NewItem(category="A01", name="a"))[0].part_number for _ in range(depth)]
         parts = [create_item(tx, NewItem(category="F01", name="p"))[0].part_number for _ in range(many)]
         for above, below_it in itertools.pairwise(chain):
-            merge_bom(tx, above, read_merge_order(merge_body({below_it: 1}), 100), None)
-        merge_bom(tx, chain[-1], read_merge_order(merge_body(dict.fromkeys(parts, 1)), 100), None)
+            merge_bom(tx, above, read_merge_request(merge_body({below_it: 1}), 100), None)
+        merge_bom(tx, chain[-1], read_merge_request(merge_body(dict.fromkeys(parts, 1)), 100), None)
     assert keep_all(db) == depth
     with db.read() as tx:
         told = summary_of(tx, get_item(tx, chain[0]))
@@ -399,8 +401,8 @@ def test_an_export_reads_its_parts_some_at_a_time(
     top, sub, *_, first, second = seed(db)
     with db.write() as tx:
         body = {**merge_body({first: 2, second: 3}), "left_out": [GAP]}
-        merge_bom(tx, sub, read_merge_order(body, 100), None)
-        merge_bom(tx, top, read_merge_order(merge_body({sub: 2, second: 1}), 100), None)
+        merge_bom(tx, sub, read_merge_request(body, 100), None)
+        merge_bom(tx, top, read_merge_request(merge_body({sub: 2, second: 1}), 100), None)
         patch_properties(tx, first, {"mass_kg": 0.5, "supplier": "Misumi"})
 
     def rows(words: str) -> list[dict[str, Any]]:

@@ -14,7 +14,8 @@ from silo_server.db.engine import Database
 from silo_server.run import prepare
 from silo_server.services.bom.history import change_at, list_changes, state_at
 from silo_server.services.bom.lines import lines_of
-from silo_server.services.bom.merge import merge_bom, read_merge_order
+from silo_server.services.bom.merge import merge_bom
+from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.review import add_line, change_line
 from silo_server.services.items import ItemChange, NewItem, change_item, create_item, get_item
 from silo_server.services.revisions import list_revisions
@@ -83,7 +84,7 @@ def test_changes_under_clocks_that_are_set_back(url: str) -> None:
         with (first, second)[number % 2].write() as tx:
             if number % 3:
                 entries = [{"child_part_number": f"P-{number % 4}", "quantity": number}]
-                merge_bom(tx, "TOP", read_merge_order({"entries": entries}, 10), None)
+                merge_bom(tx, "TOP", read_merge_request({"entries": entries}, 10), None)
             else:
                 change_item(tx, "TOP", ItemChange(properties={"n": number}))
     check(first, "TOP")

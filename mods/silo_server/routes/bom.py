@@ -53,6 +53,7 @@ from silo_server.routes.models import (
 )
 from silo_server.services.bom import history, imports, review, transfer, tree
 from silo_server.services.bom.frozen import changes_of
+from silo_server.services.bom.last_sync import NEVER, last_syncs, record_refusal
 from silo_server.services.bom.lines import (
     LineId,
     check_line_count,
@@ -64,16 +65,8 @@ from silo_server.services.bom.lines import (
     revisions_to_wire,
     state_to_json,
 )
-from silo_server.services.bom.merge import (
-    NEVER,
-    MergeOrder,
-    MergeOutcome,
-    last_syncs,
-    merge_bom,
-    preview_merge,
-    read_merge_order,
-    remember_refusal,
-)
+from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merge
+from silo_server.services.bom.merge_request import MergeRequestIn, read_merge_request
 from silo_server.services.bom.review import told_quantities
 from silo_server.services.bom.summary import Summary, standing_alone, summary_of
 from silo_server.services.bom.transfer import View
@@ -191,8 +184,8 @@ async def merge(call: Editor, part_number: str, expected: ExpectedVersion) -> Re
     body = await json_body(call.request)
 
     def work() -> MergeOutcome:
-        order = read_merge_order(body, call.server.settings.max_merge_entries)
-        return _merge(call, part_number, order, expected)
+        request = read_merge_request(body, call.server.settings.max_merge_entries)
+        return _merge(call, part_number, request, expected)
 
     outcome = await anyio.to_thread.run_sync(work)
     return raw_json(outcome.answer, headers={"ETag": etag_of(outcome.version)})
@@ -345,17 +338,17 @@ def line_changes(body: LineChangeBody) -> dict[str, Any]:
     return changes
 
 
-def _merge(call: Call, part_number: str, order: MergeOrder, expected: int | None) -> MergeOutcome:
-    if order.dry_run:
+def _merge(call: Call, part_number: str, request: MergeRequestIn, expected: int | None) -> MergeOutcome:
+    if request.dry_run:
         with call.read() as tx:
-            return preview_merge(tx, part_number, order, expected)
+            return preview_merge(tx, part_number, request, expected)
     try:
         with call.write() as tx:
-            return merge_bom(tx, part_number, order, expected)
+            return merge_bom(tx, part_number, request, expected)
     except (RejectedError, CycleError) as error:
         # In a transaction of its own: that of the merge is undone.
         with call.write() as tx:
-            remember_refusal(tx, get_item(tx, part_number, lock=True), str(error)[:4096])
+            record_refusal(tx, get_item(tx, part_number, lock=True), str(error)[:4096])
         raise
 
 

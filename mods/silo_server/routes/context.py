@@ -40,7 +40,7 @@ from silo_server.services.access import (
     actor_by_session,
     actor_by_token,
 )
-from silo_server.services.bom.merge import text_problem
+from silo_server.services.field_checks import text_problem
 from silo_server.services.items import NUMBER_FORM, RESERVED
 from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings
@@ -361,7 +361,7 @@ _JSON_VALUE: Schema = {
     ],
 }
 _NOT_BLANK = rf"^[^{REFUSED_CHARACTERS}]*[^\s{REFUSED_CHARACTERS}][^{REFUSED_CHARACTERS}]*$"
-# What services.bom.merge asks of the wire model's fields.
+# What services.bom.merge_request asks of the wire model's fields.
 _MERGE: dict[str, dict[str, Schema]] = {
     "MergeRequest": {
         "source": {"description": "not read: the entries are an assembly's"},
@@ -406,7 +406,7 @@ def complete(document: Schema) -> Schema:
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
-    # The merge reads its body by itself (services.bom.merge); its form is the wire model's.
+    # The merge reads its body by itself (services.bom.merge_request); its form is the wire model's.
     merge = MergeRequest.model_json_schema(ref_template="#/components/schemas/{model}")
     schemas.update(merge.pop("$defs"), MergeRequest=merge, JsonValue=_JSON_VALUE)
     for model, fields in _MERGE.items():

@@ -56,15 +56,9 @@ from silo_server.routes.models import (
 )
 from silo_server.schema import describe, describe_form, find_schema, schemas
 from silo_server.services import items, revisions, scene, search
-from silo_server.services.bom.merge import (
-    NEVER,
-    LastSync,
-    last_sync,
-    last_syncs,
-    sha256_or_none,
-    text_problem,
-)
+from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
 from silo_server.services.bom.tree import where_used
+from silo_server.services.field_checks import sha256_or_none, text_problem
 from silo_server.services.releases import draft_of
 from silo_server.services.revisions import RevisionOrigin, revision_to_wire
 from silo_server.values import Document, Item, Revision

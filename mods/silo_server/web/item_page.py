@@ -29,8 +29,8 @@ from silo_server.routes.items import told_of
 from silo_server.schema import ITEM_TYPES, find_schema
 from silo_server.services import revisions
 from silo_server.services.bom import tree
+from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import lines_of_many
-from silo_server.services.bom.merge import in_sentences, last_sync
 from silo_server.services.bom.review import is_followed, last_look
 from silo_server.services.bom.summary import (
     MOST_NAMED,

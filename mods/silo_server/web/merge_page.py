@@ -29,8 +29,8 @@ from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.routes.context import Call
 from silo_server.schema import text_hints
 from silo_server.services.bom import history, review
+from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
-from silo_server.services.bom.merge import in_sentences, last_sync
 from silo_server.services.bom.review import Decision
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item

@@ -63,9 +63,9 @@ from silo_server.services.bom.lines import (
     new_line_id,
     parent_to_change,
 )
-from silo_server.services.bom.merge import quantity_problem
 from silo_server.services.bom.summary import LastChange, Summary, at_once
 from silo_server.services.bom.tree import Graph, Told, conflicts_in
+from silo_server.services.field_checks import quantity_problem
 from silo_server.services.items import get_by_uuids, get_item
 from silo_server.user_json import json_problem
 from silo_server.values import Item, Line, LineState

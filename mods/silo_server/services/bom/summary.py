@@ -46,8 +46,8 @@ from silo_server.db.tables import (
 )
 from silo_server.db.tables import events as event_log
 from silo_server.fields import names_of
+from silo_server.services.bom.last_sync import NEVER, last_syncs
 from silo_server.services.bom.lines import newer_exists, select_lines, to_line
-from silo_server.services.bom.merge import NEVER, last_syncs
 from silo_server.services.bom.tree import (
     MAX_DEPTH,
     Graph,

@@ -32,7 +32,7 @@ from silo.bom.resolve import with_allowed_characters
 from silo.platform import scratch_folder
 from silo_server.db.engine import Tx
 from silo_server.services.bom.frozen import changes_of, frozen_product
-from silo_server.services.bom.merge import in_sentences, last_syncs
+from silo_server.services.bom.last_sync import in_sentences, last_syncs
 from silo_server.services.bom.summary import MassAndCost, OpenBom, Summary, own_worth, summaries, summary_of
 from silo_server.services.bom.tree import (
     MAX_DEPTH,

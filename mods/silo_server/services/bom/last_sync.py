@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The last sync of each assembly: when, from which file, what it left out, and what each line is in CAD.
+
+One row per assembly, written by the merge in its own transaction. An incomplete BOM must never look like a
+complete one, and an assembly that was never synced must not look like a part.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import delete, insert, select, update
+
+from silo.bom.report import Reason, in_words, remembered
+from silo_server.db.engine import Tx, one_of
+from silo_server.db.tables import bom_last_syncs
+from silo_server.fields import from_row
+from silo_server.services.bom.merge_request import MergeRequestIn
+from silo_server.times import wire_time
+from silo_server.user_json import dumps
+from silo_server.values import Item
+
+
+@dataclass(frozen=True, slots=True)
+class LastSync:
+    """What is known of an assembly's last sync. ``at`` None: it was never synced.
+
+    left_out
+        what the assembly holds and the BOM does not: the fields of :class:`silo.bom.report.LeftOut`.
+    refused_at
+        when the server refused a later merge, None if it did not; ``refusal`` says why.
+    """
+
+    at: str | None = None
+    username: str = ""
+    document_file: str | None = None
+    left_out: Sequence[Mapping[str, Any]] = ()
+    refused_at: str | None = None
+    refusal: str = ""
+    components: Mapping[int, Sequence[Mapping[str, str]]] = field(default_factory=dict)
+    folder: str = ""
+
+    @property
+    def gaps(self) -> list[dict[str, Any]]:
+        """List everything that is not in the BOM, including a refused merge."""
+        gaps = [dict(part) for part in self.left_out]
+        if self.refused_at:
+            gaps.append({"reason": Reason.REFUSED.value, "message": self.refusal})
+        return gaps
+
+    @property
+    def words(self) -> str:
+        """Count the gaps in words: ``2 missing, 1 unregistered``; "" if there are none."""
+        return in_words(self.gaps)
+
+    def to_wire(self) -> dict[str, Any]:
+        """Return the last sync as the API sends it."""
+        return {"at": wire_time(self.at), "left_out": self.gaps}
+
+
+NEVER = LastSync()
+
+
+def last_sync(tx: Tx, parent: Item) -> LastSync:
+    """Return the last sync of one assembly; :data:`NEVER` if there was none."""
+    return last_syncs(tx, [parent.id]).get(parent.id, NEVER)
+
+
+def last_syncs(tx: Tx, parent_ids: Collection[int]) -> dict[int, LastSync]:
+    """Read the last syncs of these assemblies; those that were never synced (nor refused) are absent."""
+    rows = tx.conn.execute(select(bom_last_syncs).where(one_of(tx, bom_last_syncs.c.parent_id, parent_ids)))
+    return {row.parent_id: _read(row) for row in rows}
+
+
+def _read(row: Any) -> LastSync:
+    return from_row(
+        LastSync,
+        row,
+        left_out=json.loads(row.left_out),
+        refusal=row.refusal or "",
+        components={int(child): components for child, components in json.loads(row.components).items()},
+        folder=row.folder or "",
+    )
+
+
+def record_merge(
+    tx: Tx,
+    parent: Item,
+    request: MergeRequestIn,
+    children: Mapping[str, int],
+    before: LastSync,
+    kept: Sequence[str],
+) -> None:
+    """Record a merge. ``children``: part number → item id; ``kept``: the lines of missing components."""
+    ids = {number.casefold(): str(child) for number, child in children.items()}
+    entries = [
+        {"child_part_number": ids[entry.key], "components": entry.components} for entry in request.entries
+    ]
+    by_child = {str(child): list(components) for child, components in before.components.items()}
+    components = remembered(by_child, entries, [str(children[number]) for number in kept])
+    tx.conn.execute(delete(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id))
+    row = {
+        "at": tx.stamp,
+        "document_file": request.document_file,
+        "folder": request.document_folder or before.folder or None,
+        "left_out": dumps([dict(part) for part in request.left_out]),
+        "components": dumps(components),
+    }
+    _insert(tx, parent, row)
+
+
+def record_refusal(tx: Tx, parent: Item, message: str) -> None:
+    """Record that a merge was refused; the last good merge stays known. No event announces it."""
+    written = {"refused_at": tx.stamp, "refusal": message}
+    updated = tx.conn.execute(
+        update(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id).values(**written)
+    )
+    if not updated.rowcount:
+        _insert(tx, parent, {"left_out": "[]", "components": "{}", **written})
+    tx.touched.add(parent.uuid)
+
+
+def _insert(tx: Tx, parent: Item, row: Mapping[str, Any]) -> None:
+    who = {"parent_id": parent.id, "username": tx.actor.username}
+    tx.conn.execute(insert(bom_last_syncs).values(**who, **row))
+
+
+def in_sentences(gaps: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Describe what was left out, each gap in a sentence."""
+    return [_sentence(gap) for gap in gaps]
+
+
+def _sentence(gap: Mapping[str, Any]) -> str:
+    name, count = gap.get("name") or gap.get("object") or "", gap.get("quantity")
+    who = f"{count} × {name}" if count else str(name)
+    where = f" ({gap['file']})" if gap.get("file") else ""
+    texts = {
+        Reason.MISSING: f"{who}{where}: the file is missing or cannot be read",
+        Reason.UNREGISTERED: f"{who}{where}: no part number yet",
+        Reason.BROKEN: str(gap.get("message", "")),
+        Reason.REFUSED: f"a later sync was refused: {gap.get('message', '')}",
+    }
+    return texts.get(gap["reason"], f"{gap['reason']}: {who}{where} {gap.get('message', '')}").rstrip()

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A merge request, read from its decoded JSON body (spec bom-sync §5).
+
+It is read by hand and not by a model, because a bad quantity and an unknown part number are reported
+together, each with the index of its entry, in the one 400.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
+
+from silo.bom.errors import RejectedError
+from silo.bom.numbers import LARGEST_QUANTITY
+from silo.bom.quantities import as_decimal
+from silo.bom.report import Reason
+from silo_server.errors import TooLargeError
+from silo_server.services.field_checks import quantity_problem, sha256_or_none, shortened, text_problem
+
+
+@dataclass(frozen=True, slots=True)
+class MergeRequestEntry:
+    """One direct child as requested; ``key`` is its case-folded number."""
+
+    index: int
+    part_number: str
+    quantity: float
+    components: Sequence[Mapping[str, str]] = ()
+
+    @property
+    def key(self) -> str:
+        return self.part_number.casefold()
+
+
+@dataclass(frozen=True, slots=True)
+class MergeRequestIn:
+    """A merge request. ``problems`` are (index, text) of the entries that are unusable in themselves."""
+
+    entries: Sequence[MergeRequestEntry]
+    problems: Sequence[tuple[int, str]] = ()
+    sync_id: str | None = None
+    dry_run: bool = False
+    document_file: str | None = None
+    document_folder: str | None = None
+    document_sha256: str | None = None
+    document_revision: int | None = None
+    left_out: Sequence[Mapping[str, Any]] = ()
+
+    @property
+    def missing(self) -> list[tuple[str, str]]:
+        """List (file, object) of the components that the assembly has lost."""
+        return [
+            (part.get("file", ""), part.get("object", ""))
+            for part in self.left_out
+            if part["reason"] == Reason.MISSING
+        ]
+
+
+def read_merge_request(body: Any, max_entries: int) -> MergeRequestIn:
+    """Read the request from a decoded JSON body; RejectedError if the body as a whole is unusable.
+
+    Unknown keys are ignored. Whatever ``source`` says, the entries are an assembly's.
+    """
+    if not isinstance(body, Mapping) or not isinstance(body.get("entries"), list):
+        raise RejectedError('body: wanted {"entries": [{"child_part_number": …, "quantity": …}, …]}')
+    if len(body["entries"]) > max_entries:
+        raise TooLargeError(f"entries: this server takes at most {max_entries}, got {len(body['entries'])}")
+    sync_id, dry_run = body.get("sync_id"), body.get("dry_run")
+    if sync_id is not None and (
+        problem := text_problem(sync_id, 128) if sync_id else "wanted a text, got none"
+    ):
+        raise RejectedError(f"sync_id: {problem}")
+    if dry_run is not None and not isinstance(dry_run, bool):
+        raise RejectedError("dry_run: wanted true or false")
+    document = _document(body.get("document"))
+    entries: list[MergeRequestEntry] = []
+    problems: list[tuple[int, str]] = []
+    for index, raw in enumerate(body["entries"]):
+        entry, problem = _entry(index, raw)
+        if entry is not None:
+            entries.append(entry)
+        if problem is not None:
+            problems.append((index, problem))
+    if not problems:
+        problems = _sums_too_large(entries)
+    left_out = _left_out(body.get("left_out"), max_entries)
+    return MergeRequestIn(entries, problems, sync_id, bool(dry_run), *document, left_out)
+
+
+def _sums_too_large(entries: Sequence[MergeRequestEntry]) -> list[tuple[int, str]]:
+    """Find children whose sum over several entries exceeds the limit of one entry."""
+    sums: dict[str, Decimal] = {}
+    problems = []
+    for entry in entries:
+        sums[entry.key] = sums.get(entry.key, Decimal(0)) + as_decimal(entry.quantity)
+        if sums[entry.key] > LARGEST_QUANTITY:
+            text = f"entries[{entry.index}].quantity: all entries of {entry.part_number!r} add up to over 1e9"
+            problems.append((entry.index, text))
+    return problems
+
+
+def _entry(index: int, raw: Any) -> tuple[MergeRequestEntry | None, str | None]:
+    if not isinstance(raw, Mapping):
+        return None, f"entries[{index}]: wanted an object, got {shortened(raw)}"
+    name, quantity = raw.get("child_part_number"), raw.get("quantity")
+    problem = quantity_problem(quantity)
+    text = None if problem is None else f"entries[{index}].quantity: {problem}"
+    wrong = text_problem(name, 200) or (None if str(name).strip() else "wanted a part number, got none")
+    if wrong:
+        missing = f"entries[{index}].child_part_number: {wrong}"
+        return None, missing if text is None else f"{missing}; {text}"
+    # An entry with a bad quantity is still looked up, so that an unknown number is reported as well.
+    components, wrong = _components(index, raw.get("components"))
+    entry = MergeRequestEntry(index, str(name).strip(), 1.0 if text else float(quantity or 0), components)
+    return entry, "; ".join(filter(None, (text, wrong))) or None
+
+
+def _components(index: int, raw: Any) -> tuple[Sequence[Mapping[str, str]], str | None]:
+    if raw is None:
+        return (), None
+    where = f"entries[{index}].components"
+    if not isinstance(raw, list) or not all(isinstance(component, Mapping) for component in raw):
+        return (), f'{where}: wanted [{{"file": …, "object": …}}, …], got {shortened(raw)}'
+    for component in raw:
+        if wrong := text_problem(component.get("file"), 4096) or text_problem(
+            component.get("object", ""), 1024
+        ):
+            return (), f"{where}: {wrong}"
+    return [{"file": component["file"], "object": component.get("object", "")} for component in raw], None
+
+
+_LEFT_OUT_TEXTS = {"reason": 32, "name": 1024, "file": 4096, "object": 1024, "message": 4096}
+
+
+def _left_out(raw: Any, most: int) -> list[dict[str, Any]]:
+    if raw is None:
+        return []
+    if not isinstance(raw, list) or len(raw) > most:
+        raise RejectedError(f"left_out: wanted a list of at most {most} objects, got {shortened(raw)}")
+    return [_left_out_part(index, part) for index, part in enumerate(raw)]
+
+
+def _left_out_part(index: int, raw: Any) -> dict[str, Any]:
+    if not isinstance(raw, Mapping) or not raw.get("reason"):
+        raise RejectedError(f'left_out[{index}]: wanted {{"reason": …, "name": …, …}}, got {shortened(raw)}')
+    part: dict[str, Any] = {}
+    for name, longest in _LEFT_OUT_TEXTS.items():
+        value = raw.get(name, "")
+        if problem := text_problem(value, longest):
+            raise RejectedError(f"left_out[{index}].{name}: {problem}")
+        if value:
+            part[name] = value
+    quantity = raw.get("quantity", 0)
+    if isinstance(quantity, bool) or quantity != 0:
+        if problem := quantity_problem(quantity):
+            raise RejectedError(f"left_out[{index}].quantity: {problem}")
+        part["quantity"] = quantity
+    return part
+
+
+def _document(raw: Any) -> tuple[str | None, str | None, str | None, int | None]:
+    if raw is None:
+        return None, None, None, None
+    if not isinstance(raw, Mapping):
+        raise RejectedError('document: wanted {"file": …, "sha256": …, "revision": …}')
+    file, folder, revision = raw.get("file"), raw.get("folder"), raw.get("revision")
+    if problem := text_problem(file, 4096):
+        raise RejectedError(f"document.file: {problem}")
+    if folder is not None and (problem := text_problem(folder, 1024)):
+        raise RejectedError(f"document.folder: {problem}")
+    sha256 = sha256_or_none("document.sha256", raw.get("sha256"))
+    if isinstance(revision, float) and revision.is_integer():
+        revision = int(revision)  # 2.0 is a whole number in JSON
+    if revision is not None and not (type(revision) is int and 0 <= revision < 2**31):
+        raise RejectedError("document.revision: wanted a whole number")
+    return file, folder, sha256, revision

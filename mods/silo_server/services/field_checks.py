@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What is wrong with one field of a request: a text, a quantity, a SHA-256.
+
+A check says what was wanted and got, without the field's name: the caller puts the name, and the index of
+the entry, before it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+from silo.bom.errors import RejectedError
+from silo.bom.numbers import LARGEST_QUANTITY
+from silo.bom.resolve import character_problem
+
+
+def text_problem(value: Any, longest: int) -> str | None:
+    """Say what is wrong with a text of at most ``longest`` characters; None if nothing is."""
+    if not isinstance(value, str) or len(value) > longest:
+        return f"wanted a text of at most {longest} characters, got {shortened(value)}"
+    return character_problem(value)
+
+
+def sha256_or_none(name: str, value: Any) -> str | None:
+    """Read a SHA-256 in lower-case hex digits, or None; RejectedError with the field for anything else."""
+    if value is None:
+        return None
+    if isinstance(value, str) and re.fullmatch("[0-9A-Fa-f]{64}", value):
+        return value.lower()
+    raise RejectedError(f"{name}: wanted 64 hexadecimal digits")
+
+
+def quantity_problem(value: Any) -> str | None:
+    """Say what is wrong with a quantity; None if nothing is."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f"wanted a number, got {shortened(value)}"
+    # A huge integer has no float; comparing it is safe, converting it is not.
+    if not 0 < value <= LARGEST_QUANTITY or not math.isfinite(value):
+        return f"wanted a number above 0 and at most 1e9, got {shortened(value)}"
+    return None
+
+
+def shortened(value: Any) -> str:
+    """Write a value of a request for a message, in at most 60 characters."""
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"
