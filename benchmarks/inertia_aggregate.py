@@ -20,11 +20,14 @@ from pathlib import Path
 
 import numpy as np
 
+from silo.inertia.arrays import Floats
+from silo.inertia.assembly import Assembly, Instance
 from silo.inertia.bom.parser import BOMParser
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.links import origin_frame
 from silo.inertia.materials import load_materials
-from silo.inertia.model import Assembly, Floats, Instance, MassProps, combine_arrays, place
+from silo.inertia.placements import place
+from silo.inertia.rigid import MassProps, combine_arrays
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 
@@ -128,7 +131,7 @@ def main() -> None:
     slow = median_ms(lambda: loop(*values), args.repeat)
     print(f"  loop      {slow:8.1f} ms  (largest difference {worst:.1e})")
     print(f"  report    {median_ms(lambda: calculate(asm, table, task), args.repeat):8.1f} ms")
-    for module in ("silo.inertia", "silo.inertia.bom", "silo.inertia.model", "silo.inertia.calculator"):
+    for module in ("silo.inertia", "silo.inertia.bom", "silo.inertia.assembly", "silo.inertia.calculator"):
         print(f"  import {module:<26} {import_ms(module, args.repeat):8.1f} ms")
 
 

@@ -35,7 +35,7 @@ OURS = """
 import json, resource, sys, time
 from pathlib import Path
 import numpy as np
-from silo.inertia.model import combine_arrays, place
+from silo.inertia.assembly import combine_arrays, place
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.graph import ReadOptions
 from silo.inertia.geometry.helpers import Helpers

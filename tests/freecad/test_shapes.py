@@ -14,9 +14,10 @@ from freecad_cases.machines import MOSTLY_ENDS, REPOSITORY, WANTED, FreeCAD
 from public_projects import ASSEMBLIES
 
 from silo.bom.errors import InputError
+from silo.inertia.assembly import Assembly
 from silo.inertia.geometry import ReadOptions, read
 from silo.inertia.geometry.read import load
-from silo.inertia.model import Assembly, GeometryCode
+from silo.inertia.notes import GeometryCode
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from bodies import placement
 
-from silo.inertia.bom import BomTable
+from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.bom.parser import BOMParser
+from silo.inertia.bom.table import BomTable
 from silo.inertia.calculator import Task, calculate, read_geometry
 from silo.inertia.materials import load_materials
-from silo.inertia.model import Assembly, Instance, Prototype
 from silo.inertia.report import InertiaReport
 
 try:

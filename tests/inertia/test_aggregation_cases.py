@@ -14,8 +14,8 @@ from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from silo.inertia.assembly import Assembly, Instance
 from silo.inertia.links import link_map, origin_frame
-from silo.inertia.model import Assembly, Instance
 
 Fixture = Callable[..., Any]
 BOM = "Name,Material,Mass\nplate,steel,\nrod,aluminum,\nblock,,0.7500 kg\nodd,PLA,\n"
@@ -99,7 +99,7 @@ def test_case_38_one_part_alone(compute: Fixture, name: str, mass: float) -> Non
 @given(layouts)
 def test_case_39_links_sum_up_to_the_assembly(compute: Fixture, layout: list[Any]) -> None:
     """The links together are the assembly, however the parts are dealt out."""
-    from silo.inertia.model import combine
+    from silo.inertia.rigid import combine
 
     report = compute(build(layout), BOM)
     close(combine([link.props for link in report.links.values()]), report.total)

@@ -15,7 +15,7 @@ from silo.inertia import (
     InertiaReport,
     compute_link_inertials,
 )
-from silo.inertia.model import combine
+from silo.inertia.rigid import combine
 
 ARM = Path(__file__).parents[2] / "examples" / "arm"
 

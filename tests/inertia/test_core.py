@@ -8,15 +8,9 @@ import pytest
 from bodies import box, placement
 
 from silo.bom.errors import InputError
-from silo.inertia.model import (
-    InertialProperties,
-    MassProps,
-    TensorProblem,
-    as_placement,
-    is_rigid,
-    parallel_axis,
-    place,
-)
+from silo.inertia.placements import as_placement, is_rigid, place
+from silo.inertia.rigid import MassProps, TensorProblem, parallel_axis
+from silo.inertia.types import InertialProperties
 
 PRODUCT = 0.015 * np.array([[0, 1, 0], [1, 0, 0], [0, 0, 0]])
 TURN_Z = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]

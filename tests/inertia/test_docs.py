@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from silo.cli.main import build_parser
-from silo.inertia.bom import BomCode
-from silo.inertia.model import GeometryCode
+from silo.inertia.bom.table import BomCode
+from silo.inertia.notes import GeometryCode
 from silo.inertia.report import Decided, MassCode, Rule, Source
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -16,10 +16,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import ConfigError, InputError
+from silo.inertia.assembly import Instance
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.links import FrameChoice, as_link_map, claim, link_map, matches, origin_frame, read_link_map
 from silo.inertia.materials import load_materials
-from silo.inertia.model import Instance
 from silo.inertia.urdf import Urdf
 
 Fixture = Callable[..., Any]

@@ -12,7 +12,7 @@ from bodies import box
 
 from silo.bom.errors import AuthError, NotFoundError, ServerFaultError, SiloError
 from silo.inertia.masses import Options
-from silo.inertia.model import Note
+from silo.inertia.notes import Note
 from silo.inertia.push import describe, plan_push, push
 
 Fixture = Callable[..., Any]

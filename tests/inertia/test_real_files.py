@@ -10,9 +10,11 @@ from typing import Any
 
 import pytest
 
+from silo.inertia.assembly import Assembly
 from silo.inertia.masses import Options
-from silo.inertia.model import Assembly, GeometryCode, leaf_products
+from silo.inertia.notes import GeometryCode
 from silo.inertia.output import snippets, writable
+from silo.inertia.products import leaf_products
 from silo.inertia.report import Source
 
 Fixture = Callable[..., Any]

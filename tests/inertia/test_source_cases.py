@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from bodies import box, shape_only
 
+from silo.inertia.assembly import SolidProps
 from silo.inertia.geometry.measured import Measured
 from silo.inertia.masses import GivenMass, Options, density_doubts, looks_like_totals
 from silo.inertia.materials import Material
-from silo.inertia.model import GeometryCode, Note, SolidProps
+from silo.inertia.notes import GeometryCode, Note
 from silo.inertia.report import Source
 
 HEAD = "Item,Quantity,Part number,Material,Mass,Name\n"

@@ -14,9 +14,9 @@ from bodies import box, placement
 from hypothesis import given
 from hypothesis import strategies as st
 
+from silo.inertia.assembly import Assembly, Instance
 from silo.inertia.geometry.graph import unique_names
 from silo.inertia.links import as_map, as_yaml, claim, link_map, read_link_map, starting_map
-from silo.inertia.model import Assembly, Instance
 
 Fixture = Callable[..., Any]
 PART = box("p", 0.1, 0.1, 0.1)

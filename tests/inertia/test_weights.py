@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from silo.bom.errors import InputError
+from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.geometry.together import Mesh, mesh_solid
 from silo.inertia.masses import Options
-from silo.inertia.model import Assembly, Instance, Prototype
 from silo.inertia.report import Source
 
 LINKS = {"arm": ["arm"], "base": ["base"]}

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from silo.inertia.model import Floats, Prototype
+from silo.inertia.arrays import Floats
+from silo.inertia.assembly import Prototype
 
 
 def body(name: str, volume: float, second: Sequence[float], **more: Any) -> Prototype:

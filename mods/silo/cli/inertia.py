@@ -31,11 +31,11 @@ from silo.cli.common import (
 
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry
-    from silo.inertia.bom import BomTable
+    from silo.inertia.assembly import Assembly
+    from silo.inertia.bom.table import BomTable
     from silo.inertia.calculator import Task
     from silo.inertia.geometry import ReadOptions
     from silo.inertia.materials import MaterialTable
-    from silo.inertia.model import Assembly
     from silo.inertia.push import PushPlan
     from silo.inertia.report import InertiaReport
     from silo.inertia.urdf import Urdf
@@ -299,7 +299,7 @@ def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
     """Return exit code 1, and print why, if a warning without --allow says that something could not be read;
     with --strict, if there is any warning without --allow.
     """
-    from silo.inertia.model import GeometryCode
+    from silo.inertia.notes import GeometryCode
 
     left = [
         w.code
@@ -596,7 +596,7 @@ def run_mass(args: argparse.Namespace) -> int:
     from silo.inertia.calculator import Task, calculate
     from silo.inertia.links import Link, LinkMap
     from silo.inertia.masses import Options
-    from silo.inertia.model import GeometryCode
+    from silo.inertia.notes import GeometryCode
 
     table = bom_table(args)
     materials = material_table(args)

@@ -41,6 +41,8 @@ from silo.drawing import Glb, cube, shaded
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
 from silo.files import FoundFile, Locator, content_hash
+from silo.inertia.assembly import SolidProps
+from silo.inertia.digits import rounded
 from silo.inertia.geometry.fcstd import Entries, StoredFacts, Unpacked, located
 from silo.inertia.geometry.freecad import NOTHING, Leaf, ShapeRef, ShapeSource, StatedMaterial, Walk, file_of
 from silo.inertia.geometry.graph import Progress, ReadOptions, in_metres
@@ -48,7 +50,8 @@ from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.read import main as read_main
 from silo.inertia.geometry.read import python, run, say
 from silo.inertia.geometry.together import Box, Floats, Mesh, about_enclosed, combined, joined, welded
-from silo.inertia.model import DOUBTFUL, SolidProps, is_rigid, rounded
+from silo.inertia.notes import DOUBTFUL
+from silo.inertia.placements import is_rigid
 from silo.platform import remove_patiently, scratch_folder
 
 if TYPE_CHECKING:

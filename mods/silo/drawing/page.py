@@ -24,10 +24,11 @@ from trimesh import creation
 
 from silo.bom.errors import counted
 from silo.drawing import Glb, Shape, shaded
+from silo.inertia.assembly import Assembly, Instance
 from silo.inertia.geometry.together import Floats, Mesh
-from silo.inertia.model import Assembly, Instance, MassProps
 from silo.inertia.output import NOISE, SOURCE_WORDS, how, material_of
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, Source
+from silo.inertia.rigid import MassProps
 
 Colour = tuple[float, float, float]
 

@@ -10,12 +10,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from silo.inertia.bom import BOMEntry
     from silo.inertia.bom.parser import BOMParser
+    from silo.inertia.bom.table import BOMEntry
     from silo.inertia.calculator import EnhancedInertiaCalculator, InertiaCalculator, compute_link_inertials
     from silo.inertia.materials import MATERIAL_DENSITIES
-    from silo.inertia.model import InertialProperties, MassProps
     from silo.inertia.report import InertiaReport, PartWarning
+    from silo.inertia.rigid import MassProps
+    from silo.inertia.types import InertialProperties
 
 __all__ = [
     "MATERIAL_DENSITIES",
@@ -36,9 +37,9 @@ _HOME = {
     "EnhancedInertiaCalculator": "calculator",
     "InertiaCalculator": "calculator",
     "InertiaReport": "report",
-    "InertialProperties": "model",
+    "InertialProperties": "types",
     "MATERIAL_DENSITIES": "materials",
-    "MassProps": "model",
+    "MassProps": "rigid",
     "PartWarning": "report",
     "compute_link_inertials": "calculator",
 }

@@ -17,8 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from silo.bom.errors import InputError
-from silo.inertia.bom import BOMEntry, BomTable, as_table, parse_mass
+from silo.inertia.arrays import Floats
+from silo.inertia.assembly import Assembly, Prototype
+from silo.inertia.bom.mass_cell import parse_mass
 from silo.inertia.bom.parser import BOMParser
+from silo.inertia.bom.table import BOMEntry, BomTable, as_table
 from silo.inertia.links import (
     ASSEMBLY_FRAME,
     ROOT_LINK,
@@ -35,20 +38,8 @@ from silo.inertia.links import (
 from silo.inertia.masses import MassRule, Options, Placed, PlacedAssembly, place_all, weighed
 from silo.inertia.matching import Matching, Suggester, match, plain
 from silo.inertia.materials import MaterialHit, MaterialTable, load_materials
-from silo.inertia.model import (
-    Assembly,
-    Floats,
-    InertialProperties,
-    MassProps,
-    Product,
-    Prototype,
-    TensorProblem,
-    combine_arrays,
-    is_rigid,
-    leaf_products,
-    sub_assemblies,
-    tensor_words,
-)
+from silo.inertia.placements import is_rigid
+from silo.inertia.products import Product, leaf_products, sub_assemblies
 from silo.inertia.report import (
     InertiaReport,
     LinkResult,
@@ -57,6 +48,8 @@ from silo.inertia.report import (
     PartWarning,
     SubAssemblyResult,
 )
+from silo.inertia.rigid import MassProps, TensorProblem, combine_arrays, tensor_words
+from silo.inertia.types import InertialProperties
 
 if TYPE_CHECKING:
     from silo.inertia.geometry import ReadOptions

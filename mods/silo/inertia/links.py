@@ -35,8 +35,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.bom.errors import ConfigError, counted, listed
+from silo.inertia.arrays import Floats
+from silo.inertia.assembly import Assembly, Instance, placed_below
 from silo.inertia.matching import bare
-from silo.inertia.model import Assembly, Floats, Instance, placed_below
 
 
 class FrameChoice(StrEnum):

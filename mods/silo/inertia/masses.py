@@ -21,20 +21,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from silo.inertia.bom import BomCode, BOMEntry
+from silo.inertia.arrays import Floats
+from silo.inertia.assembly import Assembly, Prototype, placed_below
+from silo.inertia.bom.table import BomCode, BOMEntry
 from silo.inertia.matching import Match, Matching, Suggester
 from silo.inertia.materials import DENSEST, LIGHTEST, Material, MaterialHit, MaterialTable, checked_density
-from silo.inertia.model import (
-    Assembly,
-    Floats,
-    GeometryCode,
-    Note,
-    Prototype,
-    companions,
-    place,
-    placed_below,
-    rigid_mask,
-)
+from silo.inertia.notes import GeometryCode, Note
+from silo.inertia.placements import place, rigid_mask
+from silo.inertia.products import companions
 from silo.inertia.report import Decided, MassCode, Rule, Source
 
 

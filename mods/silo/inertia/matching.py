@@ -27,8 +27,8 @@ from functools import lru_cache
 from itertools import count
 
 from silo.bom.errors import counted, listed
-from silo.inertia.bom import BOMEntry, BomTable
-from silo.inertia.model import Product
+from silo.inertia.bom.table import BOMEntry, BomTable
+from silo.inertia.products import Product
 from silo.inertia.report import Decided, Rule
 
 SUGGEST_FROM = 0.84

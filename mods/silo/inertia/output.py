@@ -31,8 +31,10 @@ from rich.text import Text
 
 from silo.bom.errors import InputError, counted, listed
 from silo.bom.headers import safe_cell
-from silo.inertia.model import CHECK_TOLERANCE, Floats, MassProps, TensorProblem, tensor_words
+from silo.inertia.arrays import Floats
+from silo.inertia.digits import number
 from silo.inertia.report import Decided, InertiaReport, LinkResult, PartResult, PartWarning, Source
+from silo.inertia.rigid import CHECK_TOLERANCE, MassProps, TensorProblem, tensor_words
 from silo.platform import replacing
 
 # Says a finished sentence in the language of a person, as ``silo.spoken`` does.
@@ -44,11 +46,6 @@ _MARGIN = 1e-14
 
 _NOISE = 1e-14
 """Relative: an element below this is the rest of a sum that cancelled."""
-
-
-def number(value: float) -> str:
-    """Write fifteen significant digits, which hide the noise of the last bit; never "-0"."""
-    return f"{value + 0.0:.15g}"
 
 
 def settled(props: MassProps) -> MassProps:

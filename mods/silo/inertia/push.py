@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 from silo.api.policy import ends_run
 from silo.bom.errors import NotFoundError, SiloError
-from silo.inertia.bom import BomCode
-from silo.inertia.model import DOUBTFUL, rounded
-from silo.inertia.output import number
+from silo.inertia.bom.table import BomCode
+from silo.inertia.digits import number, rounded
+from silo.inertia.notes import DOUBTFUL
 from silo.inertia.report import InertiaReport, MassCode, PartResult, Source, SubAssemblyResult
 
 if TYPE_CHECKING:

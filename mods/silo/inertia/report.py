@@ -2,7 +2,8 @@
 """The report: results per link and part, and every warning with link, part and code (spec, Task 2).
 
 The codes are machine names of what a mass calculation has to say; stable, part of the report's schema. Other
-warnings carry those of :class:`~silo.inertia.model.GeometryCode` and :class:`~silo.inertia.bom.BomCode`.
+warnings carry those of :class:`~silo.inertia.notes.GeometryCode` and
+:class:`~silo.inertia.bom.table.BomCode`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from silo.bom.errors import counted
 
 if TYPE_CHECKING:
     from silo.inertia.links import LinkFrame
-    from silo.inertia.model import InertialProperties, MassProps, TensorProblem
+    from silo.inertia.rigid import MassProps, TensorProblem
+    from silo.inertia.types import InertialProperties
 
 
 logger = logging.getLogger(__name__)

@@ -20,9 +20,10 @@ from xml.parsers import expat
 import numpy as np
 
 from silo.bom.errors import InputError
+from silo.inertia.arrays import Floats
 from silo.inertia.links import MOST_RAD, ROOT_LINK, origin_frame
-from silo.inertia.model import Floats, MassProps
 from silo.inertia.output import inertial, write_whole
+from silo.inertia.rigid import MassProps
 
 MAX_BYTES = 64 * 1024 * 1024
 

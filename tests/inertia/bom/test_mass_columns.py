@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from silo.inertia.bom import BomCode, BomTable
+from silo.inertia.bom.table import BomCode, BomTable
 
 Bom = Callable[..., BomTable]
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.numbers import Mark, parse_number
-from silo.inertia.bom import BomCode, BomTable, column_mark, is_empty, parse_mass
+from silo.inertia.bom.mass_cell import column_mark, is_empty, parse_mass
+from silo.inertia.bom.table import BomCode, BomTable
 
 LB = 0.45359237
 

@@ -13,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
-from silo.inertia.bom import BomCode, BomTable, unit_factor
+from silo.inertia.bom.columns import find_columns
+from silo.inertia.bom.mass_cell import unit_factor
 from silo.inertia.bom.parser import BOMParser
-from silo.inertia.bom.sheet import find_columns
+from silo.inertia.bom.table import BomCode, BomTable
 
 PLAIN = (
     "Item,Quantity,Part number,Description,Material,Mass,Name\n"

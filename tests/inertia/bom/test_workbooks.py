@@ -15,8 +15,8 @@ import pytest
 from sheet_corpus import read_corpus
 
 from silo.bom.errors import InputError
-from silo.inertia.bom import BomCode
 from silo.inertia.bom.parser import BOMParser
+from silo.inertia.bom.table import BomCode
 from silo.workbook import read_workbook
 
 openpyxl = pytest.importorskip("openpyxl")

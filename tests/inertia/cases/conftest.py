@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from step_writer import StepDocument
 
-from silo.inertia.bom import BomTable
+from silo.inertia.bom.table import BomTable
 from silo.inertia.calculator import Task, calculate, read_geometry
 from silo.inertia.geometry import ReadOptions
 from silo.inertia.report import InertiaReport

@@ -13,7 +13,8 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from step_writer import trsf_of
 
-from silo.inertia.model import GeometryCode, combine_arrays
+from silo.inertia.notes import GeometryCode
+from silo.inertia.rigid import combine_arrays
 
 Fixture = Callable[..., Any]
 PARTS, KINDS, MODULES, EACH = 20, 4, 100, 100

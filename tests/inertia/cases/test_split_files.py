@@ -16,8 +16,9 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from step_writer import emptied, trsf_of
 
-from silo.inertia.model import GeometryCode, TensorProblem
+from silo.inertia.notes import GeometryCode
 from silo.inertia.report import Source
+from silo.inertia.rigid import TensorProblem
 
 Fixture = Callable[..., Any]
 SIZES = {"upper arm": (10, 10, 100), "hand": (20, 20, 5), "finger": (4, 4, 30)}

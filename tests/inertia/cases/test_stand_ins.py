@@ -24,7 +24,7 @@ from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopoDS import TopoDS_Compound
 from step_writer import trsf_of
 
-from silo.inertia.model import GeometryCode
+from silo.inertia.notes import GeometryCode
 from silo.inertia.report import Decided, Rule
 
 Fixture = Callable[..., Any]

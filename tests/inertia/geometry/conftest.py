@@ -13,8 +13,9 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
 from step_writer import StepDocument, trsf_of
 
+from silo.inertia.assembly import Assembly
 from silo.inertia.geometry import ReadOptions, read
-from silo.inertia.model import Assembly, Note
+from silo.inertia.notes import Note
 
 _TESTS = Path(__file__).parents[2]
 for _folder in (_TESTS / "fcstd", _TESTS / "freecad"):

@@ -13,6 +13,7 @@ import pytest
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 
 from silo.bom.errors import DocumentError, InputError
+from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.geometry import Mesh, ReadOptions, read
 from silo.inertia.geometry.read import (
     FORMAT,
@@ -25,7 +26,7 @@ from silo.inertia.geometry.read import (
     measured_by,
     save,
 )
-from silo.inertia.model import Assembly, Instance, Note, Prototype
+from silo.inertia.notes import Note
 from silo.platform import cache_folder
 
 IMPOSSIBLE = 1

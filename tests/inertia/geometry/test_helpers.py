@@ -22,13 +22,14 @@ from OCP.BRepTools import BRepTools
 from OCP.TopoDS import TopoDS_Compound
 from step_writer import StepDocument, emptied, trsf_of
 
+from silo.inertia.assembly import Assembly
 from silo.inertia.geometry import ReadOptions, read
 from silo.inertia.geometry.fcstd import read_freecad
 from silo.inertia.geometry.helpers import LEAST_MB, WORTH_HELP, Helpers, helpers_for
 from silo.inertia.geometry.kernel.solids import measure_all
 from silo.inertia.geometry.step import read_step
 from silo.inertia.geometry.step_text import begin
-from silo.inertia.model import Assembly, GeometryCode
+from silo.inertia.notes import GeometryCode
 from silo.platform import processors
 
 OPTIONS = ReadOptions(isolate=False, cache=False)

@@ -35,8 +35,9 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
 from product_hunt import Moments, Piece, Product, product, triangles
 from step_writer import StepDocument, trsf_of
 
+from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.geometry import kernel as occt
-from silo.inertia.model import Assembly, GeometryCode, Prototype
+from silo.inertia.notes import GeometryCode
 from silo.inertia.push import DOUBTS
 
 COUNT = int(os.environ.get("SILO_HUNT", "120"))

@@ -15,7 +15,7 @@ import pytest
 from silo.bom.errors import CancelledError, ConfigError, DocumentError
 from silo.inertia.geometry import Progress, ReadOptions, read
 from silo.inertia.geometry.read import run
-from silo.inertia.model import GeometryCode
+from silo.inertia.notes import GeometryCode
 
 
 def options(**more: Any) -> ReadOptions:

@@ -21,14 +21,13 @@ from rich.console import Console
 
 from silo.bom.errors import InputError
 from silo.cli.show import console
+from silo.inertia.digits import number
 from silo.inertia.links import ASSEMBLY_FRAME, link_map, origin_frame
-from silo.inertia.model import MassProps, combine
 from silo.inertia.output import (
     CSV_COLUMNS,
     MAX_PART_ROWS,
     SNIPPETS,
     document,
-    number,
     report_csv,
     report_data,
     report_json,
@@ -39,6 +38,7 @@ from silo.inertia.output import (
     writable,
 )
 from silo.inertia.report import LinkResult
+from silo.inertia.rigid import MassProps, combine
 
 Fixture = Callable[..., Any]
 SCHEMA = Path(__file__).parents[3] / "mods" / "silo" / "inertia" / "schema.json"
@@ -273,8 +273,8 @@ def test_case_43_json_fits_its_schema(report: Any) -> None:
 
 def test_schema_knows_every_code_of_the_program() -> None:
     """Enumerations of schema and program are the same."""
-    from silo.inertia.model import TensorProblem
     from silo.inertia.report import Decided, Rule, Source
+    from silo.inertia.rigid import TensorProblem
 
     schema = json.loads(SCHEMA.read_text("utf-8"))["$defs"]
     part = schema["part"]["properties"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from silo.bom.errors import InputError
-from silo.inertia.model import MassProps
+from silo.inertia.rigid import MassProps
 from silo.inertia.urdf import Urdf, read_urdf, write_urdf
 
 PROPS = MassProps(1.5, [0.1, 0.2, 0.3], np.diag([0.01, 0.02, 0.025]))  # type: ignore[arg-type]

@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from silo.drawing.page import LinkView, ellipsoid, inertia_ellipsoid, shaded, views_of, write_glb
+from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.geometry import Mesh
 from silo.inertia.geometry.together import mesh_volume
-from silo.inertia.model import Assembly, Instance, MassProps, Prototype
+from silo.inertia.rigid import MassProps
 
 
 def cube_mesh(size: float = 0.1) -> Mesh:

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.inertia.links import origin_frame
-from silo.inertia.model import MassProps, combine, place
 from silo.inertia.output import settled
+from silo.inertia.placements import place
+from silo.inertia.rigid import MassProps, combine
 
 length = st.floats(-5, 5, allow_nan=False)
 positive = st.floats(1e-3, 10)

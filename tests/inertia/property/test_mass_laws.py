@@ -15,10 +15,10 @@ from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from silo.inertia.bom import BOMEntry, BomTable
-from silo.inertia.bom.parser import with_structure
+from silo.inertia.assembly import Assembly, Instance
+from silo.inertia.bom.structure import with_structure
+from silo.inertia.bom.table import BOMEntry, BomTable
 from silo.inertia.matching import bare, plain
-from silo.inertia.model import Assembly, Instance
 from silo.inertia.output import report_json
 from silo.inertia.report import Source
 

@@ -21,7 +21,7 @@ from hunting import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from silo.inertia.model import Assembly, Instance, Prototype
+from silo.inertia.assembly import Assembly, Instance, Prototype
 
 NAMES = (
     "Part 1",

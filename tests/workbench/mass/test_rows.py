@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from bodies import box
 
+from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.links import Link, LinkMap
 from silo.inertia.masses import Options
 from silo.inertia.materials import load_materials
-from silo.inertia.model import Assembly, Instance, Note, Prototype
+from silo.inertia.notes import Note
 from silo.workbench.mass.rows import MassView, mass_text, shown
 
 

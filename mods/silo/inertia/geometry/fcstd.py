@@ -37,7 +37,7 @@ from silo.inertia.geometry.freecad import (
 from silo.inertia.geometry.graph import Floats, GeometryReading, ReadOptions, Report
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers, Task
 from silo.inertia.geometry.measured import Measured
-from silo.inertia.model import is_rigid
+from silo.inertia.placements import is_rigid
 from silo.platform import remove_patiently, scratch_folder
 
 

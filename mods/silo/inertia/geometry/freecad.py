@@ -46,11 +46,12 @@ from silo.bom.resolve import display_name
 from silo.bom.roots import choose_assembly, seen_beside, silent_reader
 from silo.bom.standard import STANDARD_PARTS
 from silo.bom.targets import Step, is_assembly_link, is_link
+from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.geometry import measured as checks
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, ReadOptions, Report, in_metres, unfold
 from silo.inertia.geometry.measured import Measured
 from silo.inertia.materials import DENSEST, LIGHTEST, card_of, parse_density
-from silo.inertia.model import Assembly, GeometryCode, Note, Prototype
+from silo.inertia.notes import GeometryCode, Note
 
 NO_MATERIAL = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
 """FreeCAD's "Default": what every untouched part has. Its 1 kg/m^3 is nobody's density."""

@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.bom.errors import DocumentError, InputError
-from silo.inertia.model import Assembly, GeometryCode, Instance, Note
+from silo.inertia.assembly import Assembly, Instance
+from silo.inertia.notes import GeometryCode, Note
 
 _GENERIC = re.compile(r"(?:(?:SOLID|COMPOUND|COMPSOLID|SHELL|FACE|WIRE|EDGE|VERTEX)(?:_?\d+)?|=>\[[\d:]*\])?")
 _STEP_SUFFIXES = (".step", ".stp", ".p21")

@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import counted, listed
+from silo.inertia.assembly import Assembly, Instance, Prototype, SolidProps
 from silo.inertia.geometry.graph import Unfolded, lost_characters
 from silo.inertia.geometry.together import Body, Mesh, Together, about_enclosed, combined
-from silo.inertia.model import Assembly, GeometryCode, Instance, Note, Prototype, SolidProps, rigid_mask
+from silo.inertia.notes import GeometryCode, Note
+from silo.inertia.placements import rigid_mask
 
 STATED = 5e-5
 """Relative: what the volume may depend on the way that it is taken, and no farther in silence."""

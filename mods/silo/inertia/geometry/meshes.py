@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from silo.bom.errors import ConfigError, DocumentError, counted
+from silo.inertia.assembly import Prototype
 from silo.inertia.geometry.graph import (
     MAX_DEPTH,
     MESH_UNITS,
@@ -40,7 +41,7 @@ from silo.inertia.geometry.graph import (
 )
 from silo.inertia.geometry.measured import Measured, assembled, implausible_size
 from silo.inertia.geometry.together import Floats, Mesh, enclosed, welded, without
-from silo.inertia.model import GeometryCode, Note, Prototype
+from silo.inertia.notes import GeometryCode, Note
 
 MAX_COORDINATE = 1e12
 """Of mesh files, in their own unit; nothing that is made is as large, and larger ones overflow an inertia."""

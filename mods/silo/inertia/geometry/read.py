@@ -44,6 +44,7 @@ from silo import platform
 from silo.bom.document import relative
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError, counted
 from silo.files import content_hash
+from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.geometry.graph import (
     Format,
     GeometryReading,
@@ -56,7 +57,7 @@ from silo.inertia.geometry.graph import (
 )
 from silo.inertia.geometry.helpers import Helpers, helpers_for
 from silo.inertia.geometry.together import Mesh
-from silo.inertia.model import Assembly, GeometryCode, Instance, Note, Prototype
+from silo.inertia.notes import GeometryCode, Note
 from silo.platform import cache_folder, limit_this_process, remove_patiently, replacing, scratch_folder
 
 POLL_SECONDS = 0.05
@@ -485,7 +486,8 @@ def measured_by() -> str:
     differ.
     """
     package = Path(__file__).resolve().parent
-    return fingerprint([*package.rglob("*.py"), package.parent / "model.py"])
+    values = (package.parent / f"{name}.py" for name in ("arrays", "assembly", "notes", "placements"))
+    return fingerprint([*package.rglob("*.py"), *values])
 
 
 def fingerprint(paths: Iterable[Path]) -> str:

@@ -53,6 +53,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.XCAFDoc import XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
 
 from silo.bom.errors import DocumentError, InputError, counted, listed
+from silo.inertia.assembly import Prototype
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.graph import (
     Child,
@@ -76,7 +77,7 @@ from silo.inertia.geometry.measured import Measured, assembled, implausible_size
 from silo.inertia.geometry.part21 import ProductFacts, Products
 from silo.inertia.geometry.step_text import MARK, Prepared, prepare
 from silo.inertia.geometry.together import Floats, combined
-from silo.inertia.model import GeometryCode, Note, Prototype
+from silo.inertia.notes import GeometryCode, Note
 from silo.platform import scratch_folder
 
 

@@ -24,7 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.bom.errors import counted
-from silo.inertia.model import GeometryCode, Note, SolidProps, combine_arrays
+from silo.inertia.assembly import SolidProps
+from silo.inertia.notes import GeometryCode, Note
+from silo.inertia.rigid import combine_arrays
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]

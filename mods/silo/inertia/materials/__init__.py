@@ -31,7 +31,7 @@ from silo.bom.errors import ConfigError, InputError
 from silo.bom.numbers import LONGEST, parse_number, plain_text, read_number
 from silo.bom.quantities import plain
 from silo.freecads import material_folders
-from silo.inertia.bom import MASS_UNITS
+from silo.inertia.bom.mass_cell import MASS_UNITS
 from silo.inertia.matching import Suggester
 
 if TYPE_CHECKING:

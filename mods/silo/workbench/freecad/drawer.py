@@ -131,7 +131,7 @@ def _stored(path: Path, named: str, place: Floats) -> Any:
     import Part
 
     from silo.inertia.geometry.graph import is_binary_brep
-    from silo.inertia.model import is_rigid
+    from silo.inertia.placements import is_rigid
 
     if not is_rigid(place):
         raise DocumentError(named, "its placement scales it inside of its part, which is not supported")

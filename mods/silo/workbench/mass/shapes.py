@@ -23,6 +23,7 @@ import numpy as np
 
 from silo.bom.document import LinkProblem, own
 from silo.bom.errors import DocumentError
+from silo.inertia.assembly import Assembly, SolidProps
 from silo.inertia.geometry.exact import (
     Basis,
     Curve,
@@ -60,7 +61,8 @@ from silo.inertia.geometry.measured import (
     shell_note,
 )
 from silo.inertia.geometry.together import Body, Mesh, mesh_volume, together
-from silo.inertia.model import Assembly, GeometryCode, Note, SolidProps, place
+from silo.inertia.notes import GeometryCode, Note
+from silo.inertia.placements import place
 from silo.workbench.freecad import live
 
 _ELEMENTARY = {

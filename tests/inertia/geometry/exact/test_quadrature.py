@@ -28,7 +28,7 @@ from silo.inertia.geometry.exact import (
     basis_functions,
     integrate,
 )
-from silo.inertia.model import GeometryCode
+from silo.inertia.notes import GeometryCode
 
 Point = Callable[[float, float], tuple[float, float, float]]
 TURN = 2 * math.pi

@@ -22,10 +22,12 @@ from silo.bom.errors import DocumentError
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
+from silo.inertia.assembly import Assembly
 from silo.inertia.geometry import ReadOptions, read
 from silo.inertia.geometry.fcstd import placed
 from silo.inertia.geometry.together import Mesh
-from silo.inertia.model import Assembly, GeometryCode, place
+from silo.inertia.notes import GeometryCode
+from silo.inertia.placements import place
 
 SCRIPT = Path(__file__).with_name("freecad_shapes.py")
 

@@ -31,9 +31,12 @@ from OCP.gp import gp_Ax1, gp_Dir, gp_GTrsf, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.TopAbs import TopAbs_INTERNAL
 from OCP.TopoDS import TopoDS_Compound
 
+from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.kernel.solids import moments as moments_of
-from silo.inertia.model import Assembly, GeometryCode, MassProps, Prototype, combine, combine_arrays, place
+from silo.inertia.notes import GeometryCode
+from silo.inertia.placements import place
+from silo.inertia.rigid import MassProps, combine, combine_arrays
 
 EXACT = 1e-9
 MM = 1e-3

@@ -22,10 +22,11 @@ from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
 
+from silo.inertia.assembly import Prototype
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.kernel.solids import measure
 from silo.inertia.geometry.together import combined, mesh_volume
-from silo.inertia.model import GeometryCode, Prototype
+from silo.inertia.notes import GeometryCode
 
 Read = Callable[..., Any]
 COPY, OVER = GeometryCode.COINCIDENT_SOLIDS, GeometryCode.OVERLAPPING_SOLIDS

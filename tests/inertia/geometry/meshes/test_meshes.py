@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import DocumentError
+from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.geometry.together import (
     Mesh,
     about_enclosed,
@@ -28,7 +29,7 @@ from silo.inertia.geometry.together import (
     winding_number,
     without_doubled,
 )
-from silo.inertia.model import Assembly, GeometryCode, Prototype
+from silo.inertia.notes import GeometryCode
 
 
 def brick(size: tuple[float, float, float] = (10, 20, 30), at: Any = (0, 0, 0)) -> Any:

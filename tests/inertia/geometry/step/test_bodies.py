@@ -21,9 +21,10 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell
 from step_bodies import KINDS, MM, Bodies, begun, some
 from step_writer import StepDocument, trsf_of
 
+from silo.inertia.assembly import Prototype
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.part21 import WANTED, read_products, scan
-from silo.inertia.model import GeometryCode, Prototype
+from silo.inertia.notes import GeometryCode
 
 COUNT = int(os.environ.get("SILO_HUNT", "60"))
 SEED = int(os.environ.get("SILO_HUNT_SEED", "29"))

@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from silo.inertia.model import Assembly, GeometryCode, MassProps, combine_arrays, place
+from silo.inertia.assembly import Assembly
+from silo.inertia.notes import GeometryCode
+from silo.inertia.placements import place
+from silo.inertia.rigid import MassProps, combine_arrays
 
 
 def volumes(assembly: Assembly) -> dict[str, float]:

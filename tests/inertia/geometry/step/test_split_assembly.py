@@ -10,7 +10,8 @@ import pytest
 from step_writer import emptied
 
 from silo.bom.errors import DocumentError
-from silo.inertia.model import Assembly, GeometryCode
+from silo.inertia.assembly import Assembly
+from silo.inertia.notes import GeometryCode
 
 
 def volume_mm3(assembly: Assembly) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from silo.inertia.model import GeometryCode
+from silo.inertia.notes import GeometryCode
 
 UNITS = {
     "kg/m3": """

@@ -29,12 +29,14 @@ from OCP.STEPControl import STEPControl_Reader
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
 
 from silo.bom.errors import DocumentError
+from silo.inertia.assembly import Prototype
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.kernel.solids import beside_edges, solid_moments
 from silo.inertia.geometry.part21 import ProductFacts, Products
 from silo.inertia.geometry.step import StatedInStep, StepFile, against_stated, stated_totals
-from silo.inertia.model import GeometryCode, Note, Prototype, place
+from silo.inertia.notes import GeometryCode, Note
+from silo.inertia.placements import place
 
 
 def compound(*shapes: Any) -> Any:

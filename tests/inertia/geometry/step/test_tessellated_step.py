@@ -16,7 +16,7 @@ from OCP.TopoDS import TopoDS_Face, TopoDS_Shell, TopoDS_Solid
 
 from silo.inertia.geometry.kernel import tessellated
 from silo.inertia.geometry.together import Mesh
-from silo.inertia.model import GeometryCode
+from silo.inertia.notes import GeometryCode
 
 GIVEN = GeometryCode.READER
 """What each solid of triangles is marked with."""

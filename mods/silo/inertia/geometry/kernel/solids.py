@@ -69,6 +69,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Shape
 
 from silo.bom.errors import DocumentError
+from silo.inertia.assembly import Assembly, Instance, SolidProps
 from silo.inertia.geometry import kernel as occt
 from silo.inertia.geometry.exact import (
     Basis,
@@ -125,7 +126,8 @@ from silo.inertia.geometry.together import (
     together,
     welded,
 )
-from silo.inertia.model import Assembly, GeometryCode, Instance, Note, SolidProps, place
+from silo.inertia.notes import GeometryCode, Note
+from silo.inertia.placements import place
 from silo.platform import remove_patiently
 
 TENSOR_SHARE = 1e-4
