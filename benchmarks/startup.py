@@ -42,8 +42,8 @@ def cpu_ms(command: list[str | Path], runs: int) -> float:
 
 def registering(count: int) -> Callable[[], object]:
     """Return what makes the table of ``count`` files with one content."""
+    from silo.bom.items.proposal import Proposal
     from silo.bom.model import BomEntry
-    from silo.bom.resolve import Proposal
     from silo.registering.offer import Candidate, ComponentState, Offer
     from silo.registering.orders import write_table
 

@@ -28,12 +28,13 @@ from typing import Any, BinaryIO, Protocol
 from xml.sax.saxutils import escape, quoteattr
 
 from silo.api.wire import SourceDocument
+from silo.bom.consolidation import one_hint_each
 from silo.bom.document import relative
 from silo.bom.errors import DocumentError, Exit, InputError, RemoteError, SiloError, counted, listed
 from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.items.naming import display_name
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, diff_json, diff_rows, entry_json, finding_json, project_folder, shorten
-from silo.bom.resolve import display_name, one_hint_each
 from silo.bom_sync import (
     Outcome,
     Resolved,

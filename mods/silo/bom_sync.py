@@ -46,22 +46,20 @@ from silo.api.wire import (
 )
 from silo.bom.compare.difference import diff_bom
 from silo.bom.compare.merge import MergePlan, plan_merge
+from silo.bom.consolidation import consolidation_findings
 from silo.bom.document import relative
 from silo.bom.errors import SiloError, Translate, english
 from silo.bom.findings import Finding, FindingCode, Severity
-from silo.bom.links import extract, extract_bom_links
-from silo.bom.model import BomDiff, BomEntry, Extraction, walk_entries
-from silo.bom.report import LeftOut, components_of, left_out_of
-from silo.bom.resolve import (
-    ItemLookup,
-    Known,
-    consolidation_findings,
-    look_up,
+from silo.bom.items.lookup import ItemLookup, Known, look_up
+from silo.bom.items.resolve import (
     numbered_findings,
     resolve_part_numbers,
     resolve_with,
     unregistered_findings,
 )
+from silo.bom.links import extract, extract_bom_links
+from silo.bom.model import BomDiff, BomEntry, Extraction, walk_entries
+from silo.bom.report import LeftOut, components_of, left_out_of
 from silo.platform import cache_folder, data_folder, read_memory, write_memory
 
 # Each costs a request, and only while nobody has registered the part.

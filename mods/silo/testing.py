@@ -63,7 +63,7 @@ from silo.bom.errors import (
 from silo.bom.model import as_uuid
 from silo.bom.quantities import counts_pieces
 from silo.bom.report import Reason, remembered
-from silo.bom.resolve import name_key
+from silo.bom.text import name_key
 
 __all__ = ["FakeSilo"]
 

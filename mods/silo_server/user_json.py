@@ -14,7 +14,7 @@ from decimal import Decimal
 from typing import Any
 
 from silo.bom.errors import RejectedError
-from silo.bom.resolve import character_problem
+from silo.bom.text import character_problem
 
 MAX_DEPTH = 32
 MAX_BYTES = 256 * 1024

@@ -19,7 +19,7 @@ from silo.bom.errors import (
     ServerFaultError,
     UnreachableError,
 )
-from silo.bom.resolve import categories_of
+from silo.bom.items.schema import categories_of
 
 UUIDS = [str(uuid4()) for _ in range(2000)]
 

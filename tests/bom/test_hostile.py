@@ -11,9 +11,9 @@ from typing import Any
 from fakes import Doc, edit
 
 from silo.bom import diff_bom, extract, resolve_part_numbers
+from silo.bom.consolidation import consolidation_findings
 from silo.bom.model import walk_entries
 from silo.bom.report import flat_counts, tree_size
-from silo.bom.resolve import consolidation_findings
 
 
 class EveryItem:

@@ -10,17 +10,10 @@ from typing import Any
 import pytest
 
 from silo.bom import FindingCode, Severity, resolve_part_numbers
+from silo.bom.consolidation import consolidation_findings, consolidation_message, one_hint_each
 from silo.bom.findings import Finding
+from silo.bom.items.resolve import merge_lines, numbered_findings, resolve_with, unregistered_findings
 from silo.bom.model import BomEntry, identity_findings
-from silo.bom.resolve import (
-    consolidation_findings,
-    consolidation_message,
-    merge_lines,
-    numbered_findings,
-    one_hint_each,
-    resolve_with,
-    unregistered_findings,
-)
 
 
 class Silo:

@@ -18,7 +18,7 @@ from server_testing import Api, bom
 from web_visitor import enter
 
 from silo.api.wire import ItemTexts
-from silo.bom.resolve import character_problem
+from silo.bom.text import character_problem
 from silo_server.services.search import words_of
 
 

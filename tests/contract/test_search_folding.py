@@ -11,7 +11,7 @@ import pytest
 from hunting import BOTH
 from server_testing import Api
 
-from silo.bom.resolve import name_key
+from silo.bom.text import name_key
 from silo_server.services.search import fits
 
 # Ways to write one thing.

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from silo.bom import BomEntry, apply_merge, diff_bom, plan_merge, resolve_part_numbers
 from silo.bom.compare.answer import summary
+from silo.bom.items.resolve import merge_lines
 from silo.bom.quantities import same_quantity
-from silo.bom.resolve import merge_lines
 
 NUMBERS = ("PRT-100", "ASM-200", "F01-0001", "F01-0002", "glue", "Ü-1")
 

@@ -9,8 +9,8 @@ from fcstd_writer import part
 
 from silo.api.wire import Item
 from silo.bom.errors import RejectedError
+from silo.bom.items.proposal import propose
 from silo.bom.model import BomEntry
-from silo.bom.resolve import propose
 from silo.registering.items import Journal, Registration
 from silo.registering.offer import Candidate, ComponentState, Learnt, LearntChoice, Modelled
 from silo.registering.orders import Order, carry_out, take_back

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
+from silo.bom.items.proposal import Proposal
 from silo.bom.model import BomEntry
-from silo.bom.resolve import Proposal
 from silo.registering.offer import Candidate, CandidateFiles, ComponentState, Offer
 from silo.registering.orders import read_table, write_table
 

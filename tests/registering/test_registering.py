@@ -13,8 +13,9 @@ import pytest
 
 from silo.bom.errors import ServerFaultError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.items.proposal import Proposal
+from silo.bom.items.schema import Categories
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.resolve import Categories, Proposal
 from silo.registering.offer import Candidate, ComponentState, Offer, OpenedFile, offer
 from silo.testing import FakeSilo
 from silo.workbench.register.flow import EditedRow

@@ -31,8 +31,8 @@ from silo.bom.errors import (
     SiloError,
     UnreachableError,
 )
+from silo.bom.items.proposal import propose
 from silo.bom.model import BomEntry
-from silo.bom.resolve import propose
 from silo.fcstd import Library, stamp
 from silo.platform import hold_lock
 from silo.registering.items import (

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from silo.bom.items.proposal import Proposal, crowded_files
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.resolve import Proposal, crowded_files
 from silo.bom.standard import standard_uuid
 from silo.bom_sync import Memory, by_description, find_items, resolve
 from silo.registering.items import register_standard

@@ -24,7 +24,7 @@ from silo.bom.errors import (
     RejectedError,
     ServerFaultError,
 )
-from silo.bom.resolve import character_problem, with_allowed_characters
+from silo.bom.text import character_problem, with_allowed_characters
 
 
 def as_json(data: object) -> bytes:

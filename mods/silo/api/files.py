@@ -20,7 +20,7 @@ from silo.api.transport import MAX_ERROR, ApiCall, Cancel, Transport
 from silo.api.wire import Document, HeldItem, LinkedFile, Release, Revision, Scene, Wire
 from silo.bom.errors import ConflictError, DocumentError, RejectedError, RouteMissingError, ServerFaultError
 from silo.bom.numbers import whole_number
-from silo.bom.resolve import with_allowed_characters
+from silo.bom.text import with_allowed_characters
 from silo.platform import remove_patiently, replacing
 
 if TYPE_CHECKING:

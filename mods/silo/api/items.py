@@ -23,8 +23,9 @@ from silo.bom.errors import (
     ServerFaultError,
     SiloError,
 )
+from silo.bom.items.schema import Categories, categories_of, rules_of, schema_names
 from silo.bom.model import as_uuid
-from silo.bom.resolve import Categories, categories_of, name_key, rules_of, schema_names
+from silo.bom.text import name_key
 from silo.files import bare_checksum
 
 

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from silo.bom.compare.difference import diff_bom
     from silo.bom.compare.merge import MergePlan, apply_merge, plan_merge
     from silo.bom.findings import Finding, FindingCode, Place, Severity
+    from silo.bom.items.resolve import resolve_part_numbers
     from silo.bom.links import extract, extract_bom_links
     from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
-    from silo.bom.resolve import resolve_part_numbers
     from silo.bom.roots import choose_assembly
 
 _HOME = {
@@ -24,7 +24,7 @@ _HOME = {
     "findings": ("Finding", "FindingCode", "Place", "Severity"),
     "links": ("extract", "extract_bom_links"),
     "model": ("BomChange", "BomDiff", "BomEntry", "Extraction", "QuantityChange"),
-    "resolve": ("resolve_part_numbers",),
+    "items.resolve": ("resolve_part_numbers",),
     "roots": ("choose_assembly",),
 }
 

@@ -22,6 +22,7 @@ from typing import Any
 from silo.bom.document import NAMELESS, label_of, own
 from silo.bom.errors import InputError, SeveralAssembliesError, did_you_mean
 from silo.bom.findings import Finding, FindingCode, Place
+from silo.bom.items.naming import display_name
 from silo.bom.model import BomEntry, Extraction, identity_findings, identity_of, sole_identity, walk_entries
 from silo.bom.objects import (
     Count,
@@ -34,7 +35,6 @@ from silo.bom.objects import (
     is_container,
     is_named_assembly,
 )
-from silo.bom.resolve import display_name
 from silo.bom.roles import Canonical, Files
 from silo.bom.roots import Whole, as_it_is, beside, choose_assembly, fates, silent_reader
 from silo.bom.standard import same_articles, standard_uuid

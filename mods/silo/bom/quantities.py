@@ -17,7 +17,6 @@ _WIDE = Context(prec=80)
 
 # A pattern: "pcs" and what means the same.
 PIECE_WORDS = r"(?:pcs?|pieces?|ea|each|units?|stk|stck|st|stück|pz|шт|個|个|件)\.?"
-
 _PIECE = re.compile(PIECE_WORDS, re.IGNORECASE)
 
 

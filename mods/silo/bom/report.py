@@ -28,8 +28,8 @@ from typing import Any
 from silo.bom.document import relative
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.items.naming import display_name
 from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts, walk_entries
-from silo.bom.resolve import display_name
 from silo.bom.standard import STANDARD_PARTS
 
 # A CAD model counts pieces.

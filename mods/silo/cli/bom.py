@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from silo import spoken
+from silo.bom.consolidation import consolidation_findings, one_hint_each
 from silo.bom.document import relative
 from silo.bom.errors import (
     BusyError,
@@ -31,9 +32,10 @@ from silo.bom.errors import (
 )
 from silo.bom.findings import FindingCode
 from silo.bom.headers import safe_cell
+from silo.bom.items.naming import display_name
 from silo.bom.model import BomDiff, BomEntry, Extraction, walk_entries
 from silo.bom.report import PIECES, base_of, bom_json, diff_json, finding_json, flat_json, shorten
-from silo.bom.resolve import consolidation_findings, display_name, one_hint_each, with_allowed_characters
+from silo.bom.text import with_allowed_characters
 from silo.cli.common import (
     EACH,
     READING,

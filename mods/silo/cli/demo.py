@@ -23,10 +23,10 @@ from xml.etree import ElementTree
 
 from silo import spoken
 from silo.batch import source_document
+from silo.bom.consolidation import consolidation_findings
 from silo.bom.errors import DocumentError, Exit, InputError, ServerFaultError
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
-from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import Outcome, Status, activity_text, resolve, sync_tree
 from silo.cli.common import add_options, read_assembly
 from silo.cli.setup import need_server_extra

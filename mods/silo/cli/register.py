@@ -24,9 +24,9 @@ from typing import TYPE_CHECKING, Any
 from silo import spoken
 from silo.bom.document import relative
 from silo.bom.errors import ConflictError, DocumentError, Exit, InputError, SiloError, counted
+from silo.bom.items.proposal import Proposal, propose
 from silo.bom.model import Extraction, walk_entries
 from silo.bom.report import base_of
-from silo.bom.resolve import Proposal, propose
 from silo.cli.common import (
     add_options,
     add_top,

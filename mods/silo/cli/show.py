@@ -20,9 +20,9 @@ from silo import spoken
 from silo.bom.document import relative
 from silo.bom.errors import ConfigError, Exit, counted
 from silo.bom.findings import Finding, Severity
+from silo.bom.items.naming import display_name
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.report import MOST_LINES, base_of, check_tree_size, diff_rows, shorten
-from silo.bom.resolve import display_name
 from silo.cli.common import (
     above_zero,
     account_of,
@@ -36,7 +36,7 @@ from silo.cli.common import (
 
 if TYPE_CHECKING:
     from silo.api.wire import OrderList, ProductSummary
-    from silo.bom.resolve import Proposal
+    from silo.bom.items.proposal import Proposal
     from silo.bom_sync import ActivityText, Outcome
     from silo.registering.items import Registration
     from silo.registering.offer import Modelled

@@ -34,9 +34,9 @@ from silo.bom.document import derived, label_of, object_name, own
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError, counted
 from silo.bom.model import identity_of
 from silo.bom.objects import Contents, Contribution, Key, Kind, Lost, elements, is_container, survey_of
-from silo.bom.resolve import with_allowed_characters
 from silo.bom.roots import choose_assembly, find_assemblies
 from silo.bom.standard import standard_uuid
+from silo.bom.text import with_allowed_characters
 from silo.drawing import Glb, cube, shaded
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths

@@ -50,8 +50,8 @@ from silo.bom.errors import (
     SiloError,
     UnreachableError,
 )
+from silo.bom.items.proposal import Proposal
 from silo.bom.model import BomEntry, as_uuid, document_identity, own_identity
-from silo.bom.resolve import Proposal
 from silo.bom_sync import Memory, by_description, server_of
 from silo.files import folder_lock
 from silo.platform import data_folder, private_file, private_folder, remove_patiently, replacing

@@ -35,9 +35,11 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.findings import FindingCode
+from silo.bom.items.naming import is_generic
+from silo.bom.items.proposal import Proposal, crowded_files, propose
+from silo.bom.items.stems import stems
 from silo.bom.model import BomEntry, Extraction, document_identity, meta_key, own_identity, walk_entries
 from silo.bom.objects import survey_of
-from silo.bom.resolve import Proposal, crowded_files, is_generic, propose, stems
 from silo.bom.roles import DECLARABLE
 from silo.bom.roots import choose_assembly, silent_reader
 from silo.fcstd import Library

@@ -28,8 +28,9 @@ from silo.bom.document import relative
 from silo.bom.errors import DocumentError, InputError, NotFoundError, SiloError
 from silo.bom.findings import Finding
 from silo.bom.headers import plain_cell, safe_cell
+from silo.bom.items.categories import proposed_category
+from silo.bom.items.proposal import Proposal, propose_all
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.resolve import Proposal, propose_all, proposed_category
 from silo.bom_sync import resolve
 from silo.fcstd import check_stampable, stamp
 from silo.freecads import OpenInFreecad, open_in_any

@@ -33,10 +33,10 @@ from silo.bom.compare.states import ComparedAssembly
 from silo.bom.document import relative
 from silo.bom.errors import CancelledError, DocumentError, InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.items.lookup import Known
 from silo.bom.links import MAX_LEVELS, Rings, extract
 from silo.bom.model import BomEntry, Extraction, copied_identity
 from silo.bom.report import shorten, whole_row
-from silo.bom.resolve import Known
 from silo.bom.roots import choose_assembly, find_assemblies
 from silo.bom.standard import standard_uuid
 from silo.bom_sync import (

@@ -40,9 +40,9 @@ from silo.bom.compare.states import ComparedAssembly
 from silo.bom.compare.three_states import ThreeLines, compare_three
 from silo.bom.compare.two_states import LineChange, compare_assemblies
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError, listed
+from silo.bom.items.naming import display_name
 from silo.bom.links import extract
 from silo.bom.model import Extraction
-from silo.bom.resolve import display_name
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.library import FileContents

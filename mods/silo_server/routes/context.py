@@ -26,7 +26,7 @@ from silo.api.wire import RELEASE_LABEL, ErrorBody, MergeRequest
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
 from silo.bom.numbers import whole_number
 from silo.bom.quantities import LARGEST_QUANTITY
-from silo.bom.resolve import REFUSED_CHARACTERS
+from silo.bom.text import REFUSED_CHARACTERS
 from silo_server.actors import Actor, Role
 from silo_server.db.engine import Database, Turnstile, Tx
 from silo_server.events import Hub

@@ -19,7 +19,7 @@ from pydantic import (
 from silo.api import wire
 from silo.bom.numbers import read_quantity
 from silo.bom.quantities import LARGEST_QUANTITY
-from silo.bom.resolve import character_problem
+from silo.bom.text import character_problem
 from silo_server.routes import context
 from silo_server.schema import text_hints
 from silo_server.services.bom.review import REL_TYPES, SOURCES

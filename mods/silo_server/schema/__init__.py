@@ -18,9 +18,9 @@ from pydantic.fields import FieldInfo
 
 from silo.api.wire import ItemTexts
 from silo.bom.errors import ConfigError, InputError, NotFoundError, RejectedError
+from silo.bom.items.schema import CategoryRule
 from silo.bom.numbers import read_number
 from silo.bom.quantities import plain
-from silo.bom.resolve import CategoryRule
 
 DEFAULT_SCHEMA = "kindred-rd"
 _log = logging.getLogger(__name__)

@@ -12,8 +12,8 @@ import re
 from typing import Any
 
 from silo.bom.errors import RejectedError
-from silo.bom.numbers import LARGEST_QUANTITY
-from silo.bom.resolve import character_problem
+from silo.bom.quantities import LARGEST_QUANTITY
+from silo.bom.text import character_problem
 
 
 def text_problem(value: Any, longest: int) -> str | None:

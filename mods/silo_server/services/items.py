@@ -22,7 +22,7 @@ from sqlalchemy.exc import IntegrityError
 from silo.api.wire import FACTS, FactSource, ItemTexts, Stated
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
 from silo.bom.model import as_uuid
-from silo.bom.resolve import REFUSED_CHARACTERS, character_problem
+from silo.bom.text import REFUSED_CHARACTERS, character_problem
 from silo_server import events
 from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer, one_of
 from silo_server.db.tables import items, number_counters

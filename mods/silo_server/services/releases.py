@@ -23,7 +23,7 @@ from sqlalchemy import insert, select, update
 
 from silo.api.wire import RELEASE_LABEL, ItemTexts
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
-from silo.bom.resolve import character_problem
+from silo.bom.text import character_problem
 from silo_server import events
 from silo_server.actors import Role, Scope
 from silo_server.db.engine import Tx, insert_rows, one_of

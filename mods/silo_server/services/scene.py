@@ -23,7 +23,7 @@ from sqlalchemy import insert, select, update
 
 from silo.api import wire
 from silo.bom.errors import NotFoundError, RejectedError
-from silo.bom.resolve import character_problem
+from silo.bom.text import character_problem
 from silo_server.db.engine import Tx, one_of
 from silo_server.db.tables import document_items, documents, models, revisions
 from silo_server.db.tables import items as item_rows

@@ -36,7 +36,7 @@ from sqlalchemy.dialects.postgresql import TSQUERY, TSVECTOR
 from sqlalchemy.sql.expression import cast, literal
 
 from silo.api.wire import ItemTexts
-from silo.bom.resolve import folded, glued, name_key
+from silo.bom.text import folded, glued, name_key
 from silo_server.db.engine import Tx, get_state, one_of, put_state
 from silo_server.db.tables import items, revisions
 from silo_server.schema import text_hints

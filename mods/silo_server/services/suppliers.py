@@ -26,7 +26,7 @@ from silo.bom.errors import ConflictError, RejectedError, VersionConflictError
 from silo.bom.headers import Heading
 from silo.bom.numbers import Mark, common_mark, parse_number, read_number, whole_number, yes_or_no
 from silo.bom.quantities import as_decimal, exact_product
-from silo.bom.resolve import character_problem
+from silo.bom.text import character_problem
 from silo_server import events
 from silo_server.db.engine import Tx, get_state, one_of, put_state
 from silo_server.db.tables import items, supplier_changes

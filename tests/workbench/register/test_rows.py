@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import pytest
 
+from silo.bom.items.proposal import Proposal
+from silo.bom.items.schema import Categories
 from silo.bom.model import BomEntry
-from silo.bom.resolve import Categories, Proposal
 from silo.registering.offer import Candidate, ComponentState, Offer, Similar
 from silo.workbench.register.flow import (
     ASK,

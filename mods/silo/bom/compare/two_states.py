@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from silo.bom.compare.states import ComparedAssembly, ComponentMatch, first_state
+from silo.bom.items.naming import display_name
 from silo.bom.model import BomEntry
-from silo.bom.resolve import display_name
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ import numpy as np
 from silo.bom.document import LinkProblem, derived, first_of, label_of, object_name, own, relative
 from silo.bom.errors import DocumentError, InputError, listed
 from silo.bom.findings import FindingCode
+from silo.bom.items.naming import display_name
 from silo.bom.model import BomEntry
 from silo.bom.objects import (
     REPEATERS,
@@ -42,7 +43,6 @@ from silo.bom.objects import (
     kind_of,
     left_out_by,
 )
-from silo.bom.resolve import display_name
 from silo.bom.roots import choose_assembly, seen_beside, silent_reader
 from silo.bom.standard import STANDARD_PARTS
 from silo.bom.targets import Step, is_assembly_link, is_link

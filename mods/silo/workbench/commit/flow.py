@@ -40,8 +40,8 @@ from silo.bom.compare.states import ComparedAssembly
 from silo.bom.compare.three_states import ThreeLines
 from silo.bom.errors import DocumentError, NotFoundError, RouteMissingError, SiloError
 from silo.bom.findings import Finding, FindingCode
+from silo.bom.items.naming import display_name
 from silo.bom.model import Extraction, walk_entries
-from silo.bom.resolve import display_name
 from silo.outbox.entry import UNKNOWN, Commit, new_key, on_top
 from silo.platform import data_folder, one_path, read_memory, write_memory
 from silo.workbench.commit.opened import Base

@@ -15,9 +15,9 @@ from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
 from silo.bom.document import saved_by
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.items.naming import display_name
 from silo.bom.model import BomEntry, walk_entries
 from silo.bom.report import shorten
-from silo.bom.resolve import display_name
 from silo.bom_sync import (
     MergeCount,
     Resolved,

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 from silo.bom.document import relative
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.items.naming import display_name
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.report import shorten
-from silo.bom.resolve import display_name
 from silo.outbox.entry import new_key
 from silo.workbench.commit.flow import CommitFlow, Desk, commit_of
 from silo.workbench.commit.plan import Snapshot

@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from silo.bom.numbers import plain
+from silo.bom.quantities import plain
 from silo_server.db.engine import KeptAnswer, Tx
 from silo_server.services.bom.history import state_at
 from silo_server.services.bom.lines import LineRecord

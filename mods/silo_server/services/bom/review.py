@@ -28,7 +28,7 @@ from silo.api.wire import LineTexts
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError, VersionConflictError
 from silo.bom.quantities import counts_pieces, plain, same_quantity
 from silo.bom.report import Reason
-from silo.bom.resolve import character_problem
+from silo.bom.text import character_problem
 from silo_server import events
 from silo_server.actors import Actor, Role
 from silo_server.db.engine import Database, Tx, insert_rows, one_of

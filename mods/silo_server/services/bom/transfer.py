@@ -28,7 +28,7 @@ from silo.bom.headers import (
     safe_cell,
 )
 from silo.bom.quantities import as_decimal, plain
-from silo.bom.resolve import with_allowed_characters
+from silo.bom.text import with_allowed_characters
 from silo.platform import scratch_folder
 from silo_server.db.engine import Tx
 from silo_server.services.bom.frozen import changes_of, frozen_product

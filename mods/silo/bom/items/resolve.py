@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Entries with the part numbers and names of their items (spec bom-sync §2).
+
+Pure but for the look-up. Entries of one part number become one line; what has no number is listed apart.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.items.lookup import ItemLookup, Known, look_up
+from silo.bom.items.naming import display_name
+from silo.bom.model import BomEntry, walk_entries
+
+
+def resolve_part_numbers(
+    entries: Sequence[BomEntry], api_client: ItemLookup
+) -> tuple[list[BomEntry], list[BomEntry]]:
+    """Give each entry its part number and name.
+
+    Returns (resolved, unresolved): resolved entries in order, with resolved children, and one line for each
+    part number; unresolved components of every level, each once. An unresolved sub-assembly keeps its
+    (resolved) children. Missing components stay in place without a number: they cannot be looked up, and they
+    are not there to be registered.
+    """
+    items = look_up((e.silo_uuid for e in walk_entries(entries) if e.silo_uuid), api_client)
+    return resolve_with(entries, items)
+
+
+def resolve_with(entries: Sequence[BomEntry], items: Known) -> tuple[list[BomEntry], list[BomEntry]]:
+    """Do what :func:`resolve_part_numbers` does, with items that were fetched before; pure."""
+    missing: dict[tuple[str, str], BomEntry] = {}
+    done: dict[int, tuple[BomEntry, bool]] = {}
+
+    def one(entry: BomEntry) -> tuple[BomEntry, bool]:
+        # Nested assemblies share their values; each distinct value is resolved once.
+        if (before := done.get(id(entry))) is not None:
+            return before
+        if entry.missing:
+            return done.setdefault(id(entry), (entry, True))
+        item = items.get(entry.silo_uuid) if entry.silo_uuid else None
+        number = item.get("part_number") if item is not None else None
+        name = (item.get("name") or item.get("description") or number) if item is not None else None
+        if not number:
+            missing.setdefault(entry.key, entry)
+        bom_entry = replace(
+            entry,
+            part_number=number or None,
+            name=name,
+            children=tuple(merged(entry.children)),
+            unregistered=tuple(
+                child for child, children_resolved in map(one, entry.children) if not children_resolved
+            ),
+        )
+        return done.setdefault(id(entry), (bom_entry, bool(number)))
+
+    def merged(group: Iterable[BomEntry]) -> list[BomEntry]:
+        return merge_lines(entry for entry, group_resolved in map(one, group) if group_resolved)
+
+    resolved = merged(entries)
+    unresolved = [one(entry)[0] for entry in missing.values()]
+    return resolved, unresolved
+
+
+def numbered_findings(findings: Iterable[Finding], items: Known) -> tuple[Finding, ...]:
+    """Put part numbers into the findings about identities, since people know an item by its number."""
+    numbers = {uuid.lower(): str(item.get("part_number") or uuid) for uuid, item in items.items() if item}
+    codes = (FindingCode.COPIED_IDENTITY, FindingCode.SHARED_IDENTITY)
+
+    def numbered(message: str) -> str:
+        return re.sub(r"(?<=\()[^()]+(?=\): )", lambda uuid: numbers.get(uuid[0], uuid[0]), message)
+
+    return tuple(
+        replace(finding, message=numbered(finding.message)) if finding.code in codes else finding
+        for finding in findings
+    )
+
+
+def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
+    """Merge the entries of one parent with the same part number into one line, and sum their quantities.
+
+    Entries without a number stay apart.
+    """
+    lines: dict[str | tuple[str, str], BomEntry] = {}
+    for entry in entries:
+        name = entry.part_number or entry.key
+        before = lines.get(name)
+        if before is None:
+            lines[name] = entry
+            continue
+        lines[name] = replace(
+            before,
+            also=(*before.also, entry.key, *entry.also),
+            quantity=before.quantity + entry.quantity,
+            is_assembly=before.is_assembly or entry.is_assembly,
+            children=before.children or entry.children,
+            consolidation_warning=before.consolidation_warning or entry.consolidation_warning,
+            individual_links=before.individual_links + entry.individual_links,
+            link_objects=before.link_objects + entry.link_objects,
+            instances=before.instances + entry.instances,
+        )
+    return list(lines.values())
+
+
+def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]:
+    """Make a finding for each component without a Silo part number: the BOM leaves it out, but says so."""
+    return tuple(
+        Finding(
+            FindingCode.UNREGISTERED,
+            Severity.WARNING,
+            f"{display_name(entry) or entry.object_name} has no Silo part number and is left out of the BOM "
+            "until it is registered.",
+            (Place(entry.doc_path, entry.object_name),),
+        )
+        for entry in unresolved
+    )
