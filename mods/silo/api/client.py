@@ -24,25 +24,13 @@ import requests
 from silo.api.abilities import Abilities, load_abilities, save_abilities
 from silo.api.address import ServerAddress
 from silo.api.boms import BomCalls
-from silo.api.config import ServerAddress
-from silo.api.events import SILENCE, HttpEventStream, ServerEvent, open_stream
+from silo.api.events import SILENCE, HttpEventStream, open_stream
 from silo.api.items import ItemCalls
 from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
-from silo.api.transport import (
-    Abilities,
-    ApiCall,
-    Cancel,
-    Timeouts,
-    Transport,
-    load_abilities,
-    save_abilities,
-    stop_if,
-)
+from silo.api.transport import ApiCall, Cancel, Timeouts, Transport, stop_if
 from silo.api.wire import ServerState, User, login_code
-from silo.bom.errors import (
-    SiloError,
-)
+from silo.bom.errors import SiloError
 
 
 @dataclass(frozen=True)
