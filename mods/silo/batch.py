@@ -179,7 +179,7 @@ def suggest_by_identity(
     identities = _identities_before(lacking)
     if not identities:
         return whole
-    from silo.fcstd.linked import with_suggestions
+    from silo.fcstd.suggest import with_suggestions
 
     entries = (*whole.entries, *whole.unresolved)
     files = None if candidates is None else tuple(candidates(identities.values()))

@@ -15,7 +15,8 @@ from fcstd_writer import COMMENT, Doc, container, part, save_xml
 from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
 from silo.fcstd import Limits, open_document
-from silo.fcstd.container import ContainerFile, FcstdError
+from silo.fcstd.container import ContainerFile
+from silo.fcstd.errors import FcstdError
 
 
 def refused(path: Path, limits: Limits | None = None) -> str:

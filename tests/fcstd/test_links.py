@@ -14,7 +14,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
 from silo.bom.links import extract
 from silo.fcstd import FcstdObject, Library, Limits, open_document
-from silo.fcstd.library import FileContents
+from silo.fcstd.contents import FileContents
 from silo.files import refusal
 
 

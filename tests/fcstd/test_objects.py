@@ -16,7 +16,7 @@ from silo.bom.document import DocumentLike, ObjectLike, document_property, own
 from silo.bom.errors import DocumentError
 from silo.bom.targets import is_mirrored
 from silo.fcstd import FcstdObject, Library, open_document
-from silo.fcstd.document import PARENTS, ancestors
+from silo.fcstd.type_tree import PARENTS, ancestors
 
 
 def read(folder: Path, **values: Any) -> FcstdObject:

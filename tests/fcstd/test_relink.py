@@ -13,7 +13,7 @@ from fcstd_writer import Doc, Raw, locals_
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.links import extract
 from silo.fcstd import open_document
-from silo.fcstd.linked import Relinked, read_back, relink
+from silo.fcstd.relink import Relinked, read_back, relink
 
 
 @pytest.fixture

@@ -18,8 +18,11 @@ from other_disk import other_disk
 from silo.bom.errors import DocumentError
 from silo.bom.model import document_identity, identity_of
 from silo.fcstd import check_stampable, open_document, stamp, unstamp
-from silo.fcstd.container import ContainerFile, FileState, Limits
-from silo.fcstd.stamp import _read_back, replace_file, replaced_entry
+from silo.fcstd.container import ContainerFile, FileState
+from silo.fcstd.edit import replace_file
+from silo.fcstd.limits import Limits
+from silo.fcstd.repack import replaced_entry
+from silo.fcstd.stamp import _read_back
 from silo.platform import sync_folder
 
 

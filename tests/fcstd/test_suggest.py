@@ -11,7 +11,7 @@ from fcstd_writer import Doc, XLink, locals_
 
 from silo.bom.links import extract
 from silo.fcstd import open_document
-from silo.fcstd.linked import with_suggestions
+from silo.fcstd.suggest import with_suggestions
 
 
 def part(*names: str, **properties: Any) -> Doc:

@@ -18,7 +18,7 @@ import pytest
 from fcstd_writer import Doc, locals_, part
 
 from silo.fcstd import FcstdObject, Library, open_document, stamp
-from silo.fcstd.document import PARENTS, ancestors
+from silo.fcstd.type_tree import PARENTS, ancestors
 
 FREECADCMD = os.environ.get("SILO_FREECADCMD") or shutil.which("freecadcmd") or shutil.which("FreeCADCmd")
 

@@ -28,7 +28,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from silo.bom.errors import InputError
-from silo.fcstd.library import FileContents
+from silo.fcstd.contents import FileContents
 from silo.vault.index import Index, SeenFile, StoredAnswer
 from silo.vault.reading import Question, VaultReader, WalkSession
 

@@ -373,7 +373,7 @@ def add_relink(parser: argparse.ArgumentParser) -> None:
 
 def run_relink(args: argparse.Namespace) -> int:
     """Mend the links; returns 2 if no link records OLD, or if NEW does not hold what they want."""
-    from silo.fcstd.linked import Relinked, relink
+    from silo.fcstd.relink import Relinked, relink
 
     folder = os.path.dirname(os.path.realpath(args.top))
     paths = _documents(args.top)

@@ -299,7 +299,7 @@ def read_assembly(top: str) -> Extraction:
 def _with_suggestions(extraction: Extraction) -> Extraction:
     if not any(entry.missing for entry in walk_entries(extraction.entries)):
         return extraction
-    from silo.fcstd.linked import with_suggestions
+    from silo.fcstd.suggest import with_suggestions
 
     return with_suggestions(extraction)
 

@@ -6,9 +6,10 @@ ones; linked files are opened when a link is followed. Input is hostile until pr
 writes an identity into a file.
 """
 
-from silo.fcstd.container import Limits
-from silo.fcstd.document import FcstdDocument, FcstdObject
+from silo.fcstd.document import FcstdDocument
 from silo.fcstd.library import Library, open_document
+from silo.fcstd.limits import Limits
+from silo.fcstd.objects import FcstdObject
 from silo.fcstd.stamp import check_stampable, stamp, unstamp
 
 __all__ = [

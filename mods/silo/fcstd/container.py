@@ -6,10 +6,6 @@ copy an entry as it stands; both matter here, for a quick walk and for stamping.
 authority, the local header must agree with it. ZIP64, encryption and methods other than stored and deflated
 are refused: FreeCAD writes none of them and cannot read them. Entries are unpacked in bounded steps: sizes
 and ratios are counted on the bytes that really come out.
-
-How much an FCStd file may ask of us, and the error of one that cannot be read.
-
-Everything is counted on what was really read, not on what the file claims.
 """
 
 from __future__ import annotations
@@ -18,79 +14,13 @@ import os
 import stat
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from io import BytesIO
 from struct import Struct
 from typing import Any, NamedTuple
 
-from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
-
-_MB = 1024 * 1024
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Bounds for hostile or broken input; a file beyond one of them is refused with a plain sentence.
-
-    document_xml
-        bytes of an unpacked ``Document.xml``. FreeCAD writes some 5 kB per link; this is room for 50 000.
-    packed
-        bytes of it in the file.
-    ratio, ratio_from
-        unpacked : packed, looked at once ``ratio_from`` bytes are unpacked. Deflate reaches 1032; the most
-        regular assembly (1000 equal links, written by FreeCAD 0.20) has 44.
-    entries
-        files in the container; FreeCAD writes some per object.
-    objects
-        objects in one document.
-    depth
-        nesting of XML elements; FreeCAD's own are less than 12 deep.
-    side_entry
-        bytes of another unpacked entry (the scales of a link array).
-    documents
-        files opened in one session.
-    resident
-        bytes of unpacked XML kept in memory by one session; beyond it the files that were not used for
-        longest are unpacked again when needed. One text that is longer than this does not count.
-    """
-
-    document_xml: int = 256 * _MB
-    packed: int = 64 * _MB
-    ratio: int = 300
-    ratio_from: int = 4 * _MB
-    entries: int = 65_535
-    objects: int = 1_000_000
-    depth: int = 64
-    side_entry: int = 32 * _MB
-    documents: int = 20_000
-    resident: int = 48 * _MB
-
-
-# For a file that FreeCAD has opened: whatever its size, FreeCAD had the memory for it.
-ANY_SIZE = Limits(1 << 32, 1 << 32, 2000, entries=1 << 30, objects=1 << 30, side_entry=1 << 32)
-
-
-class FcstdError(DocumentError):
-    """A file that cannot be read.
-
-    finding
-        what a link to this file has: missing, unreadable, …
-    state
-        the state of the file (``FileState``) that was tried, None where it could not be opened.
-    """
-
-    def __init__(
-        self,
-        path: str,
-        reason: str,
-        finding: FindingCode = FindingCode.UNREADABLE_FILE,
-        state: object = None,
-    ) -> None:
-        super().__init__(path, reason)
-        self.finding = finding
-        self.state = state
-
+from silo.fcstd.errors import FcstdError
+from silo.fcstd.limits import Limits
 
 DOCUMENT_XML = b"Document.xml"
 
@@ -437,3 +367,12 @@ class Inflater:
 
     def _error(self, reason: str) -> FcstdError:
         return FcstdError(self._path, f"its {self._entry.name.decode('utf-8', 'replace')} {reason}")
+
+
+def document_xml(container: ContainerFile, limits: Limits) -> tuple[ZipEntry, bytes]:
+    """Return the entry Document.xml and its unpacked text. Raises DocumentError."""
+    entry = container.entry(DOCUMENT_XML)
+    if entry is None:
+        raise FcstdError(container.path, "it is not a FreeCAD document (there is no Document.xml in it)")
+    packed = container.packed(entry, limits.packed)
+    return entry, Inflater(container.path, entry, packed, limits.document_xml, limits).whole()

@@ -2,237 +2,30 @@
 """Write a Silo identity into an FCStd file, and nothing else.
 
 The identity goes into the document's ``Meta`` map, which every FreeCAD keeps, also in partial loads (FreeCAD
-0.20 has no document properties of its own). Only ``Document.xml`` is packed again; all other entries keep
-their bytes, order and times. The file is replaced in one step, so a reader sees the old one or the new one.
+0.20 has no document properties of its own).
 
 Where things are in the XML is asked of expat, so comments, other quotes and another order of attributes do no
 harm.
-
-Change the Document.xml of an FCStd file, and nothing else of it.
-
-All other entries keep their bytes, order and times. The file is replaced in one step, so a reader sees the
-old one or the new one; what was written is read back first.
-
-The container with one entry packed again: APPNOTE.TXT 4.3.7, 4.3.12, 4.3.16.
 """
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
-import stat
-import tempfile
 import unicodedata
-import zlib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
 
 from silo.bom.document import own
 from silo.bom.errors import DocumentError
 from silo.bom.model import META_KEY, meta_key, own_identity
-from silo.fcstd import xmltext
-from silo.fcstd.container import (
-    CENTRAL,
-    DOCUMENT_XML,
-    END,
-    LOCAL,
-    ContainerFile,
-    Directory,
-    FcstdError,
-    FileState,
-    Inflater,
-    Limits,
-    ZipEntry,
-)
+from silo.fcstd import expat_reader
+from silo.fcstd.container import ContainerFile, FileState, ZipEntry
+from silo.fcstd.edit import changed, check_writable, edited_xml, in_attribute, replace_file
+from silo.fcstd.expat_reader import Malformed, Span, XmlElement
 from silo.fcstd.library import Library
-from silo.fcstd.xmltext import Malformed, Span, XmlElement
-from silo.platform import copy_rights, one_path, patiently, remove_patiently, swap, sync_folder
-
-_HAS_DESCRIPTOR = 0x8
-_DEFLATED = 8
-_LARGEST = 0xFFFFFFFF
-_REFERENCES = {'"': "&quot;", "'": "&apos;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
-
-
-class KeptBytes(NamedTuple):
-    """Bytes of the old container that stay as they are: taken from there when the new one is written."""
-
-    offset: int
-    length: int
-
-
-Piece = bytes | KeptBytes
-
-
-def in_attribute(text: str) -> str:
-    """Escape a text for the value of an XML attribute, to be put between quotes."""
-    from xml.sax.saxutils import escape  # late, as it imports HTTP and TLS
-
-    return escape(text, _REFERENCES)
-
-
-def replaced_entry(container: ContainerFile, entry: ZipEntry, content: bytes) -> tuple[Piece, ...]:
-    """Make the container with ``content`` in ``entry``, in pieces, so that a big file is never held in
-    memory.
-
-    Raises FcstdError if entries overlap, or if the result is too large for a plain zip.
-    """
-    entries = _entries(container)
-    begin = entry.offset
-    # Up to the next entry: header, data, a data descriptor if there is one, and any padding.
-    end = min((e.offset for e in entries if e.offset > begin), default=container.directory.offset)
-    if end < container.data_offset(entry) + entry.packed:
-        raise FcstdError(container.path, "it is damaged: its entries overlap")
-    local, packed = _local(container, entry, content)
-    growth = len(local) - (end - begin)
-    before, after = KeptBytes(0, begin), KeptBytes(end, container.directory.offset - end)
-    directory = _directory(container.directory, entries, entry, content, packed, growth)
-    tail = _end(container.directory, growth)
-    size = before.length + len(local) + after.length + len(directory) + len(tail)
-    if size > _LARGEST:
-        raise FcstdError(container.path, "it is too large for a plain zip container")
-    return before, local, after, directory, tail
-
-
-def _entries(container: ContainerFile) -> list[ZipEntry]:
-    try:
-        return list(container.directory.entries())
-    except ValueError as error:
-        raise FcstdError(container.path, str(error)) from error
-
-
-def _local(container: ContainerFile, entry: ZipEntry, content: bytes) -> tuple[bytes, int]:
-    """Make the local header and data, and return them with the packed length; times, name and extra field
-    stay.
-    """
-    engine = zlib.compressobj(wbits=-zlib.MAX_WBITS)
-    data = engine.compress(content) + engine.flush()
-    header = list(LOCAL.unpack(container.read(entry.offset, LOCAL.size)))
-    names = container.read(entry.offset + LOCAL.size, header[9] + header[10])
-    header[2] &= ~_HAS_DESCRIPTOR
-    header[3] = _DEFLATED
-    header[6:9] = [zlib.crc32(content), len(data), len(content)]
-    return LOCAL.pack(*header) + names + data, len(data)
-
-
-def _directory(
-    directory: Directory, entries: list[ZipEntry], changed: ZipEntry, content: bytes, packed: int, growth: int
-) -> bytes:
-    raw = bytearray(directory.raw)
-    for entry in entries:
-        fields = list(CENTRAL.unpack_from(raw, entry.central))
-        if entry == changed:
-            fields[3] &= ~_HAS_DESCRIPTOR
-            fields[4] = _DEFLATED
-            fields[7:10] = [zlib.crc32(content), packed, len(content)]
-        elif entry.offset > changed.offset:
-            fields[16] += growth
-        CENTRAL.pack_into(raw, entry.central, *fields)
-    return bytes(raw)
-
-
-def _end(directory: Directory, growth: int) -> bytes:
-    fields = list(END.unpack_from(directory.tail))
-    fields[6] += growth
-    return END.pack(*fields) + directory.tail[END.size :]
-
-
-_BLOCK = 1 << 20
-
-# The text of Document.xml → its edited text; a ValueError says why it cannot be edited.
-Edit = Callable[[bytes], bytes]
-
-
-def changed(path: str) -> FcstdError:
-    """Make the error that somebody else changed the file meanwhile."""
-    return FcstdError(path, "it was changed by somebody else meanwhile; nothing was written")
-
-
-def check_writable(path: str) -> None:
-    """Raise DocumentError if the file may not be replaced."""
-    # Asked of the mode: an administrator may write anything, and replacing a file needs no right to it at
-    # all.
-    if not os.stat(path).st_mode & stat.S_IWUSR or not os.access(path, os.W_OK):
-        raise DocumentError(path, "it is read-only; nothing was written")
-    if not os.access(os.path.dirname(path), os.W_OK):
-        raise DocumentError(path, "its folder is read-only; nothing was written")
-    names = os.stat(path).st_nlink
-    if names > 1:
-        raise DocumentError(
-            path,
-            f"it has {names} names on this disk (hard links), and the others would keep the old content; "
-            "nothing was written. Make it a file of its own: copy it, then put the copy in its place",
-        )
-
-
-def document_xml(container: ContainerFile, limits: Limits) -> tuple[ZipEntry, bytes]:
-    """Return the entry Document.xml and its unpacked text. Raises DocumentError."""
-    entry = container.entry(DOCUMENT_XML)
-    if entry is None:
-        raise FcstdError(container.path, "it is not a FreeCAD document (there is no Document.xml in it)")
-    packed = container.packed(entry, limits.packed)
-    return entry, Inflater(container.path, entry, packed, limits.document_xml, limits).whole()
-
-
-def edited_xml(container: ContainerFile, edit: Edit, limits: Limits) -> tuple[ZipEntry, bytes]:
-    """Return the entry Document.xml and its edited text. Raises DocumentError."""
-    entry, text = document_xml(container, limits)
-    try:
-        return entry, edit(text)
-    except ValueError as error:
-        raise FcstdError(container.path, f"its Document.xml {error}; nothing was written") from error
-
-
-def replace_file(path: str, state: FileState, content: Iterable[Piece], check: Callable[[str], None]) -> None:
-    """Replace the file, which must still be in ``state``, in one step. Raises DocumentError.
-
-    check
-        looks at the copy that was written, and raises DocumentError if it is not as it should be.
-    """
-    # The file is closed by now: Windows lets nobody replace an open one.
-    try:
-        _write(path, state, content, check)
-    except OSError as error:
-        raise DocumentError(path, f"it cannot be written: {error.strerror or error}") from error
-
-
-def _write(path: str, state: FileState, content: Iterable[Piece], check: Callable[[str], None]) -> None:
-    folder = os.path.dirname(path)
-    descriptor, temporary = tempfile.mkstemp(prefix=".silo-", suffix=".tmp", dir=folder)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            _put(path, content, file)
-            file.flush()
-            copy_rights(path, temporary)
-            os.fsync(file.fileno())
-        check(temporary)
-        if FileState.now(path) != state:
-            raise changed(path)
-        patiently(lambda: swap(temporary, path))
-    except BaseException:
-        with contextlib.suppress(OSError):
-            remove_patiently(temporary)
-        raise
-    sync_folder(folder)
-
-
-def _put(path: str, content: Iterable[Piece], file: BinaryIO) -> None:
-    with open(path, "rb") as old:
-        for piece in content:
-            if isinstance(piece, bytes):
-                file.write(piece)
-                continue
-            old.seek(piece.offset)
-            left = piece.length
-            while left:
-                block = old.read(min(left, _BLOCK))
-                if not block:
-                    raise changed(path)
-                file.write(block)
-                left -= len(block)
-
+from silo.fcstd.limits import Limits
+from silo.fcstd.repack import replaced_entry
+from silo.platform import one_path
 
 _LONGEST = 200
 
@@ -435,9 +228,9 @@ def _edited(
     the document. None removes a key or a property. Raises ValueError, with the reason, if the text cannot be
     edited.
     """
-    if xmltext.as_utf8(text) is not text:
+    if expat_reader.as_utf8(text) is not text:
         raise Malformed("is not in UTF-8")
-    head, data = xmltext.index_document(text, depth_limit)
+    head, data = expat_reader.index_document(text, depth_limit)
     if head.properties is None:
         raise Malformed("has no document properties")
     edits: list[tuple[Span, Callable[[bytes], bytes]]]
@@ -457,9 +250,9 @@ def _edited(
 
 
 def _with_meta(element: bytes, changes: Mapping[str, str | None], depth_limit: int) -> bytes:
-    span = xmltext.index_properties(element, depth_limit).get("Meta")
+    span = expat_reader.index_properties(element, depth_limit).get("Meta")
     old = element[slice(*span)] if span else b""
-    meta = _items(xmltext.parse_value(old, depth_limit)) if span else {}
+    meta = _items(expat_reader.parse_value(old, depth_limit)) if span else {}
     items = {key: value for key, value in {**meta, **changes}.items() if value is not None}
     if items == meta:
         return element
@@ -476,7 +269,7 @@ def _with_all(element: bytes, properties: Mapping[str, bytes | None], depth_limi
 
 def _with_property(element: bytes, name: str, prop: bytes | None, indent: bytes, depth_limit: int) -> bytes:
     """Set a property in a ``<Properties>`` element, or in the ``<Object>`` around it; None removes it."""
-    spans = xmltext.index_properties(element, depth_limit)
+    spans = expat_reader.index_properties(element, depth_limit)
     here = spans.get(name)
     if here is not None and prop is not None:
         return element[: here[0]] + prop + element[here[1] :]

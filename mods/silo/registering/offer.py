@@ -43,7 +43,7 @@ from silo.bom.objects import survey_of
 from silo.bom.roles import DECLARABLE
 from silo.bom.roots import choose_assembly, silent_reader
 from silo.fcstd import Library
-from silo.fcstd.document import FcstdObject
+from silo.fcstd.objects import FcstdObject
 from silo.files import content_hash
 from silo.platform import data_folder, one_path, read_memory, write_memory
 from silo.registering.items import component_key

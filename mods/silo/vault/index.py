@@ -43,8 +43,11 @@ from zlib import crc32
 import silo.bom
 import silo.fcstd
 from silo.bom.errors import InputError
-from silo.fcstd.container import FcstdError, FileState
-from silo.fcstd.library import Content, FileContents, FileFacts, Library, Remembered
+from silo.fcstd.container import FileState
+from silo.fcstd.contents import Content, FileContents
+from silo.fcstd.errors import FcstdError
+from silo.fcstd.facts import FileFacts, Remembered
+from silo.fcstd.library import Library
 from silo.files import FoundFile, Locator, NotFound
 from silo.platform import cache_folder, hold_lock, remove_patiently
 

@@ -51,7 +51,7 @@ from silo.bom_sync import (
     sync,
 )
 from silo.fcstd import Library
-from silo.fcstd.linked import with_suggestions
+from silo.fcstd.suggest import with_suggestions
 from silo.files import documents_in, folder_lock
 from silo.vault.reading import Question, VaultReader, WalkAnswer, collecting_seldom, grouped
 

@@ -45,7 +45,7 @@ from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.fcstd.library import FileContents
+from silo.fcstd.contents import FileContents
 from silo.fcstd.linked import identity_in, recorded_paths
 from silo.files import Project, ProjectEntry, content_hash, refusal
 from silo.platform import folded, one_path, remove_patiently, replacing, scratch_folder

@@ -36,7 +36,9 @@ from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.report import from_plain, to_plain
 from silo.bom.roots import choose_assembly
-from silo.fcstd.library import Content, FileContents, Library, facts_of
+from silo.fcstd.contents import Content, FileContents
+from silo.fcstd.facts import facts_of
+from silo.fcstd.library import Library
 from silo.files import FoundFile, Locator
 from silo.platform import workers
 from silo.vault.index import Index, StoredAnswer, engine

@@ -7,7 +7,7 @@ import os
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from silo.fcstd.container import FcstdError
+    from silo.fcstd.errors import FcstdError
 
 
 DAMAGED = (
@@ -30,8 +30,10 @@ def damage(path: str, name: str = "") -> FcstdError | None:
     """
     from silo.bom.findings import FindingCode
     from silo.fcstd import Library
-    from silo.fcstd.container import ANY_SIZE, FcstdError, FileState
-    from silo.fcstd.xmltext import Refused
+    from silo.fcstd.container import FileState
+    from silo.fcstd.errors import FcstdError
+    from silo.fcstd.expat_reader import Refused
+    from silo.fcstd.limits import ANY_SIZE
 
     if not path or not os.access(path, os.R_OK):
         return None

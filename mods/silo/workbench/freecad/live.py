@@ -213,7 +213,7 @@ class LinkInspector:
     def _look(self, owner: str, file: str, name: str) -> LinkProblem:
         """Let the reader of files find the problem of a target, since it knows more than FreeCAD does."""
         from silo.fcstd import Library
-        from silo.fcstd.properties import Ref
+        from silo.fcstd.values import Ref
 
         if self._library is None:
             self._library = Library()

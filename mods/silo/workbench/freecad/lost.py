@@ -47,7 +47,8 @@ def _is_ours(program: str) -> bool:
 def _of_unknown_types(doc: Any) -> dict[str, tuple[str, str]]:
     from silo.bom.errors import DocumentError
     from silo.fcstd import Library
-    from silo.fcstd.container import ANY_SIZE, FileState
+    from silo.fcstd.container import FileState
+    from silo.fcstd.limits import ANY_SIZE
 
     path = doc.FileName
     try:

@@ -149,7 +149,7 @@ def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
     """Compare a snapshot with the server, sub-assemblies included. Worker."""
     from silo.batch import suggest_by_identity
     from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
-    from silo.fcstd.linked import with_suggestions
+    from silo.fcstd.suggest import with_suggestions
 
     extraction = snapshot.extraction or Extraction(BomEntry(snapshot.path, label=snapshot.label))
     extraction = with_suggestions(extraction)
