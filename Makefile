@@ -68,7 +68,7 @@ ON_WINDOWS = $(addprefix tests/,api/test_config.py api/test_files.py contract/te
 	fcstd/test_stamp.py outbox/test_send.py outbox/test_store.py vault/test_git.py vault/test_index.py \
 	vault/test_pull.py workbench/commit workbench/register/test_flow.py workbench/revisions workbench/session \
 	$(addprefix cli/test_,bom_diff.py commands.py login.py night_job.py project.py register.py) \
-	$(addprefix inertia/,geometry/test_cache.py output/test_files.py) registering/test_orders.py \
+	$(addprefix inertia/,geometry/test_cache.py output/test_files.py) registering/test_carry_out.py \
 	$(addprefix server/test_,backup.py file_store.py housekeeping.py) \
 	$(addprefix test_,addon_install.py batch.py durable.py folders.py open_in_freecad.py platform.py))
 test-windows-files: setup

@@ -44,8 +44,9 @@ def registering(count: int) -> Callable[[], object]:
     """Return what makes the table of ``count`` files with one content."""
     from silo.bom.items.proposal import Proposal
     from silo.bom.model import BomEntry
-    from silo.registering.offer import Candidate, ComponentState, Offer
-    from silo.registering.orders import write_table
+    from silo.registering.candidate import Candidate, ComponentState
+    from silo.registering.offer import Offer
+    from silo.registering.table import write_table
 
     def candidate(number: int) -> Candidate:
         entry = BomEntry(f"/v/{number}.FCStd", object_name="Body")

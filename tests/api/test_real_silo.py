@@ -48,8 +48,8 @@ from silo.inertia.push import PushItem, PushPlan, push
 from silo.outbox.entry import Commit, State, pause_text
 from silo.outbox.send import Report, send_all
 from silo.outbox.store import Store
-from silo.registering.items import RESERVED
-from silo.registering.orders import proposals_for, register_all
+from silo.registering.closed_files import proposals_for, register_all
+from silo.registering.journal import RESERVED
 from silo.vault.project import commits, find_project, keep, name_documents, read_project
 from silo.vault.project import compare as compare_project
 

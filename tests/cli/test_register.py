@@ -24,9 +24,12 @@ from silo.bom.model import BomEntry
 from silo.cli.common import read_assembly
 from silo.cli.register import Dialog
 from silo.fcstd import open_document
-from silo.registering.items import Journal, component_key, on_disk
-from silo.registering.offer import Candidate, ComponentState, Offer, Similar
-from silo.registering.orders import ITEM_TYPES, Order, carry_out_on_disk, proposals_for
+from silo.registering.candidate import Candidate, ComponentState, Similar
+from silo.registering.closed_files import carry_out_on_disk, proposals_for
+from silo.registering.journal import Journal, component_key
+from silo.registering.offer import Offer
+from silo.registering.request import ITEM_TYPES, Order
+from silo.registering.saved_file import on_disk
 from silo.testing import FakeSilo
 from silo_server.run import running_server
 

@@ -28,7 +28,8 @@ from silo.fcstd import stamp
 from silo.outbox.entry import Commit, State, new_key
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
-from silo.registering.items import Journal, register
+from silo.registering.items import register
+from silo.registering.journal import Journal
 
 CATEGORIES = {"A01": "Mechanical assembly", "M01": "Machined parts"}
 LONGEST_LIFE_S = 0.3

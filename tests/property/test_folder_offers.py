@@ -15,7 +15,7 @@ from public_projects import ASSEMBLIES
 
 from silo.bom.model import Extraction, walk_entries
 from silo.files import documents_in
-from silo.registering.orders import whole_folder
+from silo.registering.closed_files import whole_folder
 from silo.vault.index import Index
 from silo.vault.plan import make_plan
 from silo.vault.reading import Question, VaultReader

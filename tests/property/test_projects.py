@@ -32,7 +32,7 @@ from silo.fcstd.linked import recorded_paths
 from silo.files import FoundFile, Locator, documents_in
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
-from silo.registering.orders import proposals_for, register_all
+from silo.registering.closed_files import proposals_for, register_all
 from silo.testing import FakeSilo
 from silo.vault.project import (
     Belonging,

@@ -9,7 +9,7 @@ import pytest
 from fakes import Doc
 
 from silo.bom import choose_assembly, extract
-from silo.registering.offer import label_stem, modelled_in
+from silo.registering.modelled import label_stem, modelled_in
 
 
 def shapes(**known: str) -> Any:

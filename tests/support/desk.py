@@ -20,9 +20,10 @@ from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.outbox.send import Sent
 from silo.platform import stamp_of
+from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.registering.items import Registration
-from silo.registering.offer import Candidate, ComponentState, Offer, OpenedFile
-from silo.registering.orders import Order
+from silo.registering.offer import Offer
+from silo.registering.request import Order
 from silo.testing import FakeSilo
 from silo.workbench.commit.flow import CommitAnswer, Look
 from silo.workbench.commit.opened import Base

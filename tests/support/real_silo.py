@@ -782,7 +782,7 @@ def register_elsewhere(top: str, url: str, home: str) -> int:
     from silo.api.client import SiloClient
     from silo.api.policy import Retries
     from silo.cli.common import read_assembly
-    from silo.registering.orders import proposals_for, register_all
+    from silo.registering.closed_files import proposals_for, register_all
 
     for name in HOMES:
         os.environ[name] = home

@@ -33,7 +33,7 @@ from silo.cli.setup import need_server_extra
 from silo.cli.show import activity_box, bom_tree, console, diff_table, findings_text, outcome_text
 from silo.files import shipped
 from silo.platform import replace_patiently, scratch_folder
-from silo.registering.orders import proposals_for, register_all
+from silo.registering.closed_files import proposals_for, register_all
 
 if TYPE_CHECKING:
     from rich.console import Console

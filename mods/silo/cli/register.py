@@ -41,33 +41,14 @@ from silo.cli.common import (
 from silo.cli.show import plain
 from silo.files import check_writable
 from silo.freecads import open_in_any
-from silo.registering.items import Ask, Journal, Registration, finished, unclear
-from silo.registering.offer import (
-    ITEM_TYPES,
-    Candidate,
-    CandidateFiles,
-    ComponentState,
-    Offer,
-    chosen,
-    modelled,
-    offer,
-)
-from silo.registering.orders import (
-    OPEN,
-    Order,
-    TableRow,
-    carry_out_on_disk,
-    doubts,
-    find_item,
-    is_own,
-    orders_of,
-    read_table,
-    remarks,
-    seen_on_disk,
-    whole_folder,
-    write_table,
-    wrong_name,
-)
+from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
+from silo.registering.closed_files import OPEN, carry_out_on_disk, is_own, seen_on_disk, whole_folder
+from silo.registering.items import Ask, Registration, finished, unclear
+from silo.registering.journal import Journal
+from silo.registering.modelled import chosen, modelled
+from silo.registering.offer import Offer, offer
+from silo.registering.request import ITEM_TYPES, Order, find_item, wrong_name
+from silo.registering.table import TableRow, doubts, orders_of, read_table, remarks, write_table
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

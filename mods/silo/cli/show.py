@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from silo.bom.items.proposal import Proposal
     from silo.bom_sync import ActivityText, Outcome
     from silo.registering.items import Registration
-    from silo.registering.offer import Modelled
+    from silo.registering.modelled import Modelled
 
 
 _MARK = {

@@ -5,7 +5,7 @@ The order is what keeps a crash harmless: the file can take an identity; the int
 item shall have, is on disk before the server is asked; the identity is in the file before the intent is
 finished. Whatever is interrupted, the next run finds the intent and looks for the item that it may have made:
 by its UUID, by the property that carries it, and, where a server shows neither, among the items of the same
-description that were made since. Where that leaves a doubt, a person is asked.
+description that were made since. Where that leaves a doubt, the user is asked.
 
 All of that happens under the lock of the file's folder, and with the identity that the file has then:
 another computer may have registered it. What is begun stands in that folder, so that another computer
@@ -13,37 +13,19 @@ continues it. Where others do not see the lock, the file itself carries the iden
 asked.
 
 A file may carry an identity that the server does not know, from another server or from another computer's
-run. Its item gets that identity; what brings such a file here has asked a person.
-
-What was begun and what was finished when components were registered: one SQLite file, for all processes.
-
-An intent is on disk before the server is asked, and stays until the component's file names its item. What is
-finished stays too: a FreeCAD that had the file open may save its own copy over the identity, and the item
-must be found again then.
-
-What is begun stands in the component's folder too until it is finished, so that another computer continues
-it instead of making a second item.
+run. Its item gets that identity; what brings such a file here has asked the user.
 """
 
 from __future__ import annotations
 
-import json
-import os
-import sqlite3
-import time
-import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any, Protocol
 
 from silo.bom.errors import (
     BusyError,
     ConflictError,
-    DocumentError,
-    InputError,
     NotFoundError,
     NotSentError,
     ServerFaultError,
@@ -51,10 +33,10 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.bom.items.proposal import Proposal
-from silo.bom.model import BomEntry, as_uuid, document_identity, own_identity
+from silo.bom.model import BomEntry, as_uuid
 from silo.bom_sync import Memory, by_description, server_of
-from silo.files import folder_lock
-from silo.platform import data_folder, private_file, private_folder, remove_patiently, replacing
+from silo.registering.journal import Journal, RegistrationRecord, Turn, component_key
+from silo.registering.saved_file import on_disk
 
 # Servers that give UUIDs of their own still keep properties: this one finds an item made before a crash.
 REGISTRATION_PROPERTY = "registration_id"
@@ -111,30 +93,6 @@ class Registration:
     found: bool = False
 
 
-def component_key(entry: BomEntry) -> str:
-    """Return the name of a component in the journal. A path may be no text, but SQLite keeps only text."""
-    path = entry.doc_path.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
-    return f"{path}#{entry.object_name}"
-
-
-def on_disk(entry: BomEntry, *, shares_file: bool = False) -> tuple[str, str]:
-    """Read from disk FreeCAD's UUID of the component's document, and the component's identity; "" for none,
-    and if the file cannot be read.
-    """
-    from silo.fcstd import Library
-
-    if not os.path.isfile(entry.doc_path):
-        return "", ""
-    try:
-        with Library() as library:
-            document = library.open(entry.doc_path)
-            obj = document.getObject(entry.object_name) if entry.object_name else None
-            identity = own_identity(obj) if obj is not None else None
-            return str(document.Uid), identity or ("" if shares_file else document_identity(document) or "")
-    except DocumentError:
-        return "", ""
-
-
 def finished(record: RegistrationRecord, journal: Journal) -> bool:
     """Note in the journal, and return True, if the component's file names its item by now; another computer
     may have written it.
@@ -148,7 +106,7 @@ def finished(record: RegistrationRecord, journal: Journal) -> bool:
 
 
 def unclear(proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Refuse to choose, if no person can be asked. Raises ConflictError that names the items."""
+    """Refuse to choose, if the user cannot be asked. Raises ConflictError that names the items."""
     numbers = ", ".join(str(item["part_number"]) for item in matches)
     raise ConflictError(
         f"{proposal.name}: {numbers} may be its item: made by an interrupted run, or registered from this "
@@ -237,7 +195,7 @@ class _ItemRun:
         return item, existing
 
     def _registered_meanwhile(self, identity: str) -> Mapping[str, Any]:
-        """Return the item that somebody gave the component after it was read."""
+        """Return the item that the component got elsewhere after it was read."""
         entry = self.proposal.entry
         item = self.api.get_item_by_uuid(identity)
         if item is None:
@@ -250,7 +208,7 @@ class _ItemRun:
         return item
 
     def _lost(self, uid: str) -> Mapping[str, Any] | None:
-        """Return the item of a document that was registered and lost its identity, if a person agrees.
+        """Return the item of a document that was registered and lost its identity, if the user agrees.
         FreeCAD saved over it, or a copy with the same UUID is in its place.
         """
         record = self.turn.journal.find(self.turn.component)
@@ -407,252 +365,4 @@ def register_standard(
     return Registration(proposal, part_number=str(item["part_number"]), item_id=item_id, found=existing)
 
 
-RESERVED = ".silo-registering.json"
 """In a component's folder: what is begun there and not finished, for other computers."""
-
-_TABLE = """
-CREATE TABLE IF NOT EXISTS registrations (
-    component TEXT PRIMARY KEY,
-    wanted TEXT NOT NULL,
-    item_id TEXT NOT NULL,
-    document_uid TEXT NOT NULL DEFAULT '',
-    begun_at REAL NOT NULL,
-    finished_at REAL
-)
-"""
-_COLUMNS = "component, wanted, item_id, document_uid, begun_at, finished_at"
-
-
-@dataclass(frozen=True)
-class RegistrationRecord:
-    """One component's registration.
-
-    wanted
-        the UUID that we asked the server to give the item; ``item_id`` the one that it has.
-    document_uid
-        FreeCAD's own UUID of the document, which survives saving; "" where unknown.
-    begun_at, finished_at
-        seconds since 1970; ``finished_at`` is None while the file does not name its item.
-    """
-
-    component: str
-    wanted: str
-    item_id: str
-    document_uid: str
-    begun_at: float
-    finished_at: float | None
-
-    @property
-    def finished(self) -> bool:
-        return self.finished_at is not None
-
-
-class Journal:
-    """The user's registrations. Safe to use from several threads and processes.
-
-    path
-        the file; by default in the user's data folder.
-    """
-
-    def __init__(
-        self, path: Path | None = None, *, clock: Callable[[], float] = time.time, patience: float = 300.0
-    ) -> None:
-        self.path = path or data_folder() / "registrations.sqlite3"
-        self._clock, self._patience = clock, patience
-
-    def pending(self) -> dict[str, str]:
-        """Return ``file#object`` → the UUID that its item has, or will get."""
-        return {record.component: record.item_id for record in self.unfinished()}
-
-    def unfinished(self) -> list[RegistrationRecord]:
-        """Return the registrations whose file does not name its item yet, the oldest first."""
-        return self._records("finished_at IS NULL ORDER BY begun_at")
-
-    def find(self, component: str) -> RegistrationRecord | None:
-        """Return the registration of a component; None if there is none."""
-        return next(iter(self._records("component = ?", component)), None)
-
-    def begin(
-        self, component: str, carried: str = "", beside: RegistrationRecord | None = None
-    ) -> tuple[RegistrationRecord, bool]:
-        """Begin the registration of a component, or continue an earlier one; also return if it was begun
-        before.
-
-        carried
-            the identity that its file has from elsewhere, and that the item gets.
-        beside
-            what another computer has begun (:func:`begun_beside`). It has precedence over what this computer
-            began.
-        """
-        for registration_record in (beside, self.find(component)):
-            if (
-                registration_record is not None
-                and not registration_record.finished
-                and carried in ("", registration_record.wanted, registration_record.item_id)
-            ):
-                self._keep(registration_record)
-                return registration_record, True
-        wanted = carried or str(uuid.uuid4())
-        record = RegistrationRecord(component, wanted, wanted, "", self._clock(), None)
-        self._keep(record)
-        return record, False
-
-    def _keep(self, record: RegistrationRecord) -> None:
-        self._write(
-            f"REPLACE INTO registrations ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?)",  # noqa: S608
-            *vars(record).values(),
-        )
-
-    def replace(self, component: str, item_id: str) -> None:
-        """Remember the UUID that the server chose itself."""
-        self._write("UPDATE registrations SET item_id = ? WHERE component = ?", item_id, component)
-
-    def done(self, component: str, document_uid: str = "") -> None:
-        """Note that the component's file names its item."""
-        changed = "UPDATE registrations SET finished_at = ?, document_uid = ? WHERE component = ?"
-        self._write(changed, self._clock(), document_uid, component)
-
-    def forget(self, component: str) -> None:
-        """Forget a component: the server made no item for it, or it was taken back."""
-        self._write("DELETE FROM registrations WHERE component = ?", component)
-
-    def item_ids(self) -> frozenset[str]:
-        """Return the items of all components in this journal."""
-        return frozenset(record.item_id for record in self._records("TRUE"))
-
-    @contextmanager
-    def turn(
-        self, path: str, component: str, tell: Callable[[str], object] = lambda _text: None
-    ) -> Iterator[Turn]:
-        """Hold the folder of a component's file while the component is registered, on any computer, so that
-        two processes never make an item for the same component. Nobody waits for another project's server.
-
-        ``tell`` receives who else registers there, if that takes long. Raises InputError.
-        """
-        folder = os.path.dirname(path)
-        with folder_lock(folder, ".silo-register.lock", "registered", self._patience, tell) as unseen:
-            yield Turn(self, path, component, unseen)
-
-    def _records(self, where: str, *values: str) -> list[RegistrationRecord]:
-        with self._open() as db:
-            rows = db.execute(f"SELECT {_COLUMNS} FROM registrations WHERE {where}", values)  # noqa: S608
-            return [RegistrationRecord(*row) for row in rows]
-
-    def _write(self, statement: str, *values: object) -> None:
-        with self._open() as db:
-            db.execute(statement, values)
-
-    @contextmanager
-    def _open(self) -> Iterator[sqlite3.Connection]:
-        try:
-            with closing(self._connect()) as db:
-                db.execute("PRAGMA synchronous = FULL")
-                db.execute("BEGIN IMMEDIATE")
-                db.execute(_TABLE)
-                yield db
-                db.execute("COMMIT")
-        except (sqlite3.Error, OSError) as error:
-            raise InputError(
-                f"{self.path}: the journal of registrations cannot be read ({error}). Mend or move it; items "
-                "of an interrupted run may then exist without a file that names them."
-            ) from error
-
-    def _connect(self) -> sqlite3.Connection:
-        private_folder(self.path.parent)
-        private_file(self.path)  # before SQLite opens it
-        return sqlite3.connect(self.path, timeout=20.0, isolation_level=None)
-
-
-class Turn:
-    """The registration of one component, while nobody else registers anything in its folder.
-
-    unseen
-        why other computers see nothing of it but the component's file; "" if they do.
-    """
-
-    def __init__(self, journal: Journal, path: str, component: str, unseen: str) -> None:
-        self.journal, self.component, self.unseen = journal, component, unseen
-        self._path = path
-
-    def begin(self, carried: str, document_uid: str) -> tuple[RegistrationRecord, bool]:
-        """Begin, or continue what this or another computer began with the same document
-        (:meth:`Journal.begin`). Raises InputError."""
-        beside = begun_beside(self._path, self.component, document_uid)
-        record, begun = self.journal.begin(self.component, carried, beside)
-        if not self.unseen:
-            try:
-                self._reserve(replace(record, document_uid=document_uid))
-            except FileNotFoundError:  # no such folder: nobody else is in it
-                pass
-            except OSError as error:
-                self.unseen = error.strerror or str(error)
-        return record, begun
-
-    def replace(self, item_id: str) -> None:
-        """Remember the UUID that the server chose itself."""
-        self.journal.replace(self.component, item_id)
-
-    def done(self, document_uid: str) -> None:
-        """Note that the component's file names its item."""
-        self.journal.done(self.component, document_uid)
-        self._release()
-
-    def forget(self) -> None:
-        """Forget a component: the server certainly made no item for it."""
-        self.journal.forget(self.component)
-        self._release()
-
-    def _release(self) -> None:
-        with suppress(OSError):  # what stays is found in the file first, or continued by the same document
-            self._reserve(None)
-
-    def _reserve(self, record: RegistrationRecord | None) -> None:
-        path, name = _beside(self._path), os.path.basename(self.component)
-        others = {key: value for key, value in _reserved(path).items() if key != name}
-        if record is not None:
-            others[name] = {k: v for k, v in asdict(record).items() if k not in ("component", "finished_at")}
-        if others:
-            with replacing(path, mode=0o666) as file:  # the next one may be another user
-                file.write(json.dumps(others, indent=1).encode())
-        elif os.path.lexists(path):
-            remove_patiently(path)
-
-
-def begun_beside(path: str, component: str, document_uid: str) -> RegistrationRecord | None:
-    """Read what a computer began for a component, from the note in the folder of its file.
-
-    document_uid
-        FreeCAD's own UUID of the present file; another file of the same name continues nothing.
-
-    Raises InputError.
-    """
-    reservation = _reserved(_beside(path)).get(os.path.basename(component))
-    if reservation is None or not document_uid or reservation["document_uid"] != document_uid:
-        return None
-    return RegistrationRecord(
-        component, reservation["wanted"], reservation["item_id"], "", float(reservation["begun_at"]), None
-    )
-
-
-def _beside(path: str) -> str:
-    return os.path.join(os.path.dirname(path), RESERVED)
-
-
-def _reserved(path: str) -> dict[str, dict[str, Any]]:
-    """Read the registrations begun in a folder, by ``file#object``."""
-    try:
-        with open(path, encoding="utf-8") as file:
-            reserved = json.load(file)
-        for identity in reserved.values():
-            uuid.UUID(identity["wanted"])
-            float(identity["begun_at"])
-            if not isinstance(identity["item_id"], str) or not isinstance(identity["document_uid"], str):
-                raise TypeError("UUIDs are texts")
-    except FileNotFoundError:
-        return {}
-    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
-        raise InputError(
-            f"{path}: what another computer began to register here cannot be read ({error!r}). Register on "
-            "that computer, or delete this file: an item that was begun may then be made a second time."
-        ) from error
-    return dict(reserved)

@@ -15,8 +15,8 @@ from fcstd_writer import Doc, Raw, part
 from silo.files import Project
 from silo.outbox.entry import Commit
 from silo.outbox.store import Store
-from silo.registering.items import Journal
-from silo.registering.orders import Order
+from silo.registering.journal import Journal
+from silo.registering.request import Order
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.pane.activity import Do
 from silo.workbench.register.flow import RegisterFlow

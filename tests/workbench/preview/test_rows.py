@@ -20,7 +20,7 @@ from silo.bom.model import BomEntry, Extraction
 from silo.bom_sync import resolve, sync
 from silo.cli.common import read_assembly
 from silo.cli.main import main
-from silo.registering.orders import proposals_for, register_all
+from silo.registering.closed_files import proposals_for, register_all
 from silo.testing import FakeSilo
 from silo.workbench.commit.plan import Snapshot
 from silo.workbench.preview.flow import Preview, PreviewRow, RowKind, ask, rows, summary, to_sync

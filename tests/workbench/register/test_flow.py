@@ -9,8 +9,8 @@ import pytest
 from desk import Document, Office, RegisterWindow
 
 from silo.bom.errors import ReadOnlyError, SiloError
-from silo.registering.items import Journal
-from silo.registering.orders import Order
+from silo.registering.journal import Journal
+from silo.registering.request import Order
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.pane.activity import Action, Do, EntryLine, PaneEntry, Tone
 from silo.workbench.register.flow import RegisterFlow

@@ -12,9 +12,10 @@ from fcstd_writer import Doc, locals_
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library, stamp, unstamp
-from silo.registering.items import Journal
-from silo.registering.offer import Candidate, ComponentState, OpenedFile, offer
-from silo.registering.orders import carry_out
+from silo.registering.candidate import Candidate, ComponentState, OpenedFile
+from silo.registering.carry_out import carry_out
+from silo.registering.journal import Journal
+from silo.registering.offer import offer
 from silo.testing import FakeSilo
 from silo.workbench.register.flow import APART, NEW, EditedRow, choose, heading
 from silo.workbench.session import Control

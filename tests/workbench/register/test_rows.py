@@ -8,7 +8,8 @@ import pytest
 from silo.bom.items.proposal import Proposal
 from silo.bom.items.schema import Categories
 from silo.bom.model import BomEntry
-from silo.registering.offer import Candidate, ComponentState, Offer, Similar
+from silo.registering.candidate import Candidate, ComponentState, Similar
+from silo.registering.offer import Offer
 from silo.workbench.register.flow import (
     ASK,
     NEW,

@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     from silo.bom.objects import Key
     from silo.outbox.entry import Entry as QueueEntry
     from silo.outbox.store import Store
-    from silo.registering.offer import Candidate, OpenedFile
+    from silo.registering.candidate import Candidate, OpenedFile
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.preview.flow import PreviewWindow as Preview
     from silo.workbench.register.flow import RegisterFlow

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from silo.freecads import open_in_others
-from silo.registering.offer import Candidate, ComponentState, OpenedFile
+from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.workbench.commit.plan import leaves_first
 from silo.workbench.freecad import host, identities, saving
 from silo.workbench.freecad.lost import lost_objects, refuse_loss

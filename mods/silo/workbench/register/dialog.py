@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.errors import SiloError
 from silo.registering.items import Registration
 from silo.registering.offer import Offer
-from silo.registering.orders import Order
+from silo.registering.request import Order
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.gui.widgets import KEY, ChoiceDelegate, chosen_key

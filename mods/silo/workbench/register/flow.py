@@ -25,9 +25,13 @@ from typing import Any, Protocol
 from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry, Extraction, walk_entries
 from silo.bom_sync import rules_text
-from silo.registering.items import Journal, Registration
-from silo.registering.offer import Candidate, ComponentState, Offer, Similar, next_number, offer, picture_in
-from silo.registering.orders import CHOSEN, Order, carry_out, take_back
+from silo.registering.candidate import Candidate, ComponentState, Similar
+from silo.registering.carry_out import carry_out, take_back
+from silo.registering.items import Registration
+from silo.registering.journal import Journal
+from silo.registering.offer import Offer, next_number, offer
+from silo.registering.request import CHOSEN, Order
+from silo.registering.saved_file import picture_in
 from silo.workbench.commit.flow import CommitFlow, Desk
 from silo.workbench.commit.plan import Snapshot
 from silo.workbench.pane.activity import Tone
@@ -364,7 +368,7 @@ def set_all(rows: Iterable[EditedRow], column: str, value: str, categories: Mapp
     """Take over one value for all of these rows; a category that a person chose is no guess.
 
     column
-        of :data:`silo.registering.orders.CHOSEN`. In a name ``{name}`` is the present name, ``{n}`` counts.
+        of :data:`silo.registering.request.CHOSEN`. In a name ``{name}`` is the present name, ``{n}`` counts.
     """
     for number, row in enumerate((row for row in rows if row.editable), start=1):
         if column == "name":

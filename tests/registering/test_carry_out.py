@@ -11,9 +11,13 @@ from silo.api.wire import Item
 from silo.bom.errors import RejectedError
 from silo.bom.items.proposal import propose
 from silo.bom.model import BomEntry
-from silo.registering.items import Journal, Registration
-from silo.registering.offer import Candidate, ComponentState, Learnt, LearntChoice, Modelled
-from silo.registering.orders import Order, carry_out, take_back
+from silo.registering.candidate import Candidate, ComponentState
+from silo.registering.carry_out import carry_out, take_back
+from silo.registering.items import Registration
+from silo.registering.journal import Journal
+from silo.registering.learnt import Learnt, LearntChoice
+from silo.registering.modelled import Modelled
+from silo.registering.request import Order
 from silo.testing import FakeSilo
 from silo.workbench.session import Control
 

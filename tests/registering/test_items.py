@@ -35,15 +35,8 @@ from silo.bom.items.proposal import propose
 from silo.bom.model import BomEntry
 from silo.fcstd import Library, stamp
 from silo.platform import hold_lock
-from silo.registering.items import (
-    REGISTRATION_PROPERTY,
-    RESERVED,
-    Journal,
-    Registration,
-    component_key,
-    finished,
-    register,
-)
+from silo.registering.items import REGISTRATION_PROPERTY, Registration, finished, register
+from silo.registering.journal import RESERVED, Journal, component_key
 
 ENTRY = BomEntry(doc_path="/v/bracket.FCStd", object_name="Body", document_label="Bracket")
 PROPOSAL = propose(ENTRY, {"A01": "Mechanical assembly", "M01": "Machined parts"})
@@ -578,7 +571,7 @@ def test_if_the_folder_cannot_say_what_is_begun_the_file_does(tmp_path: Path) ->
     seen: list[str | None] = []
     shared.api.during = lambda _wanted: seen.append(shared.identity)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("silo.registering.items.replacing", refused)
+        patch.setattr("silo.registering.journal.replacing", refused)
         done = shared.register("first")
     assert (done.error, seen) == (None, [done.item_id])
 

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from silo.bom.errors import InputError
 from silo.bom.items.proposal import Proposal
 from silo.bom.model import BomEntry
-from silo.registering.offer import Candidate, CandidateFiles, ComponentState, Offer
-from silo.registering.orders import read_table, write_table
+from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
+from silo.registering.offer import Offer
+from silo.registering.table import read_table, write_table
 
 CATEGORIES = {"M01": "Machined part"}
 

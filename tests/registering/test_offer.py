@@ -16,7 +16,8 @@ from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.items.proposal import Proposal
 from silo.bom.items.schema import Categories
 from silo.bom.model import BomEntry, Extraction
-from silo.registering.offer import Candidate, ComponentState, Offer, OpenedFile, offer
+from silo.registering.candidate import Candidate, ComponentState, OpenedFile
+from silo.registering.offer import Offer, offer
 from silo.testing import FakeSilo
 from silo.workbench.register.flow import EditedRow
 from silo.workbench.session import Control

@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The table that users edit in a spreadsheet: CSV out, CSV in, requests or all that is wrong with it.
+
+The user fills in the columns ``register``, ``name``, ``source``, ``supplier``, ``supplier_number``, ``type``,
+``category`` and ``part_number``; the others say which component a row is, and how its file was when the table
+was written.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from silo.bom.document import relative
+from silo.bom.errors import InputError
+from silo.bom.headers import plain_cell, safe_cell
+from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
+from silo.registering.offer import Offer
+from silo.registering.request import AS_UTF_8, ITEM_TYPES, Order, find_item, wrong_name
+from silo.registering.saved_file import fingerprint
+from silo.workbook import unicode_name
+
+COLUMNS = (
+    *("register", "file", "object", "standard", "name", "source", "supplier", "supplier_number"),
+    *("type", "category", "part_number", "note", "fingerprint"),
+)
+
+# A table need not have them.
+_SUPPLY = ("source", "supplier", "supplier_number")
+
+_AS_THEY_ARE = ("file", "object", "standard")
+
+_ANSWERS = {"yes": True, "y": True, "no": False, "n": False}
+
+SOURCES = {"": "", "made": "manufactured", "bought": "purchased"}
+
+_FILES = {
+    ComponentState.READ_ONLY: "the file is read-only",
+    ComponentState.ELSEWHERE: "the file is open in FreeCAD",
+    ComponentState.MISSING: "the file is missing",
+}
+
+# What a spreadsheet would take for a number, a date, a time or a truth: "00123" comes back as 123, "1E5" as
+# 100000, "3-4" and "MAR1" as days. An apostrophe before it makes it text, as before a formula.
+_MONTH = (
+    "(?:jan|feb|fév|mar|mär|mrz|apr|abr|avr|may|mai|mag|jun|jui|giu|jul|lug|aug|aoû|ago|sep|set|oct|okt|ott|nov|"
+    r"dec|dez|déc|dic|ene|gen)[^\W\d_]*"
+)
+
+_NO_TEXT = re.compile(
+    r"'*(?:(?=\D*\d)[-+\d.,:/%$€ ]+(?:e[-+]?\d+)?(?: ?[ap]m?)?"
+    rf"|\d{{1,4}}[-./ ]*{_MONTH}[-./ \d]*|{_MONTH}[-./ ]*\d{{1,4}}"
+    r"|true|false|wahr|falsch|vrai|faux)",
+    re.IGNORECASE,
+)
+
+# File and object, or the designation of a standard part.
+Key = tuple[str, str]
+
+
+def key_of(candidate: Candidate, base: str) -> Key:
+    """Return the name of a component in a table."""
+    entry = candidate.entry
+    return ("", entry.standard) if entry.standard else (relative(entry.doc_path, base), entry.object_name)
+
+
+def doubts(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
+    """List why a candidate may be an item already; ``earlier``: the candidates before it, which get their
+    items first.
+    """
+    reasons = [
+        f"Silo has this very file as {similar.part_number}"
+        if similar.same_file
+        else f"Silo has {similar.part_number} with the same name"
+        for similar in candidate.similar
+    ]
+    if twin := earlier.twin(candidate):
+        reasons.append(f"the same content as {twin.proposal.name}")
+    if candidate.same_as:
+        reasons.append(f"carries the identity of {candidate.same_as}, as another file does")
+    if candidate.foreign:
+        reasons.append("carries an identity of another server, or of another computer's run")
+    return reasons
+
+
+def remarks(candidate: Candidate, earlier: CandidateFiles) -> list[str]:
+    """List what the user should know about a row."""
+    texts = doubts(candidate, earlier)
+    if candidate.proposal.is_guess:
+        texts.append("the category is a guess")
+    if candidate.learnt:
+        texts.append("the category is the one chosen before in this folder")
+    if candidate.article is not None:
+        texts.append("modelled in the assembly's own file, not counted")
+    if words := _FILES.get(candidate.state):
+        texts.append(words)
+    return texts
+
+
+def write_table(offer: Offer, wanted: Callable[[Candidate], bool], base: str) -> bytes:
+    """Write the table (RFC 4180, UTF-8 with the mark that spreadsheets need); ``wanted``: True for rows with
+    ``yes``.
+    """
+    out = io.StringIO()
+    writer = csv.DictWriter(out, COLUMNS)
+    writer.writeheader()
+    earlier = CandidateFiles()
+    for candidate in offer.candidates:
+        earlier.add(candidate)
+        if candidate.decided:
+            continue
+        proposal, entry = candidate.proposal, candidate.entry
+        row = {
+            "register": "yes" if wanted(candidate) else "no",
+            "file": relative(entry.doc_path, base),
+            "object": entry.object_name,
+            "standard": entry.standard or "",
+            "name": proposal.name,
+            "source": next(word for word, kind in SOURCES.items() if kind == proposal.sourcing),
+            "supplier": proposal.supplier,
+            "supplier_number": proposal.supplier_part_number,
+            "type": proposal.item_type,
+            "category": proposal.category,
+            "part_number": "",
+            "note": "; ".join(remarks(candidate, earlier)),
+            "fingerprint": _fingerprint(candidate),
+        }
+        writer.writerow({column: _as_text(text) for column, text in row.items()})
+    return b"\xef\xbb\xbf" + out.getvalue().encode("utf-8", "surrogateescape")
+
+
+def _as_text(cell: str) -> str:
+    return "'" + cell if _NO_TEXT.fullmatch(cell) else str(safe_cell(cell))
+
+
+def _as_written(cell: str) -> str:
+    """Return the text from which :func:`_as_text` made a cell."""
+    return cell[1:] if cell.startswith("'") and _NO_TEXT.fullmatch(cell) else plain_cell(cell)
+
+
+def _fingerprint(candidate: Candidate) -> str:
+    """Return the fingerprint after a letter: a spreadsheet takes sixteen digits for a number, and
+    rounds it.
+    """
+    checksum = "" if candidate.entry.is_standard else fingerprint(candidate.entry.doc_path)
+    return checksum and f"x{checksum}"
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """One row of a table; ``line``: where it begins in the file (1 = first)."""
+
+    line: int
+    cells: Mapping[str, str]
+
+    @property
+    def key(self) -> Key:
+        if standard := self.cells["standard"]:
+            return "", standard
+        return self.cells["file"], self.cells["object"]
+
+
+def read_table(data: bytes, name: str) -> list[TableRow]:
+    """Read the rows of a table, as a spreadsheet or an editor saved it. InputError lists all that is
+    wrong.
+    """
+    text = _decoded(data, name)
+    first = text.split("\n", 1)[0]
+    delimiter = max(",;\t", key=first.count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    begins, problems, rows = 1, [], []
+    header: list[str] | None = None
+    try:
+        for cells in reader:
+            line, begins = begins, reader.line_num + 1
+            if not any(cell.strip() for cell in cells):
+                continue
+            if header is None:
+                header = [cell.strip().lower() for cell in cells]
+                continue
+            while len(cells) > len(header) and not cells[-1].strip():
+                cells.pop()  # what a spreadsheet leaves behind on the right
+            if len(cells) != len(header):
+                problems.append(f"line {line}: wanted {len(header)} cells as in the header, got {len(cells)}")
+                continue
+            # The name of a file may begin with a space; a text that the user writes does not.
+            row = dict.fromkeys(_SUPPLY, "")
+            row |= {c: _as_written(t) for c, t in zip(header, cells, strict=True)}
+            rows.append(TableRow(line, {c: t if c in _AS_THEY_ARE else t.strip() for c, t in row.items()}))
+    except csv.Error as error:
+        raise InputError(f"{name}: the row of line {begins} cannot be read as CSV: {error}") from None
+    lacking = [column for column in COLUMNS if column not in (*(header or ()), *_SUPPLY)]
+    if lacking:
+        raise InputError(f"{name} is not a table of --plan: it has no column {', '.join(lacking)}")
+    twice = sorted(column for column, count in Counter(header).items() if count > 1 and column)
+    problems[:0] = [f"line 1: the column {column} is there more than once" for column in twice]
+    if problems:
+        raise InputError(f"{name} cannot be read; nothing was registered", problems)
+    return rows
+
+
+def _decoded(data: bytes, name: str) -> str:
+    encoding = unicode_name(data) or "utf-8"
+    if b"\0" in data and encoding == "utf-8":
+        raise InputError(f"{name} is not a CSV file; save the table as CSV (UTF-8)")
+    # Names of files may be no UTF-8; any other text that is none is a problem of its row.
+    return data.decode(encoding, "replace" if "16" in encoding else "surrogateescape")
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What a table means now.
+
+    done
+        rows whose component has its number by now.
+    unlisted
+        components without a number that the table does not know.
+    """
+
+    orders: tuple[Order, ...]
+    done: int
+    unlisted: tuple[Candidate, ...]
+
+
+def orders_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name: str) -> Planned:
+    """Make the orders of a table. InputError lists all problems with their lines; then nothing is
+    registered.
+    """
+    candidates = {
+        key_of(component, base): component for component in offer.candidates if not component.decided
+    }
+    registered = {(relative(path, base), obj): number for (path, obj), number in offer.registered.items()}
+    counts = Counter(row.key for row in rows)
+    problems: list[str] = []
+    orders = []
+    joined: dict[str, list[Order]] = {}
+    done = 0
+    for row in rows:
+        order_problems: list[str] = []
+        wanted = _ANSWERS.get(row.cells["register"].lower())
+        if wanted is None:
+            order_problems.append(f"register: wanted yes or no, got {row.cells['register']!r}")
+        if counts[row.key] > 1:
+            order_problems.append("the component is there more than once")
+        candidate = candidates.get(row.key)
+        if candidate is not None and wanted:
+            orders.append(order := _order(row, candidate, offer, api, order_problems))
+            if order is not None and order.existing is not None:
+                order_problems += _joined_before(order, joined.setdefault(order.existing.item_id, []))
+        elif candidate is None and row.key in registered and wanted:
+            done += 1
+        elif candidate is None and wanted:
+            what = row.cells["standard"] or f"{row.cells['file']}#{row.cells['object']}"
+            hint = "" if what.isprintable() else f"; {AS_UTF_8}"
+            order_problems.append(f"{what} is no component here{hint}")
+        problems += [f"line {row.line}: {words}" for words in order_problems]
+    if problems:
+        raise InputError(f"{name}: nothing was registered, because some rows have problems", problems)
+    listed = {row.key for row in rows}
+    unlisted = tuple(
+        component
+        for key, component in candidates.items()
+        if key not in listed and component.article is None and not component.same_as
+    )
+    return Planned(tuple(order for order in orders if order is not None), done, unlisted)
+
+
+def _order(
+    row: TableRow, candidate: Candidate, offer: Offer, api: Any, order_remarks: list[str]
+) -> Order | None:
+    cells = row.cells
+    before = len(order_remarks)
+    order_remarks += filter(None, [wrong_name(cells["name"], candidate)])
+    if cells["source"] not in SOURCES:
+        order_remarks.append(f"source: wanted made, bought or nothing; got {cells['source']!r}")
+    elif cells["source"] != "bought" and (cells["supplier"] or cells["supplier_number"]):
+        order_remarks.append(
+            "source: a part with a supplier is bought; say bought, or leave the supplier empty"
+        )
+    if cells["type"] not in ITEM_TYPES:
+        order_remarks.append(f"type: wanted {', '.join(ITEM_TYPES)}; got {cells['type']!r}")
+    if cells["category"] not in offer.categories:
+        order_remarks.append(
+            f"category: there is no {cells['category']!r}; there are {', '.join(offer.categories)}"
+        )
+    if not candidate.state.usable or candidate.state is ComponentState.ELSEWHERE:
+        order_remarks.append(f"{cells['file']}: {_FILES.get(candidate.state, 'the file cannot be written')}")
+    elif cells["fingerprint"] not in ("", _fingerprint(candidate)):
+        order_remarks.append(
+            f"{cells['file']} has changed since the table was written; look at it, write a new one"
+        )
+    existing = None
+    if number := cells["part_number"]:
+        try:
+            existing = find_item(number, candidate, api)
+        except InputError as error:
+            order_remarks.append(f"part_number: {error}")
+    if len(order_remarks) > before:
+        return None
+    supply = (SOURCES[cells["source"]], cells["supplier"], cells["supplier_number"])
+    return Order(candidate, cells["name"], cells["type"], cells["category"], existing, False, *supply)
+
+
+def _joined_before(order: Order, earlier: list[Order]) -> list[str]:
+    """Find a number that was copied down a column, which would make one item of several parts."""
+    others = [other for other in earlier if other.candidate.sha256 != order.candidate.sha256]
+    earlier.append(order)
+    number = order.existing.part_number if order.existing else ""
+    return [
+        f"part_number: {number} is already for {other.name!r} above, another file; "
+        "register one of them with it"
+        for other in others[:1]
+    ]
