@@ -23,11 +23,12 @@ import numpy as np
 from silo.inertia.arrays import Floats
 from silo.inertia.assembly import Assembly, Instance
 from silo.inertia.bom.parser import BOMParser
-from silo.inertia.calculator import Task, calculate
-from silo.inertia.links import origin_frame
-from silo.inertia.materials import load_materials
+from silo.inertia.calculation import calculate
+from silo.inertia.links.frames import origin_frame
+from silo.inertia.materials.table import load_materials
 from silo.inertia.placements import place
 from silo.inertia.rigid import MassProps, combine_arrays
+from silo.inertia.task import Task
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 

@@ -147,7 +147,7 @@ def write(path: Path, count: int, nested: bool) -> Path:
     """The assembly as a STEP file."""
     from step_writer import StepDocument, trsf_of
 
-    from silo.inertia.links import origin_frame
+    from silo.inertia.links.frames import origin_frame
 
     random = np.random.default_rng(1)
     document = StepDocument()

@@ -15,7 +15,7 @@ from settled import box_of, measured, picture_of
 pytest.importorskip("OCP.BRep", exc_type=ImportError)
 
 from silo.cli.main import main
-from silo.inertia.links import read_link_map
+from silo.inertia.links.link_map import read_link_map
 
 ARM = Path(__file__).parents[2] / "examples" / "arm"
 

@@ -16,9 +16,11 @@ from bodies import placement
 from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.bom.parser import BOMParser
 from silo.inertia.bom.table import BomTable
-from silo.inertia.calculator import Task, calculate, read_geometry
-from silo.inertia.materials import load_materials
+from silo.inertia.calculation import calculate
+from silo.inertia.calculator import read_geometry
+from silo.inertia.materials.table import load_materials
 from silo.inertia.report import InertiaReport
+from silo.inertia.task import Task
 
 try:
     import OCP.BRep  # noqa: F401

@@ -15,7 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.inertia.assembly import Assembly, Instance
-from silo.inertia.links import link_map, origin_frame
+from silo.inertia.links.frames import origin_frame
+from silo.inertia.links.link_map import link_map
 
 Fixture = Callable[..., Any]
 BOM = "Name,Material,Mass\nplate,steel,\nrod,aluminum,\nblock,,0.7500 kg\nodd,PLA,\n"

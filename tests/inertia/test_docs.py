@@ -10,8 +10,8 @@ import pytest
 
 from silo.cli.main import build_parser
 from silo.inertia.bom.table import BomCode
+from silo.inertia.codes import Decided, MassCode, Rule, Source
 from silo.inertia.notes import GeometryCode
-from silo.inertia.report import Decided, MassCode, Rule, Source
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "inertia.md").read_text("utf-8")

@@ -17,9 +17,13 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import ConfigError, InputError
 from silo.inertia.assembly import Instance
-from silo.inertia.calculator import Task, calculate
-from silo.inertia.links import FrameChoice, as_link_map, claim, link_map, matches, origin_frame, read_link_map
-from silo.inertia.materials import load_materials
+from silo.inertia.calculation import calculate
+from silo.inertia.links.claims import claim
+from silo.inertia.links.frames import FrameChoice, origin_frame
+from silo.inertia.links.link_map import as_link_map, link_map, read_link_map
+from silo.inertia.links.patterns import matches
+from silo.inertia.materials.table import load_materials
+from silo.inertia.task import Task
 from silo.inertia.urdf import Urdf
 
 Fixture = Callable[..., Any]

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from bodies import box
 
-from silo.inertia.matching import Suggester, bare, could_be, plain
-from silo.inertia.report import Rule
+from silo.inertia.codes import Rule
+from silo.inertia.names import Suggester, bare, could_be, plain
 
 HEAD = "Item,Quantity,Part number,Material,Mass,Name\n"
 Fixture = Callable[..., Any]

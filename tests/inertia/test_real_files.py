@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from silo.inertia.assembly import Assembly
+from silo.inertia.codes import Source
 from silo.inertia.masses import Options
 from silo.inertia.notes import GeometryCode
 from silo.inertia.output import snippets, writable
 from silo.inertia.products import leaf_products
-from silo.inertia.report import Source
 
 Fixture = Callable[..., Any]
 Real = Callable[[str], Assembly]

@@ -11,11 +11,11 @@ import pytest
 from bodies import box, shape_only
 
 from silo.inertia.assembly import SolidProps
+from silo.inertia.codes import Source
 from silo.inertia.geometry.measured import Measured
 from silo.inertia.masses import GivenMass, Options, density_doubts, looks_like_totals
-from silo.inertia.materials import Material
+from silo.inertia.materials.material import Material
 from silo.inertia.notes import GeometryCode, Note
-from silo.inertia.report import Source
 
 HEAD = "Item,Quantity,Part number,Material,Mass,Name\n"
 V = 1e-6  # of a cube of 1 cm

@@ -16,7 +16,9 @@ from hypothesis import strategies as st
 
 from silo.inertia.assembly import Assembly, Instance
 from silo.inertia.geometry.graph import unique_names
-from silo.inertia.links import as_map, as_yaml, claim, link_map, read_link_map, starting_map
+from silo.inertia.links.claims import claim
+from silo.inertia.links.link_map import link_map, read_link_map
+from silo.inertia.links.starting_map import as_map, as_yaml, starting_map
 
 Fixture = Callable[..., Any]
 PART = box("p", 0.1, 0.1, 0.1)

@@ -10,10 +10,11 @@ import pytest
 
 from silo.bom.errors import InputError
 from silo.inertia.assembly import Assembly, Instance, Prototype
-from silo.inertia.calculator import Task, calculate
+from silo.inertia.calculation import calculate
+from silo.inertia.codes import Source
 from silo.inertia.geometry.together import Mesh, mesh_solid
 from silo.inertia.masses import Options
-from silo.inertia.report import Source
+from silo.inertia.task import Task
 
 LINKS = {"arm": ["arm"], "base": ["base"]}
 

@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from silo.bom.model import BomEntry
     from silo.inertia.assembly import Assembly
     from silo.inertia.bom.table import BomTable
-    from silo.inertia.calculator import Task
     from silo.inertia.geometry import ReadOptions
-    from silo.inertia.materials import MaterialTable
+    from silo.inertia.materials.table import MaterialTable
     from silo.inertia.push import PushPlan
     from silo.inertia.report import InertiaReport
+    from silo.inertia.task import Task
     from silo.inertia.urdf import Urdf
 
 
@@ -159,14 +159,14 @@ def _pairs(texts: Sequence[str], option: str, wanted: str) -> dict[str, str]:
 
 def material_table(args: argparse.Namespace) -> MaterialTable:
     """Load the material table that the user's options name."""
-    from silo.inertia.materials import load_materials
+    from silo.inertia.materials.table import load_materials
 
     return load_materials(args.materials, freecad=not args.no_freecad_materials)
 
 
 def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
     """Report bad numbers, output files and a missing server before minutes of reading, not after."""
-    from silo.inertia.materials import checked_density
+    from silo.inertia.materials.densities import checked_density
 
     if args.default_density is not None:
         checked_density(args.default_density)
@@ -430,7 +430,7 @@ def run_inertia(args: argparse.Namespace) -> int:
         raise InputError("--urdf-out and --in-place name two places for one URDF; give one of them")
     if args.snippet and args.json:
         raise InputError("--snippet and --json both go to standard output; use --report FILE.json")
-    from silo.inertia.calculator import calculate
+    from silo.inertia.calculation import calculate
 
     # The small files first: a mistake in them should not cost the reading of the geometry.
     table = bom_table(args)
@@ -448,9 +448,10 @@ def run_inertia(args: argparse.Namespace) -> int:
 
 
 def _task(args: argparse.Namespace) -> Task:
-    from silo.inertia.calculator import Task
-    from silo.inertia.links import FrameChoice, read_link_map
+    from silo.inertia.links.frames import FrameChoice
+    from silo.inertia.links.link_map import read_link_map
     from silo.inertia.masses import Options
+    from silo.inertia.task import Task
     from silo.inertia.urdf import read_urdf
 
     frame = FrameChoice(args.frame or ("urdf" if args.urdf else "assembly"))
@@ -531,7 +532,8 @@ def run_links(args: argparse.Namespace) -> int:
     if args.clusters is not None and args.urdf:
         raise InputError("--clusters groups by position and --urdf by names; give one of them")
     check_outputs(args)
-    from silo.inertia.links import ROOT_LINK, as_map, as_yaml, claim, starting_map
+    from silo.inertia.links.claims import ROOT_LINK, claim
+    from silo.inertia.links.starting_map import as_map, as_yaml, starting_map
     from silo.inertia.output import write_whole
     from silo.inertia.urdf import read_urdf
 
@@ -593,10 +595,11 @@ def run_mass(args: argparse.Namespace) -> int:
     need_inertia_extra()
     # The documents hold identities; their part numbers are the server's, for a preview as well.
     check_options(args, asks_server=args.push)
-    from silo.inertia.calculator import Task, calculate
-    from silo.inertia.links import Link, LinkMap
+    from silo.inertia.calculation import calculate
+    from silo.inertia.links.link_map import Link, LinkMap
     from silo.inertia.masses import Options
     from silo.inertia.notes import GeometryCode
+    from silo.inertia.task import Task
 
     table = bom_table(args)
     materials = material_table(args)

@@ -12,8 +12,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from silo.inertia.bom.parser import BOMParser
     from silo.inertia.bom.table import BOMEntry
-    from silo.inertia.calculator import EnhancedInertiaCalculator, InertiaCalculator, compute_link_inertials
-    from silo.inertia.materials import MATERIAL_DENSITIES
+    from silo.inertia.calculator import (
+        MATERIAL_DENSITIES,
+        EnhancedInertiaCalculator,
+        InertiaCalculator,
+        compute_link_inertials,
+    )
     from silo.inertia.report import InertiaReport, PartWarning
     from silo.inertia.rigid import MassProps
     from silo.inertia.types import InertialProperties
@@ -38,7 +42,7 @@ _HOME = {
     "InertiaCalculator": "calculator",
     "InertiaReport": "report",
     "InertialProperties": "types",
-    "MATERIAL_DENSITIES": "materials",
+    "MATERIAL_DENSITIES": "calculator",
     "MassProps": "rigid",
     "PartWarning": "report",
     "compute_link_inertials": "calculator",

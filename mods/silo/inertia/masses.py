@@ -24,12 +24,15 @@ from numpy.typing import NDArray
 from silo.inertia.arrays import Floats
 from silo.inertia.assembly import Assembly, Prototype, placed_below
 from silo.inertia.bom.table import BomCode, BOMEntry
-from silo.inertia.matching import Match, Matching, Suggester
-from silo.inertia.materials import DENSEST, LIGHTEST, Material, MaterialHit, MaterialTable, checked_density
+from silo.inertia.codes import Decided, MassCode, Rule, Source
+from silo.inertia.matching import Match, Matching
+from silo.inertia.materials.densities import DENSEST, LIGHTEST, checked_density
+from silo.inertia.materials.material import Material, MaterialHit
+from silo.inertia.materials.table import MaterialTable
+from silo.inertia.names import Suggester
 from silo.inertia.notes import GeometryCode, Note
 from silo.inertia.placements import place, rigid_mask
 from silo.inertia.products import companions
-from silo.inertia.report import Decided, MassCode, Rule, Source
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,9 @@ from rich.text import Text
 from silo.bom.errors import InputError, counted, listed
 from silo.bom.headers import safe_cell
 from silo.inertia.arrays import Floats
+from silo.inertia.codes import Decided, Source
 from silo.inertia.digits import number
-from silo.inertia.report import Decided, InertiaReport, LinkResult, PartResult, PartWarning, Source
+from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning
 from silo.inertia.rigid import CHECK_TOLERANCE, MassProps, TensorProblem, tensor_words
 from silo.platform import replacing
 

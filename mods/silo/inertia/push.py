@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 from silo.api.policy import ends_run
 from silo.bom.errors import NotFoundError, SiloError
 from silo.inertia.bom.table import BomCode
+from silo.inertia.codes import MassCode, Source
 from silo.inertia.digits import number, rounded
 from silo.inertia.notes import DOUBTFUL
-from silo.inertia.report import InertiaReport, MassCode, PartResult, Source, SubAssemblyResult
+from silo.inertia.report import InertiaReport, PartResult, SubAssemblyResult
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

@@ -21,7 +21,8 @@ import numpy as np
 
 from silo.bom.errors import InputError
 from silo.inertia.arrays import Floats
-from silo.inertia.links import MOST_RAD, ROOT_LINK, origin_frame
+from silo.inertia.links.claims import ROOT_LINK
+from silo.inertia.links.frames import MOST_RAD, origin_frame
 from silo.inertia.output import inertial, write_whole
 from silo.inertia.rigid import MassProps
 

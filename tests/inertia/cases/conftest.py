@@ -11,9 +11,11 @@ import pytest
 from step_writer import StepDocument
 
 from silo.inertia.bom.table import BomTable
-from silo.inertia.calculator import Task, calculate, read_geometry
+from silo.inertia.calculation import calculate
+from silo.inertia.calculator import read_geometry
 from silo.inertia.geometry import ReadOptions
 from silo.inertia.report import InertiaReport
+from silo.inertia.task import Task
 
 
 @pytest.fixture(name="step")

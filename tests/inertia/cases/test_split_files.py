@@ -16,8 +16,8 @@ import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from step_writer import emptied, trsf_of
 
+from silo.inertia.codes import Source
 from silo.inertia.notes import GeometryCode
-from silo.inertia.report import Source
 from silo.inertia.rigid import TensorProblem
 
 Fixture = Callable[..., Any]

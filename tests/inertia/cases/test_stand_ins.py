@@ -24,8 +24,8 @@ from OCP.gp import gp_Pnt, gp_Vec
 from OCP.TopoDS import TopoDS_Compound
 from step_writer import trsf_of
 
+from silo.inertia.codes import Decided, Rule
 from silo.inertia.notes import GeometryCode
-from silo.inertia.report import Decided, Rule
 
 Fixture = Callable[..., Any]
 HEAD = "Item,Quantity,Part number,Material,Mass,Name\n"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from silo.inertia.materials import card_folders, cards_in, materials_of
+from silo.inertia.materials.cards import card_folders, cards_in, materials_of
 
 INI = """; (c) somebody
 [General]

@@ -9,15 +9,10 @@ from typing import Any
 import pytest
 
 from silo.bom.errors import ConfigError
-from silo.inertia.materials import (
-    Material,
-    MaterialHit,
-    MaterialMiss,
-    MaterialTable,
-    load_materials,
-    package_rows,
-    parse_density,
-)
+from silo.inertia.materials.densities import parse_density
+from silo.inertia.materials.files import package_rows
+from silo.inertia.materials.material import Material, MaterialHit, MaterialMiss
+from silo.inertia.materials.table import MaterialTable, load_materials
 
 # The spec's table, Task 3.
 SPEC = {
@@ -192,7 +187,7 @@ def test_rows_of_the_package_are_sound() -> None:
 
 def test_no_alias_names_two_densities() -> None:
     """An alias of two rows would decide by the order of a file."""
-    from silo.inertia.materials import words
+    from silo.inertia.materials.words import words
 
     seen: dict[tuple[str, ...], Material] = {}
     for row in package_rows():
@@ -390,7 +385,7 @@ def test_short_texts_are_like_nothing(materials: MaterialTable, text: str) -> No
 )
 def test_a_unit_in_a_header_needs_no_brackets(tmp_path: Path, header: str, density: float) -> None:
     """Read as kg/m³, "density lb/ft3" would be 16 times too light for every row."""
-    from silo.inertia.materials import user_rows
+    from silo.inertia.materials.files import user_rows
 
     (tmp_path / "m.csv").write_text(f'name,"{header}"\nx,7.85\n')
     assert user_rows(tmp_path / "m.csv")[0].density == pytest.approx(density)
@@ -398,7 +393,7 @@ def test_a_unit_in_a_header_needs_no_brackets(tmp_path: Path, header: str, densi
 
 def test_a_users_table_may_say_how_much_a_density_varies(tmp_path: Path) -> None:
     """In percent, in both formats; what is no percentage is refused."""
-    from silo.inertia.materials import user_rows
+    from silo.inertia.materials.files import user_rows
 
     (tmp_path / "m.csv").write_text("name,density,spread\nx,500 kg/m3,20\ny,500 kg/m3,5 %\nz,500 kg/m3,\n")
     assert [row.spread for row in user_rows(tmp_path / "m.csv")] == [0.2, 0.05, 0.0]
@@ -412,7 +407,7 @@ def test_a_users_table_may_say_how_much_a_density_varies(tmp_path: Path) -> None
 
 def test_columns_beside_the_wanted_ones_are_none_of_them(tmp_path: Path) -> None:
     """Where a table has more than we ask for, "name" is the name, and "density" the density."""
-    from silo.inertia.materials import user_rows
+    from silo.inertia.materials.files import user_rows
 
     (tmp_path / "m.csv").write_text("name,name_de,density,density_source\nx,y,500 kg/m3,me\n")
     assert [(row.name, row.density) for row in user_rows(tmp_path / "m.csv")] == [("x", 500)]

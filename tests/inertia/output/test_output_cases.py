@@ -22,7 +22,8 @@ from rich.console import Console
 from silo.bom.errors import InputError
 from silo.cli.show import console
 from silo.inertia.digits import number
-from silo.inertia.links import ASSEMBLY_FRAME, link_map, origin_frame
+from silo.inertia.links.frames import ASSEMBLY_FRAME, origin_frame
+from silo.inertia.links.link_map import link_map
 from silo.inertia.output import (
     CSV_COLUMNS,
     MAX_PART_ROWS,
@@ -273,7 +274,7 @@ def test_case_43_json_fits_its_schema(report: Any) -> None:
 
 def test_schema_knows_every_code_of_the_program() -> None:
     """Enumerations of schema and program are the same."""
-    from silo.inertia.report import Decided, Rule, Source
+    from silo.inertia.codes import Decided, Rule, Source
     from silo.inertia.rigid import TensorProblem
 
     schema = json.loads(SCHEMA.read_text("utf-8"))["$defs"]

@@ -14,8 +14,9 @@ import pytest
 from bodies import box
 
 from silo.drawing.page import report_html
+from silo.inertia.codes import Source
 from silo.inertia.geometry import Mesh
-from silo.inertia.report import InertiaReport, Source
+from silo.inertia.report import InertiaReport
 
 Fixture = Callable[..., Any]
 HOSTILE = "</script><script>alert(1)</script>/*GLB*/&amp;"

@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from silo.inertia.assembly import Assembly, Instance
 from silo.inertia.bom.structure import with_structure
 from silo.inertia.bom.table import BOMEntry, BomTable
-from silo.inertia.matching import bare, plain
+from silo.inertia.codes import Source
+from silo.inertia.names import bare, plain
 from silo.inertia.output import report_json
-from silo.inertia.report import Source
 
 Compute = Callable[..., Any]
 NAMES = (

@@ -10,11 +10,12 @@ import pytest
 from bodies import box
 
 from silo.inertia.assembly import Assembly, Instance, Prototype
-from silo.inertia.calculator import Task, calculate
-from silo.inertia.links import Link, LinkMap
+from silo.inertia.calculation import calculate
+from silo.inertia.links.link_map import Link, LinkMap
 from silo.inertia.masses import Options
-from silo.inertia.materials import load_materials
+from silo.inertia.materials.table import load_materials
 from silo.inertia.notes import Note
+from silo.inertia.task import Task
 from silo.workbench.mass.rows import MassView, mass_text, shown
 
 

@@ -50,7 +50,8 @@ from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.geometry import measured as checks
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, ReadOptions, Report, in_metres, unfold
 from silo.inertia.geometry.measured import Measured
-from silo.inertia.materials import DENSEST, LIGHTEST, card_of, parse_density
+from silo.inertia.materials.cards import card_of
+from silo.inertia.materials.densities import DENSEST, LIGHTEST, parse_density
 from silo.inertia.notes import GeometryCode, Note
 
 NO_MATERIAL = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"

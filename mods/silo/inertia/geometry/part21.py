@@ -646,7 +646,7 @@ def _density(source: Part21, item: tuple[Value, ...]) -> tuple[float | None, str
         return None, "a density is given, but its unit cannot be read; it is not used"
     density = value * factor
     # Late: few files state a density, and this loads the tables.
-    from silo.inertia.materials import DENSEST, LIGHTEST
+    from silo.inertia.materials.densities import DENSEST, LIGHTEST
 
     if not LIGHTEST <= density <= DENSEST:
         return None, (

@@ -246,7 +246,7 @@ def _content(kind: Format, options: ReadOptions) -> dict[str, Any]:
     content = options.content_options()
     if kind is not Format.FREECAD:
         return content
-    from silo.inertia.materials import cards_fingerprint
+    from silo.inertia.materials.cards import cards_fingerprint
 
     return {**content, "cards": cards_fingerprint()}
 

@@ -61,11 +61,12 @@ class MassFlow:
         return dialog
 
     def _measured(self, doc: Any) -> Any:
-        from silo.inertia.calculator import Task, calculate
+        from silo.inertia.calculation import calculate
         from silo.inertia.geometry.graph import ReadOptions
-        from silo.inertia.links import Link, LinkMap
+        from silo.inertia.links.link_map import Link, LinkMap
         from silo.inertia.masses import Options
-        from silo.inertia.materials import load_materials
+        from silo.inertia.materials.table import load_materials
+        from silo.inertia.task import Task
         from silo.workbench.mass import shapes
         from silo.workbench.mass.rows import shown
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from silo.inertia.report import InertiaReport, MassCode, PartResult, Source
+from silo.inertia.codes import MassCode, Source
+from silo.inertia.report import InertiaReport, PartResult
 from silo.workbench.words import counted, spoken, translate
 
 

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Warnings about a calculation as a whole: the links, their frames, the link map, the rows of the BOM."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from silo.inertia.assembly import Assembly
+from silo.inertia.codes import MassCode
+from silo.inertia.links.claims import Claims, chosen_frame
+from silo.inertia.links.frames import FrameChoice, apart
+from silo.inertia.matching import Matching
+from silo.inertia.names import plain
+from silo.inertia.products import Product
+from silo.inertia.report import InertiaReport
+from silo.inertia.rigid import TensorProblem, tensor_words
+from silo.inertia.task import Task
+
+if TYPE_CHECKING:
+    from silo.inertia.urdf import Urdf
+
+
+def check_links_of_urdf(report: InertiaReport, urdf: Urdf) -> None:
+    """Warn of links whose mass goes nowhere, or whose frame is unknown."""
+    for name, link in report.links.items():
+        if name not in urdf.names and link.props.mass > 0:
+            words = f"the URDF has no link of this name; its {link.props.mass:.6g} kg go nowhere"
+            report.add_warning(name, "", words, MassCode.LINK_NOT_IN_URDF)
+        elif name in urdf.loose and not link.frame.chosen:
+            words = (
+                "no joints lead from it to the URDF's root: its frame is not known, and taken for the root's"
+            )
+            report.add_warning(name, "", words, MassCode.LINK_LOOSE)
+
+
+def check_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
+    """Warn if a link map's frame or --frame wins: a URDF would get numbers of another frame."""
+    for name in claims.members:
+        if name not in task.urdf_frames:
+            continue
+        frame = chosen_frame(name, claims, task.frame)
+        distance, angle = apart(frame.placement, task.urdf_frames[name])
+        if distance > FRAME_DISTANCE or angle > FRAME_ANGLE:
+            words = (
+                f"the numbers are in another frame ({frame.description}) than the link has by the URDF's "
+                f"joints, {distance * 1e3:.4g} mm and {math.degrees(angle):.3g}° away from it"
+            )
+            report.add_warning(name, "", words, MassCode.FRAME_DIFFERS)
+
+
+def check_far_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
+    """Warn of frames that a person wrote, far outside of the assembly.
+
+    The person probably wrote millimetres instead of metres.
+    """
+    for words in task.urdf.doubts if task.urdf is not None else ():
+        report.add_warning("", "", words, MassCode.FRAME_FAR)
+    if report.total is None or report.total.mass <= 0:
+        return
+    size = 2 * math.sqrt(float(np.abs(report.total.inertia).max()) / report.total.mass)
+    far = {}
+    for name, link in report.links.items():
+        written = link.frame.chosen or (task.frame is FrameChoice.URDF and name in task.urdf_frames)
+        distance = float(np.linalg.norm(link.props.com))
+        if written and link.props.mass > 0 and distance > FAR * size:
+            far[name] = distance
+    if far:
+        words = (
+            f"the frame of {', '.join(far)} lies {max(far.values()):.4g} m from the centre of mass, in an "
+            f"assembly of about {size:.3g} m: are its origins in mm? URDFs and link maps are in m"
+        )
+        report.add_warning("", "", words, MassCode.FRAME_FAR)
+
+
+FAR = 5.0
+"""Sizes of the assembly between a link's frame and its centre of mass, from where a unit is doubted."""
+
+FRAME_DISTANCE, FRAME_ANGLE = 1e-5, 1e-3
+"""[m], [rad] up to which two frames are one; URDFs print few digits."""
+
+
+def check_tensors(report: InertiaReport) -> None:
+    """Warn about links that a simulator refuses, or accepts without a word and computes wrongly."""
+    for link in report.links.values():
+        if TensorProblem.ZERO_MASS in link.problems:
+            words = "the link has no mass; physics engines refuse a moving link without one"
+            report.add_warning(link.name, "", words, MassCode.ZERO_MASS_LINK)
+            continue
+        for problem in link.problems:
+            words = f"the link's inertia tensor {tensor_words([problem])}"
+            report.add_warning(link.name, "", words, MassCode.BAD_TENSOR)
+
+
+def check_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> None:
+    """Warn about what the link map left open: unclaimed parts, overlaps, patterns without effect."""
+    for part in report.unclaimed:
+        many = f"{part.quantity} pieces, " if part.quantity > 1 else ""
+        report.add_warning(
+            "",
+            part.name,
+            f"no link claims it ({many}{part.total_mass:.6g} kg, {part.paths[0]}); it is in no link's mass",
+            MassCode.UNCLAIMED,
+        )
+    _check_rooted(report, assembly, claims)
+    twice: dict[tuple[str, str, str], list[str]] = {}
+    for owner, other, index in claims.twice:
+        instance = assembly.instances[index]
+        name = assembly.prototypes[instance.prototype].name
+        twice.setdefault((owner, other, name), []).append(instance.name)
+    for (owner, other, name), paths in twice.items():
+        pieces = f"{paths[0]} and {len(paths) - 1} more of it" if len(paths) > 1 else paths[0]
+        words = f"{pieces}: {owner} has them by the link map, and {other} claims them as well"
+        report.add_warning(other, name, words, MassCode.CLAIMED_TWICE)
+    for link, pattern in claims.unused:
+        report.add_warning(link, "", f"the pattern “{pattern}” matches nothing", MassCode.PATTERN_UNUSED)
+
+
+def _check_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> None:
+    """Warn of parts that the root link got because no sub-assembly holds them: one warning per product."""
+    if not claims.rooted:
+        return
+    root = next(name for name, ids in claims.members.items() if claims.rooted[0] in ids)
+    alone = {assembly.instances[index].name for index in claims.rooted}
+    for part in report.links[root].parts:
+        paths = [path for path in part.paths if path in alone]
+        if paths:
+            many = f"{len(paths)} pieces, " if len(paths) > 1 else ""
+            words = (
+                f"no first-level sub-assembly holds it ({many}{part.mass * len(paths):.6g} kg); it is in the "
+                f"root link {root}. --loose or --links can say otherwise"
+            )
+            report.add_warning(root, part.name, words, MassCode.IN_ROOT_LINK)
+
+
+def check_rows(
+    report: InertiaReport, leaves: Sequence[Product], groups: Sequence[Product], matching: Matching
+) -> None:
+    """Warn of BOM rows that no part uses, and rows whose quantity is not the number of parts."""
+    names = {plain(product.name) for product in (*leaves, *groups)}
+    for row in matching.unused:
+        quantity = f", quantity {row.quantity:g}" if row.quantity is not None else ""
+        why = "no part in the geometry has this name"
+        if plain(row.name) in names:
+            why = "all parts of this name belong to other rows"
+        report.add_warning(
+            "",
+            row.name,
+            f"BOM line {row.line}{quantity}: {why}; its mass is not counted",
+            MassCode.ROW_UNUSED,
+        )
+    counted: dict[int, int] = {}
+    products = [
+        *((product, matching.parts.get(product.key)) for product in leaves),
+        *((product, matching.groups.get(product.key)) for product in groups),
+    ]
+    for product, rows in products:
+        if rows is not None:
+            counted[id(rows.row)] = counted.get(id(rows.row), 0) + product.count
+    shown_rows: set[int] = set()
+    for product, rows in products:
+        if rows is None or id(rows.row) in shown_rows:
+            continue
+        shown_rows.add(id(rows.row))
+        count, wanted = counted[id(rows.row)], rows.bundle.quantities
+        if wanted and count not in wanted:
+            said = " or ".join(f"{quantity:g}" for quantity in sorted(wanted))
+            report.add_warning(
+                "",
+                product.name,
+                f"the BOM has {said} of it (line {rows.row.line}), the geometry {count}; "
+                "the geometry's pieces were counted",
+                MassCode.COUNT_DIFFERS,
+            )

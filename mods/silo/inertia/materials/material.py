@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A material with its density, and the two answers to a material's text: understood, or not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Material:
+    """One material.
+
+    density
+        [kg/m^3] at room temperature; it varies by ± ``spread`` of itself between kinds of the material.
+    family
+        the more general row, or "".
+    """
+
+    name: str
+    density: float
+    aliases: tuple[str, ...] = ()
+    source: str = ""
+    family: str = ""
+    spread: float = 0.0
+
+
+@dataclass(frozen=True)
+class MaterialHit:
+    """A material text that was understood; ``doubt`` says why it may mean another material, or is empty."""
+
+    material: Material
+    doubt: str = ""
+
+
+@dataclass(frozen=True)
+class MaterialMiss:
+    """A material text that was not understood, and why, in words that end a sentence.
+
+    nearest
+        the material that it may mean, for a person to decide; None if nothing is near.
+    """
+
+    reason: str
+    nearest: Material | None = None
+
+    @property
+    def advice(self) -> str:
+        """Return the reason, with the nearest material if there is one."""
+        if self.nearest is None:
+            return self.reason
+        return f"{self.reason} (the nearest is {self.nearest.name}, {self.nearest.density:g} kg/m³)"
