@@ -616,7 +616,7 @@ def kill_restores(url: str, folder: Path, kills: int) -> str:
 def kept(url: str, files: Path, parent: str) -> tuple[list[float], bytes | None]:
     """The BOM's quantities and the newest file, read from the database and the folder themselves."""
     from silo.bom.errors import NotFoundError
-    from silo_server.db.engine import Database
+    from silo_server.db.database import Database
     from silo_server.services.bom.lines import lines_of
     from silo_server.services.items import get_item
     from silo_server.services.revisions import FileStore, newest_file

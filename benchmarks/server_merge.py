@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.services.items import NewItem, create_item
 from silo_server.settings import Settings
 

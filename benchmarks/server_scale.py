@@ -43,7 +43,8 @@ from server_testing import Api, Databases, ServerProcess, bom, merge_body, postg
 
 from silo_server.backup import back_up, restore
 from silo_server.db import tables
-from silo_server.db.engine import Database, insert_rows
+from silo_server.db.database import Database
+from silo_server.db.rows import insert_rows
 from silo_server.run import prepare, running_server, share_the_processor
 from silo_server.services.bom.summary import keep_all, keep_summaries, summary_of
 from silo_server.services.items import get_item

@@ -44,17 +44,10 @@ from sqlalchemy.exc import SQLAlchemyError
 from silo.bom.errors import ConfigError, SiloError, listed
 from silo.platform import replace_patiently, replacing, scratch_folder, sync_folder
 from silo_server.actors import SYSTEM
-from silo_server.db.engine import (
-    EVENT_CHANNEL,
-    MIGRATION_LOCK,
-    Database,
-    Tx,
-    insert_rows,
-    mode_of,
-    one_of,
-    put_state,
-)
+from silo_server.db.database import Database
 from silo_server.db.migrate import check_revision, upgrade
+from silo_server.db.rows import insert_rows, one_of
+from silo_server.db.state import mode_of, put_state
 from silo_server.db.tables import (
     FILE_REFERENCES,
     api_tokens,
@@ -66,8 +59,9 @@ from silo_server.db.tables import (
     sessions,
     users,
 )
+from silo_server.db.transaction import EVENT_CHANNEL, MIGRATION_LOCK, Tx
 from silo_server.errors import cause_of
-from silo_server.events import HORIZON
+from silo_server.events.log import HORIZON
 from silo_server.services import access, search
 from silo_server.services.revisions import FileStore
 from silo_server.settings import Settings

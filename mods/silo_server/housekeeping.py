@@ -47,9 +47,10 @@ from sqlalchemy import ColumnElement, Table, delete, func, insert, select, text,
 from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import SiloError
-from silo_server import events
 from silo_server.backup import BACKED_UP
-from silo_server.db.engine import Database, Turnstile, Tx, get_state, mode_of, put_state
+from silo_server.db.database import Database
+from silo_server.db.sizes import beyond, bytes_of
+from silo_server.db.state import get_state, mode_of, put_state
 from silo_server.db.tables import (
     FILE_REFERENCES,
     answers,
@@ -66,8 +67,11 @@ from silo_server.db.tables import (
     sessions,
     users,
 )
+from silo_server.db.transaction import Tx
+from silo_server.db.turnstile import Turnstile
 from silo_server.errors import cause_of
-from silo_server.events import Hub
+from silo_server.events import log
+from silo_server.events.hub import Hub
 from silo_server.schema import find_schema
 from silo_server.services import items as item_service
 from silo_server.services.access import START_TOKEN, note_token_uses
@@ -192,8 +196,8 @@ def _days(setting: str) -> Callable[[Tx], datetime | None]:
 def _answers(tx: Tx) -> int:
     """Delete answers beyond their age, or beyond their bytes; the oldest first."""
     by_age = _days("sync_days")(tx)
-    newest = select(answers.c.at, events.bytes_of(tx, answers.c.answer)).order_by(answers.c.at.desc())
-    by_size = events.beyond(tx, newest, tx.settings.sync_bytes)
+    newest = select(answers.c.at, bytes_of(tx, answers.c.answer)).order_by(answers.c.at.desc())
+    by_size = beyond(tx, newest, tx.settings.sync_bytes)
     before = max(stamp(by_age) if by_age else "", by_size or "")
     oldest = select(answers.c.at).where(answers.c.at <= before).order_by(answers.c.at).limit(BATCH)
     last = max(tx.conn.scalars(oldest), default=None)
@@ -203,7 +207,7 @@ def _answers(tx: Tx) -> int:
 
 
 def _events(tx: Tx) -> int:
-    return events.trim(tx, tx.settings.event_log_size, tx.settings.event_log_bytes, BATCH)
+    return log.trim(tx, tx.settings.event_log_size, tx.settings.event_log_bytes, BATCH)
 
 
 def _history(tx: Tx) -> int:
@@ -433,7 +437,7 @@ class Metrics:
         now = CollectorRegistry()
         with db.read() as tx:
             mode, run = mode_of(tx), last_run(tx)
-            horizon, head = events.bounds(tx)
+            horizon, head = log.bounds(tx)
         gauges: list[Metric] = [
             GaugeMetricFamily("silo_read_only", "1 while the server takes no changes", mode != "normal"),
             GaugeMetricFamily("silo_events_kept", "Events in the log", head - horizon),

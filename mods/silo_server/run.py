@@ -38,11 +38,12 @@ from silo.bom.errors import ConfigError
 from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port, scratch_folder
 from silo_server import http
 from silo_server.actors import Role
-from silo_server.db.engine import MIGRATION_LOCK, WRITERS_WAITING, Database, Tx
+from silo_server.db.database import WRITERS_WAITING, Database
 from silo_server.db.migrate import upgrade
 from silo_server.db.tables import events, users
+from silo_server.db.transaction import MIGRATION_LOCK, Tx
 from silo_server.errors import cause_of
-from silo_server.events import Hub
+from silo_server.events.hub import Hub
 from silo_server.housekeeping import SHARED, Later, Metrics, Probe, keep_tidy, tidy
 from silo_server.http import BodyLimit, Compressed, Observed, SecurityHeaders, log_to_stderr
 from silo_server.services import access, search

@@ -21,7 +21,7 @@ from server_testing import Answer, Api, bom, form_body
 from sqlalchemy import update
 
 from silo.bom.text import character_problem, clean_name, with_allowed_characters
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.db.tables import bom_lines
 from silo_server.run import RunningServer
 

@@ -18,7 +18,7 @@ from web_visitor import enter
 
 from silo.bom.errors import ConflictError
 from silo_server.actors import SYSTEM, Role
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.run import Greeting, RunningServer, prepare, running_server
 from silo_server.services import access
 from silo_server.services.access import shown_prefix

@@ -28,7 +28,7 @@ from server_testing import Databases, merge_body
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
 from silo_server.actors import Actor, Role
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.errors import DuplicateError
 from silo_server.run import prepare
 from silo_server.services.bom import history, review

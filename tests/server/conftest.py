@@ -11,7 +11,7 @@ from hunting import kinds
 from server_testing import Api, Databases, sqlite_database
 from web_visitor import Visitor, visitors_of
 
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.run import RunningServer, prepare, running_server
 from silo_server.settings import Settings
 

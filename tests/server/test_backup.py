@@ -19,7 +19,7 @@ from sqlalchemy import text
 from silo.bom.errors import ConfigError
 from silo.cli.main import main
 from silo_server import backup
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.db.tables import metadata
 from silo_server.run import running_server
 from silo_server.services.revisions import FileStore

@@ -23,8 +23,11 @@ from web_visitor import Visitor
 import silo_server
 from silo.bom.errors import BusyError, RejectedError
 from silo.bom.headers import Heading
-from silo_server.db.engine import Database, Turnstile, Tx, insert_rows
+from silo_server.db.database import Database
+from silo_server.db.rows import insert_rows
 from silo_server.db.tables import bom_lines, items
+from silo_server.db.transaction import Tx
+from silo_server.db.turnstile import Turnstile
 from silo_server.errors import TooLargeError
 from silo_server.run import RunningServer, running_server
 from silo_server.services.bom import imports, review, tree

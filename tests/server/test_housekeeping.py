@@ -20,7 +20,7 @@ from server_testing import Api, bom, run_alone, sqlite_database, wait_until
 from sqlalchemy import func, select, text
 
 from silo_server.backup import back_up
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.db.tables import answers, audit, bom_changes, events, sessions
 from silo_server.housekeeping import keep_tidy, last_run, tidy
 from silo_server.run import prepare, running_server

@@ -12,9 +12,9 @@ import pytest
 from hunting import over
 from server_testing import Api
 
-from silo_server import events as log
-from silo_server.db.engine import Database
-from silo_server.events import RING_EVENTS
+from silo_server.db.database import Database
+from silo_server.events import log
+from silo_server.events.hub import RING_EVENTS
 from silo_server.run import RunningServer, running_server
 from silo_server.user_json import dumps
 from silo_server.values import NewEvent

@@ -19,7 +19,8 @@ from server_testing import Answer, Api, sqlite_database, wait_until
 
 from silo.bom.errors import BusyError
 from silo_server.actors import SYSTEM
-from silo_server.db.engine import Turnstile, Tx
+from silo_server.db.transaction import Tx
+from silo_server.db.turnstile import Turnstile
 from silo_server.routes.bom import file_of
 from silo_server.routes.context import Call, Server
 from silo_server.run import RunningServer, running_server

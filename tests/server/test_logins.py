@@ -16,7 +16,7 @@ from sqlalchemy import func, select
 
 from silo.bom.errors import AuthError, BusyError, ConfigError
 from silo_server.actors import Actor, Role
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.db.tables import api_tokens, login_attempts
 from silo_server.errors import TooManyAttemptsError
 from silo_server.housekeeping import tidy

@@ -16,7 +16,7 @@ from sqlalchemy import Connection, MetaData, Table, inspect, select, text
 from silo.bom.errors import ConfigError
 from silo.cli.main import main
 from silo_server import backup
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.db.migrate import STEPS, upgrade
 from silo_server.db.tables import metadata
 from silo_server.run import prepare

@@ -18,9 +18,10 @@ from sqlalchemy.exc import InternalError, OperationalError
 from starlette.types import Message
 from web_visitor import Visitor, enter
 
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.db.migrate import upgrade
-from silo_server.events import EventResponse, Hub
+from silo_server.events.hub import Hub
+from silo_server.events.stream import EventResponse
 from silo_server.http import _database_error, _disk_error
 from silo_server.run import running_server, start_warnings
 from silo_server.settings import MIB, Settings

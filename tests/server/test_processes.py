@@ -16,7 +16,7 @@ from server_testing import Api, Databases, ServerProcess, sqlite_database, wait_
 
 from silo.bom.errors import ConfigError
 from silo.cli.main import main
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.run import Welcome, _without_password, is_loopback, prepare, running_server, serve
 from silo_server.settings import Settings
 

@@ -18,7 +18,8 @@ from sqlalchemy import func, select, text
 from web_visitor import enter
 
 from silo.bom.errors import CycleError
-from silo_server.db.engine import Database, Tx
+from silo_server.db.database import Database
+from silo_server.db.transaction import Tx
 from silo_server.run import prepare
 from silo_server.services.bom import history, review
 from silo_server.services.bom.merge import merge_bom

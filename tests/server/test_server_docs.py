@@ -35,6 +35,6 @@ def test_every_setting_is_named(text: str) -> None:
 
 def test_every_event_is_named(text: str) -> None:
     """The names that the log knows."""
-    source = (Path(__file__).parents[2] / "mods/silo_server/events.py").read_text("utf-8")
+    source = (Path(__file__).parents[2] / "mods/silo_server/events/announce.py").read_text("utf-8")
     for name in re.findall(r'"((?:item|revision|bom|server)[._][a-z]+)", ', source):
         assert f"`{name}`" in text, name

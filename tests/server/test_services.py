@@ -20,7 +20,8 @@ from sqlalchemy import select, update
 from silo.bom.errors import AuthError, ConflictError, RejectedError
 from silo.bom.headers import plain_cell, safe_cell
 from silo_server.actors import SYSTEM, Actor, Role
-from silo_server.db.engine import Database, insert_rows, one_of, update_rows
+from silo_server.db.database import Database
+from silo_server.db.rows import insert_rows, one_of, update_rows
 from silo_server.db.tables import answers, items, users
 from silo_server.fields import from_row, to_wire
 from silo_server.services.access import (

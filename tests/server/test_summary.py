@@ -22,10 +22,11 @@ from server_testing import Databases, merge_body
 
 from silo.bom.errors import BusyError, SiloError
 from silo.cli.main import main
-from silo_server import events
 from silo_server.actors import Actor, Role
-from silo_server.db.engine import Database, Tx
+from silo_server.db.database import Database
 from silo_server.db.tables import product_summaries
+from silo_server.db.transaction import Tx
+from silo_server.events import log
 from silo_server.run import prepare
 from silo_server.services.bom import history, review, transfer, tree
 from silo_server.services.bom.last_sync import record_refusal
@@ -362,7 +363,7 @@ def test_what_changed_behind_a_trimmed_log_is_not_kept(db: Database) -> None:
     with db.write() as tx:
         patch_properties(tx, part, {"mass_kg": 2})
     with db.write() as tx:
-        events.trim(tx, 0)
+        log.trim(tx, 0)
     keep_summaries(db)
     assert kept_ids(db) == set()
 

@@ -10,7 +10,7 @@ from random import Random
 
 from hunting import over
 
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.run import prepare
 from silo_server.services.bom.history import change_at, list_changes, state_at
 from silo_server.services.bom.lines import lines_of

@@ -22,7 +22,8 @@ from server_testing import Api, Databases, bom, run_alone, wait_until
 from sqlalchemy import make_url
 
 from silo.bom.errors import RejectedError
-from silo_server.db.engine import WRITERS_WAITING, Database, Tx
+from silo_server.db.database import WRITERS_WAITING, Database
+from silo_server.db.transaction import Tx
 from silo_server.housekeeping import Later, Probe
 from silo_server.run import running_server
 from silo_server.services import access

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from silo_server.events import LoggedEvent
+from silo_server.events.log import LoggedEvent
 from silo_server.values import LineState
 from silo_server.web.activity_page import entry_of
 from silo_server.web.line_form import changes

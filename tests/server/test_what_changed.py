@@ -15,7 +15,7 @@ from openpyxl import load_workbook
 from server_testing import Api, bom
 from web_visitor import Visitor
 
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.db.tables import bom_change_lines, bom_changes, product_looks
 from silo_server.run import RunningServer
 from silo_server.services.bom.review import SAME_LOOK, keep_looks, last_look

@@ -12,7 +12,7 @@ from typing import Any
 
 from server_testing import Api
 
-from silo_server.db.engine import Database
+from silo_server.db.database import Database
 from silo_server.services.bom.lines import ChangeKind, ChangeNote, LineRecord, apply_changes, new_line_id
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings

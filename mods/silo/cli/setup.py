@@ -119,7 +119,7 @@ def add_summaries(parser: argparse.ArgumentParser) -> None:
 def run_summaries(args: argparse.Namespace) -> int:
     """Sum up all assemblies and return 0; from then on the server keeps the sums itself."""
     need_server_extra()
-    from silo_server.db.engine import Database
+    from silo_server.db.database import Database
     from silo_server.db.migrate import upgrade
     from silo_server.services.bom.summary import keep_all
     from silo_server.settings import settings_from_environment

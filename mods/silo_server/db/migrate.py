@@ -32,8 +32,9 @@ from sqlalchemy import (
 )
 
 from silo.bom.errors import ConfigError
-from silo_server.db.engine import MIGRATION_LOCK, Database
+from silo_server.db.database import Database
 from silo_server.db.tables import NAMES, needed, only, primary
+from silo_server.db.transaction import MIGRATION_LOCK
 
 if TYPE_CHECKING:
     from alembic.operations import Operations

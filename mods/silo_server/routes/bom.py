@@ -23,7 +23,8 @@ from silo.api.wire import MergeResult
 from silo.bom.errors import CycleError, RejectedError
 from silo.bom.numbers import whole_number
 from silo.bom.quantities import plain
-from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer
+from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
+from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
 from silo_server.routes import context, models
 from silo_server.routes.context import (

@@ -28,8 +28,10 @@ from silo.bom.numbers import whole_number
 from silo.bom.quantities import LARGEST_QUANTITY
 from silo.bom.text import REFUSED_CHARACTERS
 from silo_server.actors import Actor, Role
-from silo_server.db.engine import Database, Turnstile, Tx
-from silo_server.events import Hub
+from silo_server.db.database import Database
+from silo_server.db.transaction import Tx
+from silo_server.db.turnstile import Turnstile
+from silo_server.events.hub import Hub
 from silo_server.housekeeping import Probe
 from silo_server.http import info_of
 from silo_server.schema import ITEM_TYPES, find_schema

@@ -16,7 +16,7 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import LONGEST, read_number
 from silo.bom.quantities import as_decimal
-from silo_server.db.engine import Tx
+from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
 from silo_server.routes import context
 from silo_server.routes.bom import CSV, IMPORT_BODY, XLSX, content_of, file_of, uploaded

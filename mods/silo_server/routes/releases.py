@@ -10,7 +10,7 @@ from pydantic import Field, StrictBool, WithJsonSchema
 from starlette.responses import Response
 
 from silo.api import wire
-from silo_server.db.engine import Tx
+from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
 from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Call, Editor, Viewer, json_answer
 from silo_server.routes.models import RequestBody, Text

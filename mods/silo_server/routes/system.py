@@ -18,10 +18,10 @@ from starlette.responses import Response
 
 from silo.api.wire import ErrorBody
 from silo.bom.errors import RejectedError
-from silo_server import events
 from silo_server.actors import Role, Scope
-from silo_server.db.engine import mode_of
-from silo_server.events import EventResponse
+from silo_server.db.state import mode_of
+from silo_server.events import log
+from silo_server.events.stream import EventResponse
 from silo_server.fields import to_wire
 from silo_server.housekeeping import (
     HEALTH_SECONDS,
@@ -47,6 +47,7 @@ from silo_server.routes.context import (
 )
 from silo_server.routes.models import RequestBody, Short, Text
 from silo_server.services import access
+from silo_server.services.mode import change_mode
 
 router = APIRouter(tags=["system"])
 EVENT_ID = re.compile(r"(?P<number>[0-9]{1,18})(?:-(?P<tag>[0-9a-f]{8}))?")
@@ -173,16 +174,16 @@ def get_housekeeping(call: Admin) -> dict[str, Any]:
 def set_mode(call: Admin, body: ModeBody) -> dict[str, Any]:
     """Allow changes, or refuse them (503) until the mode is set again; all processes follow at once."""
     with call.write(even_when_read_only=True) as tx:
-        return {"mode": events.set_mode(tx, body.mode)}
+        return {"mode": change_mode(tx, body.mode)}
 
 
-def _event_id(text: str | None) -> events.EventMark | None:
+def _event_id(text: str | None) -> log.EventMark | None:
     if text is None or text == "":
         return None
     match = EVENT_ID.fullmatch(text)
     if match is None:
         raise RejectedError(f"Last-Event-ID: wanted the id of an event (a number), got {text[:40]!r}")
-    return events.EventMark(int(match["number"]), match["tag"] or "")
+    return log.EventMark(int(match["number"]), match["tag"] or "")
 
 
 auth_router = APIRouter(prefix="/api", tags=["auth"])

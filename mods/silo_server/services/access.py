@@ -32,8 +32,11 @@ from silo.bom.errors import (
     RejectedError,
 )
 from silo_server.actors import Actor, Role, Scope
-from silo_server.db.engine import ADMIN_LOCK, LOGIN_LOCK, Database, Turnstile, Tx, newest_first, update_rows
+from silo_server.db.database import Database
+from silo_server.db.rows import newest_first, update_rows
 from silo_server.db.tables import api_tokens, audit, login_attempts, login_links, sessions, users
+from silo_server.db.transaction import ADMIN_LOCK, LOGIN_LOCK, Tx
+from silo_server.db.turnstile import Turnstile
 from silo_server.errors import DuplicateError, TooManyAttemptsError
 from silo_server.fields import from_row
 from silo_server.times import stamp, wire_time

@@ -23,10 +23,12 @@ from silo.api.wire import FACTS, FactSource, ItemTexts, Stated
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
 from silo.bom.model import as_uuid
 from silo.bom.text import REFUSED_CHARACTERS, character_problem
-from silo_server import events
-from silo_server.db.engine import KeptAnswer, KeyedRequest, Tx, earlier_answer, keep_answer, one_of
+from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
+from silo_server.db.rows import one_of
 from silo_server.db.tables import items, number_counters
+from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError
+from silo_server.events import announce
 from silo_server.fields import names_of
 from silo_server.schema import ITEM_TYPES, Category, Schema, find_schema
 from silo_server.services import revisions
@@ -321,7 +323,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
         item = get_item(tx, number)
     else:
         index_item(tx, item.id)
-    events.item_created(tx, item)
+    announce.item_created(tx, item)
     keep_answer(tx, request, KeptAnswer(item.uuid))
     return item, True
 
@@ -382,7 +384,7 @@ def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | No
         raise DuplicateError(f"part number {number} is taken by another item") from error
     index_item(tx, item.id)
     after = get_item(tx, number)
-    events.item_updated(tx, after)
+    announce.item_updated(tx, after)
     return after
 
 
@@ -418,7 +420,7 @@ def fill_in(tx: Tx, part_number: str, stated: Stated, checksum: str) -> None:
     if given:
         revisions.complete(tx, item, checksum, properties, changed)
         words = ", ".join(_FACT_WORDS.get(name, name) for name in given)
-        events.item_updated(tx, get_item(tx, part_number), f"{words} taken from its file")
+        announce.item_updated(tx, get_item(tx, part_number), f"{words} taken from its file")
 
 
 def _about_same(value: Any, other: Any) -> bool:
@@ -460,7 +462,7 @@ def archive_item(tx: Tx, part_number: str, expected: int | None = None) -> None:
     check_item_version(item, expected)
     archived = {"archived_at": tx.stamp, "version": items.c.version + 1}
     tx.conn.execute(update(items).where(items.c.id == item.id).values(archived))
-    events.item_deleted(tx, item)
+    announce.item_deleted(tx, item)
 
 
 def unarchive_item(tx: Tx, part_number: str) -> Item:
@@ -470,7 +472,7 @@ def unarchive_item(tx: Tx, part_number: str) -> Item:
         tx.conn.execute(
             update(items).where(items.c.id == item.id).values(archived_at=None, version=items.c.version + 1)
         )
-        events.item_updated(tx, item, "brought back")
+        announce.item_updated(tx, item, "brought back")
     return get_item(tx, part_number)
 
 

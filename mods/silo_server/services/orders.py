@@ -19,8 +19,9 @@ from sqlalchemy import insert, or_, select, update
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, counted, listed
 from silo.bom.quantities import counts_pieces, exact_product, exact_sum, plain
-from silo_server.db.engine import Tx, one_of
+from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, documents, items, orders, revisions
+from silo_server.db.transaction import Tx
 from silo_server.fields import from_row
 from silo_server.services import access
 from silo_server.services.bom.frozen import frozen_product

@@ -24,9 +24,8 @@ from sqlalchemy import insert, select, update
 from silo.api.wire import RELEASE_LABEL, ItemTexts
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
 from silo.bom.text import character_problem
-from silo_server import events
 from silo_server.actors import Role, Scope
-from silo_server.db.engine import Tx, insert_rows, one_of
+from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import (
     frozen_items,
     items,
@@ -34,7 +33,9 @@ from silo_server.db.tables import (
     releases,
     users,
 )
+from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
+from silo_server.events import announce
 from silo_server.fields import from_row
 from silo_server.services import access
 from silo_server.services.items import get_item
@@ -379,7 +380,7 @@ def _change(tx: Tx, release: Release, **values: Any) -> None:
 
 def _announce(tx: Tx, item: Item, release: Release, what: str) -> None:
     access.note(tx, f"release.{what}", item.part_number, f"revision {release.label}")
-    events.released(tx, item, release.label, what)
+    announce.released(tx, item, release.label, what)
 
 
 def read_record(tx: Tx, record: str) -> dict[str, Any]:

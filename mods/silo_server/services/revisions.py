@@ -34,10 +34,11 @@ from silo.api.wire import FACTS, FactSource
 from silo.bom.compare.base_revision import base_of, would_undo
 from silo.bom.errors import NewerRevisionError, NotFoundError, RejectedError
 from silo.platform import no_device_name, remove_patiently, replace_patiently, sync_folder
-from silo_server import events
-from silo_server.db.engine import Tx, insert_rows, one_of
+from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import document_items, document_links, documents, items, revisions
+from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError
+from silo_server.events import announce
 from silo_server.fields import from_row, to_wire
 from silo_server.services.search import index_item
 from silo_server.times import spec_time
@@ -299,7 +300,7 @@ def add_revision(
             changed["thumbnail_key"] = file.thumbnail_key
         _keep(tx, item, snapshot, source, changed)
     revision = get_revision(tx, of, number)
-    events.revision_created(tx, of, revision)
+    announce.revision_created(tx, of, revision)
     return revision
 
 

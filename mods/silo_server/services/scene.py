@@ -24,9 +24,10 @@ from sqlalchemy import insert, select, update
 from silo.api import wire
 from silo.bom.errors import NotFoundError, RejectedError
 from silo.bom.text import character_problem
-from silo_server.db.engine import Tx, one_of
+from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, documents, models, revisions
 from silo_server.db.tables import items as item_rows
+from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.services import items
 from silo_server.services.revisions import FileStore, get_revision, newest_file, with_file

@@ -37,8 +37,10 @@ from sqlalchemy.sql.expression import cast, literal
 
 from silo.api.wire import ItemTexts
 from silo.bom.text import folded, glued, name_key
-from silo_server.db.engine import Tx, get_state, one_of, put_state
+from silo_server.db.rows import one_of
+from silo_server.db.state import get_state, put_state
 from silo_server.db.tables import items, revisions
+from silo_server.db.transaction import Tx
 from silo_server.schema import text_hints
 
 # Counts up when the rules below change; the next start then makes the index again.

@@ -27,9 +27,11 @@ from silo.bom.headers import Heading
 from silo.bom.numbers import Mark, common_mark, parse_number, read_number, whole_number, yes_or_no
 from silo.bom.quantities import as_decimal, exact_product
 from silo.bom.text import character_problem
-from silo_server import events
-from silo_server.db.engine import Tx, get_state, one_of, put_state
+from silo_server.db.rows import one_of
+from silo_server.db.state import get_state, put_state
 from silo_server.db.tables import items, supplier_changes
+from silo_server.db.transaction import Tx
+from silo_server.events import announce
 from silo_server.fields import from_row
 from silo_server.services import access
 from silo_server.services.bom.imports import Layout, Record, Table
@@ -435,7 +437,7 @@ def _write(tx: Tx, item: Item, made: Sequence[Mapping[str, Any]]) -> tuple[Item,
     written = insert(supplier_changes).values(row).returning(supplier_changes.c.id)
     number = tx.conn.execute(written).scalar_one()
     index_item(tx, item.id)
-    events.item_updated(tx, item, "suppliers changed")
+    announce.item_updated(tx, item, "suppliers changed")
     return get_item(tx, item.part_number), number
 
 

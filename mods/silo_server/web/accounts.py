@@ -19,9 +19,8 @@ from starlette.responses import RedirectResponse, Response
 
 from silo.api.wire import login_code
 from silo.bom.errors import AuthError, ConflictError, ForbiddenError, RejectedError, SiloError
-from silo_server import events
 from silo_server.actors import Actor, Role, Scope
-from silo_server.db.engine import mode_of
+from silo_server.db.state import mode_of
 from silo_server.errors import TooManyAttemptsError
 from silo_server.housekeeping import last_run, standing
 from silo_server.routes.context import (
@@ -40,6 +39,7 @@ from silo_server.routes.context import (
 )
 from silo_server.routes.system import login_path, revoke, set_session_cookie
 from silo_server.services import access
+from silo_server.services.mode import change_mode
 from silo_server.web.forms import (
     MOST_KEPT,
     Form,
@@ -342,7 +342,7 @@ def set_mode(call: Administrator, form: Form) -> Response:
     if mode not in MODES:
         raise RejectedError(_("mode: wanted normal or read-only; load the page again"))
     with call.write(even_when_read_only=True) as tx:
-        events.set_mode(tx, mode)
+        change_mode(tx, mode)
     return back(
         "/users",
         _("The server takes changes.") if mode == "normal" else _("The server takes no changes now."),

@@ -19,9 +19,9 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from silo.bom.errors import NotFoundError, RejectedError, VersionConflictError
-from silo_server import events
 from silo_server.errors import ArchivedPartsError
-from silo_server.events import EventQuery, LoggedEvent
+from silo_server.events import log
+from silo_server.events.log import EventQuery, LoggedEvent
 from silo_server.routes.context import Call, PageFrom
 from silo_server.services import revisions
 from silo_server.services.bom import history, tree
@@ -119,13 +119,13 @@ def activity_page(
             if inside and number:
                 asked = replace(asked, inside=tree.ids_below(get_item(tx, number, include_archived=True)))
         if newer_than is None:
-            part = part_of(partial(events.newest, tx, asked), MOST, before, after)
+            part = part_of(partial(log.newest, tx, asked), MOST, before, after)
         else:
             # The newest of them, if there are more than a page holds.
-            newest = [event for event in events.newest(tx, asked, MOST) if event.id > newer_than]
+            newest = [event for event in log.newest(tx, asked, MOST) if event.id > newer_than]
             part = ListPart(newest, None, None)
-        last = events.head(tx)
-        users = events.usernames(tx)
+        last = log.head(tx)
+        users = log.usernames(tx)
         uuids = [event.item_uuid for event in part.rows if event.item_uuid]
         items = {uuid.uuid: uuid for uuid in get_by_uuids(tx, uuids, include_archived=True)}
     entries = [entry_of(event, items.get(event.item_uuid or "")) for event in part.rows]

@@ -22,7 +22,7 @@ from starlette.responses import Response
 
 from silo.bom.errors import BusyError, ConflictError, NotFoundError
 from silo.bom.quantities import as_decimal
-from silo_server.db.engine import Tx
+from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.fields import names_of
 from silo_server.routes.items import told_of

@@ -19,7 +19,7 @@ from silo.bom.errors import RejectedError
 from silo.bom.headers import designators
 from silo.bom.numbers import read_quantity
 from silo.bom.quantities import counts_pieces, same_quantity
-from silo_server.db.engine import Tx
+from silo_server.db.transaction import Tx
 from silo_server.schema import text_hints
 from silo_server.services.bom import history
 from silo_server.services.bom.history import Change, ChangedLine

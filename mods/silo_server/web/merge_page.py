@@ -23,9 +23,9 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.numbers import whole_number
-from silo_server import events
-from silo_server.db.engine import Tx
+from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
+from silo_server.events import log
 from silo_server.routes.context import Call
 from silo_server.schema import text_hints
 from silo_server.services.bom import history, review
@@ -304,7 +304,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
         merge = review_of.last_merge
         merged = history.get_change(tx, item, merge.id)[1] if merge else []
         recent = history.list_changes(tx, item, LATER_CHANGES)
-        seen = events.head(tx)
+        seen = log.head(tx)
         try:
             below = summary_of(tx, item).told(item.id)
         except (BusyError, CycleError) as error:

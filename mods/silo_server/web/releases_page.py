@@ -13,7 +13,7 @@ from starlette.responses import Response
 
 from silo.bom.errors import ConflictError, SiloError
 from silo.bom.quantities import as_decimal
-from silo_server.db.engine import Tx
+from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import Call
 from silo_server.routes.releases import frozen_now

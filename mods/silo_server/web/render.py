@@ -39,7 +39,7 @@ import silo
 from silo.bom.numbers import whole_number
 from silo.bom.quantities import as_decimal
 from silo_server.actors import Actor, Role
-from silo_server.db.engine import mode_of
+from silo_server.db.state import mode_of
 from silo_server.routes.context import Call, masked, server_of
 from silo_server.services.bom.review import badge, waiting_count
 from silo_server.times import wire_time

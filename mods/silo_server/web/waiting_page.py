@@ -17,7 +17,7 @@ from starlette.responses import Response
 
 from silo.bom.errors import SiloError, VersionConflictError
 from silo.bom.numbers import whole_number
-from silo_server.db.engine import Tx
+from silo_server.db.transaction import Tx
 from silo_server.routes.context import Call
 from silo_server.services.bom import history, review
 from silo_server.services.bom.review import ReviewAction, Waiting, decide_all, lines_for, waiting

@@ -109,7 +109,7 @@ def _newest_postgres(postgres_url: str) -> str:
 
 
 def _upgrade(url: str) -> None:
-    from silo_server.db.engine import Database
+    from silo_server.db.database import Database
     from silo_server.db.migrate import upgrade
     from silo_server.settings import Settings
 

@@ -20,8 +20,9 @@ from sqlalchemy import select
 
 from silo.api.wire import ItemTexts
 from silo.bom.quantities import plain
-from silo_server.db.engine import Tx, one_of
+from silo_server.db.rows import one_of
 from silo_server.db.tables import document_items, document_links, documents, revisions
+from silo_server.db.transaction import Tx
 from silo_server.services.bom.history import (
     NamedItem,
     PastChange,

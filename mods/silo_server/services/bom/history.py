@@ -22,8 +22,9 @@ from silo.api.wire import RELEASE_LABEL
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError
 from silo.bom.numbers import whole_number
 from silo.bom.quantities import plain
-from silo_server.db.engine import Tx, newest_first, one_of
+from silo_server.db.rows import newest_first, one_of
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts, items, revisions
+from silo_server.db.transaction import Tx
 from silo_server.errors import ArchivedPartsError
 from silo_server.fields import from_row, names_of
 from silo_server.services.bom.lines import (

@@ -37,8 +37,9 @@ from silo.bom.headers import (
 )
 from silo.bom.numbers import Mark, common_mark, parse_number, read_quantity, whole_number
 from silo.bom.quantities import exact_sum
-from silo_server.db.engine import Tx, one_of
+from silo_server.db.rows import one_of
 from silo_server.db.tables import items
+from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.schema import find_schema
 from silo_server.services.bom.lines import (

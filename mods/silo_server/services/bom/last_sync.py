@@ -15,8 +15,9 @@ from typing import Any
 from sqlalchemy import delete, insert, select, update
 
 from silo.bom.report import Reason, in_words, remembered
-from silo_server.db.engine import Tx, one_of
+from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_last_syncs
+from silo_server.db.transaction import Tx
 from silo_server.fields import from_row
 from silo_server.services.bom.merge_request import MergeRequestIn
 from silo_server.times import wire_time

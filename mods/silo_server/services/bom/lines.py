@@ -23,10 +23,11 @@ from sqlalchemy import Integer, Select, delete, func, insert, literal_column, se
 
 from silo.bom.errors import ConflictError, CycleError, NotFoundError, VersionConflictError
 from silo.bom.quantities import plain
-from silo_server import events
-from silo_server.db.engine import STRUCTURE_LOCK, Tx, insert_rows, one_of, update_rows
+from silo_server.db.rows import insert_rows, one_of, update_rows
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_lines, items
+from silo_server.db.transaction import STRUCTURE_LOCK, Tx
 from silo_server.errors import TooLargeError
+from silo_server.events import announce
 from silo_server.fields import names_of, to_wire
 from silo_server.services.items import get_item
 from silo_server.user_json import dumps
@@ -358,7 +359,7 @@ def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineRecord], note: Cha
         insert_rows(tx, bom_change_lines, rows)
         tx.conn.execute(update(items).where(items.c.id == parent.id).values(bom_version=version))
     if note.kind is not ChangeKind.MERGE:
-        events.bom_updated(tx, parent, note.kind, note.summary)
+        announce.bom_updated(tx, parent, note.kind, note.summary)
     return change_id, version
 
 

@@ -19,17 +19,11 @@ from silo.bom.compare.merge import MergePlan, plan_merge
 from silo.bom.compare.owner import is_manual
 from silo.bom.errors import RejectedError
 from silo.bom.model import BomDiff, QuantityChange
-from silo_server import events
-from silo_server.db.engine import (
-    KeptAnswer,
-    KeyedRequest,
-    Tx,
-    earlier_answer,
-    insert_rows,
-    keep_answer,
-    one_of,
-)
+from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
+from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import bom_conflicts, items
+from silo_server.db.transaction import Tx
+from silo_server.events import announce
 from silo_server.fields import names_of
 from silo_server.services.bom.last_sync import LastSync, last_sync, record_merge
 from silo_server.services.bom.lines import (
@@ -149,7 +143,7 @@ def merge_bom(tx: Tx, part_number: str, request: MergeRequestIn, expected: int |
         shorter = without_unchanged(prepared.lines, changes, answer)
         kept_change = change_id if shorter and len(shorter) < len(text) else None
         keep_answer(tx, keyed, KeptAnswer(shorter if shorter and kept_change else text, version, kept_change))
-    events.bom_merged(tx, parent, event_of(tx, parent, prepared.plan.diff, answer))
+    announce.bom_merged(tx, parent, event_of(tx, parent, prepared.plan.diff, answer))
     return MergeOutcome(text, version)
 
 

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from silo.bom.quantities import plain
-from silo_server.db.engine import KeptAnswer, Tx
+from silo_server.db.answers import KeptAnswer
+from silo_server.db.transaction import Tx
 from silo_server.services.bom.history import state_at
 from silo_server.services.bom.lines import LineRecord
 from silo_server.user_json import dumps

@@ -29,9 +29,9 @@ from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, Reject
 from silo.bom.quantities import counts_pieces, plain, same_quantity
 from silo.bom.report import Reason
 from silo.bom.text import character_problem
-from silo_server import events
 from silo_server.actors import Actor, Role
-from silo_server.db.engine import Database, Tx, insert_rows, one_of
+from silo_server.db.database import Database
+from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import (
     INCOMPLETE,
     UNREFERENCED,
@@ -45,7 +45,9 @@ from silo_server.db.tables import (
     users,
 )
 from silo_server.db.tables import events as event_log
+from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
+from silo_server.events import log
 from silo_server.schema import text_hints
 from silo_server.services import access
 from silo_server.services.bom.history import Change, last_merge
@@ -611,7 +613,7 @@ def follow(tx: Tx, target: str, *, on: bool) -> None:
             f"you can follow at most {MOST_FOLLOWED} items and folders; stop following some first"
         )
     if on:
-        seen = {"seen": tx.stamp, "event": events.bounds(tx)[1]}
+        seen = {"seen": tx.stamp, "event": log.bounds(tx)[1]}
         tx.conn.execute(insert(follows).values(user_id=user_id, target=target, **seen))
 
 
@@ -624,7 +626,7 @@ def is_followed(tx: Tx, user_id: int, item: Item) -> bool:
 
 def have_seen(tx: Tx) -> None:
     """Mark all news of the person as seen."""
-    seen = {"seen": tx.stamp, "event": events.bounds(tx)[1]}
+    seen = {"seen": tx.stamp, "event": log.bounds(tx)[1]}
     tx.conn.execute(follows.update().where(follows.c.user_id == tx.actor.own_id).values(seen))
 
 

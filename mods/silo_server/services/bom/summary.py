@@ -35,8 +35,8 @@ from sqlalchemy import delete, select
 
 from silo.bom.errors import BusyError, CycleError, counted
 from silo.bom.quantities import as_decimal, exact_product, exact_sum
-from silo_server import events
-from silo_server.db.engine import EVENT_LOCK, Database, Tx, insert_rows, one_of, uses_of
+from silo_server.db.database import Database
+from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import (
     bom_changes,
     bom_last_syncs,
@@ -45,6 +45,9 @@ from silo_server.db.tables import (
     product_summaries,
 )
 from silo_server.db.tables import events as event_log
+from silo_server.db.transaction import EVENT_LOCK, Tx
+from silo_server.db.usage import uses_of
+from silo_server.events import log
 from silo_server.fields import names_of
 from silo_server.services.bom.last_sync import NEVER, last_syncs
 from silo_server.services.bom.lines import newer_exists, select_lines, to_line
@@ -264,7 +267,7 @@ def _make(tx: Tx, wanted: Collection[int], most: int | None = None) -> dict[int,
         maker.node(item_id)
     products = {part_id for part_id in own if part_id in lines or own[part_id].is_assembly}
     if products and tx.built is not None:
-        head = events.bounds(tx)[1]
+        head = log.bounds(tx)[1]
         tx.built.append(
             Built(
                 head,
@@ -499,7 +502,7 @@ def keep_summaries(db: Database, ended: Callable[[], bool] = lambda: False) -> N
 
 
 def _keep(tx: Tx, built: Built) -> None:
-    if built.head < events.horizon_of(tx):
+    if built.head < log.horizon_of(tx):
         return
     since = select(event_log.c.item_uuid).where(event_log.c.id > built.head)
     # A refused sync has no event, and a time that may be before the look by as long as a change may take.

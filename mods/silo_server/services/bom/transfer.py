@@ -30,7 +30,7 @@ from silo.bom.headers import (
 from silo.bom.quantities import as_decimal, plain
 from silo.bom.text import with_allowed_characters
 from silo.platform import scratch_folder
-from silo_server.db.engine import Tx
+from silo_server.db.transaction import Tx
 from silo_server.services.bom.frozen import changes_of, frozen_product
 from silo_server.services.bom.last_sync import in_sentences, last_syncs
 from silo_server.services.bom.summary import MassAndCost, OpenBom, Summary, own_worth, summaries, summary_of

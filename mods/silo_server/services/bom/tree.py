@@ -23,8 +23,9 @@ from sqlalchemy import ColumnElement, Select, func, literal, select
 from silo.bom.errors import ConflictError, CycleError
 from silo.bom.numbers import read_number
 from silo.bom.quantities import as_decimal, exact_product, exact_sum, plain, says_the_same
-from silo_server.db.engine import Tx, among, one_of
+from silo_server.db.rows import among, one_of
 from silo_server.db.tables import bom_conflicts, bom_lines, items
+from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.services.bom.lines import child_of, select_lines, to_line
 from silo_server.services.items import by_ids
