@@ -51,7 +51,8 @@ def commits(one: Any, doc: Any) -> None:
 
 def drawing(one: Any) -> None:
     """A commit with 10 000 findings, and 2000 events in one burst."""
-    from silo.workbench.pane.activity import EntryLine, PaneEntry, Tone
+    from silo.workbench.activity.box import EntryLine, PaneEntry
+    from silo.workbench.tone import Tone
 
     lines = tuple(EntryLine(f"<b>finding</b> {number}", Tone.ERROR) for number in range(10_000))
 

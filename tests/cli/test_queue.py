@@ -13,7 +13,7 @@ import pytest
 from silo.api.pause import Pause
 from silo.outbox.entry import Commit, State
 from silo.outbox.store import Store
-from silo.workbench.pane.activity import rows
+from silo.workbench.pane.waiting import rows
 
 
 @dataclass

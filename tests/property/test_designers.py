@@ -27,9 +27,11 @@ from desk import Desk, Document, Documents, Office, Silo
 from silo.bom.errors import SiloError, UnreachableError
 from silo.outbox.entry import Entry, State
 from silo.outbox.store import Store
-from silo.workbench.commit.flow import Choice, CommitAnswer, CommitFlow, Look, Theirs, of_held
-from silo.workbench.commit.opened import Base, Opened
+from silo.workbench.colleagues.theirs import Choice, Theirs, of_held
+from silo.workbench.commit.desk import CommitAnswer, Look
+from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.plan import CommitPlan, DocumentRow
+from silo.workbench.documents.opened import Base, Opened
 from silo.workbench.revisions.flow import RevisionFlow
 from silo.workbench.session.session import Session
 

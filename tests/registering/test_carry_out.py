@@ -19,7 +19,7 @@ from silo.registering.learnt import Learnt, LearntChoice
 from silo.registering.modelled import Modelled
 from silo.registering.request import Order
 from silo.testing import FakeSilo
-from silo.workbench.session import Control
+from silo.workbench.session.worker import Control
 
 
 def carried_out(

@@ -20,7 +20,7 @@ from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.registering.offer import Offer, offer
 from silo.testing import FakeSilo
 from silo.workbench.register.flow import EditedRow
-from silo.workbench.session import Control
+from silo.workbench.session.worker import Control
 
 CONTROL = Control(lambda _detail, _fraction: None)
 

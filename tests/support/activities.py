@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import reduce
 
-from silo.workbench.pane.activity import Activity, PaneEntry
+from silo.workbench.activity.box import PaneEntry
+from silo.workbench.activity.feed import Activity
 
 
 def activity_of(entries: Iterable[PaneEntry]) -> Activity:

@@ -25,12 +25,14 @@ from silo.registering.items import Registration
 from silo.registering.offer import Offer
 from silo.registering.request import Order
 from silo.testing import FakeSilo
-from silo.workbench.commit.flow import CommitAnswer, Look
-from silo.workbench.commit.opened import Base
-from silo.workbench.commit.plan import CommitPlan, Snapshot
+from silo.workbench.commit.desk import CommitAnswer, Look
+from silo.workbench.commit.plan import CommitPlan
+from silo.workbench.documents.opened import Base
+from silo.workbench.documents.snapshot import Snapshot
+from silo.workbench.ghost import Differences, Ghost
 from silo.workbench.preview.flow import Preview
-from silo.workbench.revisions.flow import Differences, Ghost
-from silo.workbench.session.session import Listener, Session
+from silo.workbench.session.session import Session
+from silo.workbench.session.state import Listener
 from silo.workbench.settings import DEFAULTS, Preferences
 from silo.workbench.settings.server import ServerPreferences
 

@@ -15,7 +15,7 @@ from silo.outbox.entry import Commit, Entry
 from silo.outbox.send import Report, Sent, send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
-from silo.workbench.commit.plan import Snapshot
+from silo.workbench.documents.snapshot import Snapshot
 
 
 @dataclass

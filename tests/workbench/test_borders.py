@@ -17,15 +17,30 @@ MODS = Path(__file__).resolve().parents[2] / "mods"
 WORKBENCH = MODS / "silo" / "workbench"
 # What runs in a worker thread, where no document and no widget may be touched, and what runs in any test.
 WORKERS = (
+    "activity/badges",
+    "activity/box",
+    "activity/events",
+    "activity/feed",
+    "activity/links",
+    "activity/sent",
+    "activity/team",
+    "colleagues/announced",
+    "colleagues/look",
+    "colleagues/theirs",
+    "commit/desk",
     "commit/flow",
     "commit/plan",
-    "pane/activity",
-    "pane/entries",
+    "commit/take",
+    "desk",
+    "documents/opened",
+    "documents/snapshot",
+    "pane/banner",
+    "pane/waiting",
     "preview/flow",
     "register/flow",
-    "session/__init__",
     "session/online",
     "session/session",
+    "session/worker",
     "settings/server",
 )
 
@@ -114,8 +129,8 @@ def test_the_start_loads_next_to_nothing() -> None:
     assert {name for name in loaded if name.startswith("silo.") and "workbench" not in name} == set()
     ours = {name.removeprefix("silo.workbench.") for name in loaded if name.startswith("silo.workbench.")}
     assert ours == {
-        "commit",
-        "commit.opened",
+        "documents",
+        "documents.opened",
         "freecad",
         "freecad.host",
         "gui",

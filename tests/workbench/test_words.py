@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import DocumentError, NotFoundError
 from silo.workbench import words
-from silo.workbench.pane.activity import banner
-from silo.workbench.session.session import PaneState
+from silo.workbench.pane.banner import banner
+from silo.workbench.session.state import PaneState
 from silo.workbench.settings.server import ServerChoice
 from silo.workbench.words import breakable, counted, plain, quantity, tip, told_apart, visible
 

@@ -25,16 +25,18 @@ if TYPE_CHECKING:
 
     from silo.outbox.entry import Entry
     from silo.outbox.send import Sent
+    from silo.workbench.activity.box import Action, Do
+    from silo.workbench.colleagues.announced import Newer
     from silo.workbench.commit.flow import CommitFlow
-    from silo.workbench.commit.opened import Opened
+    from silo.workbench.documents.opened import Opened
     from silo.workbench.freecad.hooks import CommitHook
     from silo.workbench.freecad.silo_group import SiloGroup
     from silo.workbench.live_desk import LiveDesk
-    from silo.workbench.pane.activity import Action, Do
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
     from silo.workbench.revisions.flow import ProjectFlow, RevisionFlow
-    from silo.workbench.session.session import Newer, PaneState, Session
+    from silo.workbench.session.session import Session
+    from silo.workbench.session.state import PaneState
 
 
 # FreeCAD's window comes first; no server is asked before it is open.
@@ -107,7 +109,7 @@ class AddOn:
 
     def _ask_team(self) -> None:
         """Ask the server with which FreeCAD the team works, and say so if it is another one."""
-        from silo.workbench.pane.entries import of_team
+        from silo.workbench.activity.team import of_team
 
         def told(wanted: str) -> None:
             if (entry := of_team(wanted, host.version())) is not None:
@@ -145,7 +147,8 @@ class AddOn:
     @cached_property
     def session(self) -> Session:
         """Make the session, which does the work beside the GUI thread."""
-        from silo.workbench.session.session import Listener, Session
+        from silo.workbench.session.session import Session
+        from silo.workbench.session.state import Listener
         from silo.workbench.settings.server import Keyring, read_known
 
         def drawing() -> list[str]:
@@ -253,7 +256,7 @@ class AddOn:
         # Finding the item of each document takes a while if there are hundreds.
         asked = (colleagues, [(doc.Name, since) for doc, since in docs])
         if asked != self._present[0]:
-            from silo.workbench.pane.activity import presence_text
+            from silo.workbench.pane.banner import presence_text
 
             texts = []
             for doc, since in docs:
@@ -417,7 +420,7 @@ class Buttons:
         self._actions()[action.do](action)
 
     def _actions(self) -> dict[Do, Callable[[Action], object]]:
-        from silo.workbench.pane.activity import Do
+        from silo.workbench.activity.box import Do
 
         addon = self._addon
         return {
@@ -454,8 +457,8 @@ class Buttons:
 
     def _choose(self, action: Action) -> None:
         """Ask what to do about the colleague's revision for which a commit is held."""
-        from silo.workbench.commit.flow import Choice, of_held
-        from silo.workbench.pane.activity import Do
+        from silo.workbench.activity.box import Do
+        from silo.workbench.colleagues.theirs import Choice, of_held
 
         choose, discard = self._addon.revisions.choose, self._addon.session.discard
         for held in self._held(action):
@@ -471,7 +474,7 @@ class Buttons:
 
     def _compare(self, action: Action) -> None:
         """Show the colleague's revision as a ghost beside the document whose commit is held."""
-        from silo.workbench.commit.flow import of_held
+        from silo.workbench.colleagues.theirs import of_held
 
         for held in self._held(action):
             self._addon.revisions.compare(
@@ -484,7 +487,7 @@ class Buttons:
 
     def _details(self, action: Action) -> None:
         """Show all lines of the BOM difference for which a commit is held."""
-        from silo.workbench.commit.flow import line_texts
+        from silo.workbench.colleagues.theirs import line_texts
         from silo.workbench.gui import widgets
 
         theirs = self._addon.session.shown.theirs.get(int(action.target))

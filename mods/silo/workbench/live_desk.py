@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""FreeCAD and its user, as the flows want them (:class:`silo.workbench.commit.flow.Desk`)."""
+"""FreeCAD and its user, as the flows want them (:mod:`silo.workbench.desk`)."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.errors import DocumentError
 from silo.bom.links import extract, file_item
 from silo.freecads import open_in_any
-from silo.workbench.commit import plan
-from silo.workbench.commit.flow import CommitAnswer, Look
-from silo.workbench.commit.opened import Opened
-from silo.workbench.commit.plan import CommitPlan, Snapshot
+from silo.workbench.commit.desk import CommitAnswer, Look
+from silo.workbench.commit.plan import CommitPlan
+from silo.workbench.documents.opened import Opened
+from silo.workbench.documents.snapshot import Snapshot, take
 from silo.workbench.freecad import host, live, saving, witness
 from silo.workbench.freecad.components import (
     look_at,
@@ -32,16 +32,16 @@ from silo.workbench.gui import qt
 if TYPE_CHECKING:
     from silo.bom.model import Extraction
     from silo.bom.objects import Key
-    from silo.workbench.commit.flow import Theirs
+    from silo.workbench.colleagues.theirs import Theirs
     from silo.workbench.freecad.overlay import Overlay
     from silo.workbench.freecad.witness import SolidCount
+    from silo.workbench.ghost import Differences, Ghost
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
-    from silo.workbench.revisions.flow import Differences, Ghost
 
 
 class LiveDocuments:
-    """FreeCAD's documents, as :class:`silo.workbench.commit.plan.Documents` wants them."""
+    """FreeCAD's documents, as :class:`silo.workbench.desk.Documents` wants them."""
 
     linked = staticmethod(host.linked_documents)
     is_partial = staticmethod(host.is_partial)
@@ -70,10 +70,10 @@ class LiveDesk:
         """Take a snapshot; the assembly that is active in the 3D view decides between several."""
         hardware = self._count_hardware()
         if (whole := live.in_file(doc)) is not None:
-            return plan.take(whole, walk=partial(extract, hardware=hardware))
+            return take(whole, walk=partial(extract, hardware=hardware))
         cached = live.cached_document(doc)
         walk = partial(live.extract_object, hardware=hardware)
-        return plan.take(cached, assembly=self._hint(doc, cached), walk=walk)
+        return take(cached, assembly=self._hint(doc, cached), walk=walk)
 
     def _hint(self, doc: Any, cached: Any) -> Any:
         active = host.active_assembly() if host.has_gui() else None

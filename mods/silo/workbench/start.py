@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo import FREECAD_PACKAGES
 from silo.workbench import words
-from silo.workbench.commit.opened import Opened
+from silo.workbench.documents.opened import Opened
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt
 from silo.workbench.gui.qt import QtGui, QtWidgets

@@ -40,7 +40,7 @@ from inside import (
 )
 from themes import contrast
 
-from silo.workbench.pane.activity import Action, Do
+from silo.workbench.activity.box import Action, Do
 
 SHARED = Path(os.environ["SILO_TEST_SHARED"])
 NAMES = ("Left", "OnTop", "Taken", "Copied", "Held")

@@ -23,11 +23,15 @@ from silo.bom.model import BomEntry
 from silo.outbox.entry import UNKNOWN, Commit, State
 from silo.outbox.send import send_all
 from silo.platform import stamp_of
-from silo.workbench.commit.flow import Choice, CommitAnswer, CommitFlow, Look, Theirs, line_words
-from silo.workbench.commit.opened import Opened
+from silo.workbench.activity.box import Action, Do, EntryLine, PaneEntry
+from silo.workbench.colleagues.announced import Newer
+from silo.workbench.colleagues.theirs import Choice, Theirs, line_words
+from silo.workbench.commit.desk import CommitAnswer, Look
+from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.plan import CommitPlan, plan
-from silo.workbench.pane.activity import Action, Do, EntryLine, PaneEntry, Tone, rows
-from silo.workbench.session.session import Newer
+from silo.workbench.documents.opened import Opened
+from silo.workbench.pane.waiting import rows
+from silo.workbench.tone import Tone
 
 
 @pytest.fixture(name="flow")

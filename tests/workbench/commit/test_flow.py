@@ -17,8 +17,8 @@ from silo.outbox.entry import Commit
 from silo.outbox.store import Store
 from silo.registering.journal import Journal
 from silo.registering.request import Order
+from silo.workbench.activity.box import Do
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.pane.activity import Do
 from silo.workbench.register.flow import RegisterFlow
 
 

@@ -12,17 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import DocumentError
-from silo.workbench.commit.opened import Base
-from silo.workbench.commit.plan import (
-    CommitPlan,
-    CommittedDocument,
-    DocumentRow,
-    DocumentState,
-    Snapshot,
-    leaves_first,
-    plan,
-    take_each,
-)
+from silo.workbench.commit.plan import CommitPlan, DocumentRow, DocumentState, plan
+from silo.workbench.commit.take import CommittedDocument, take_each
+from silo.workbench.documents.opened import Base
+from silo.workbench.documents.order import leaves_first
+from silo.workbench.documents.snapshot import Snapshot
 
 
 class Doc:

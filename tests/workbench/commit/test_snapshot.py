@@ -11,7 +11,7 @@ from fakes import Doc, edit
 from silo.bom.findings import FindingCode
 from silo.bom.links import file_item
 from silo.bom.model import sole_identity
-from silo.workbench.commit.plan import Snapshot, take
+from silo.workbench.documents.snapshot import Snapshot, take
 
 
 def gearbox() -> tuple[Doc, Doc, Doc]:

@@ -7,18 +7,9 @@ from activities import activity_of, entry_text
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.workbench.pane.activity import (
-    MOST_ENTRIES,
-    MOST_LINES,
-    Action,
-    Activity,
-    Do,
-    EntryBatch,
-    EntryLine,
-    PaneEntry,
-    Tone,
-    gathered,
-)
+from silo.workbench.activity.box import MOST_LINES, Action, Do, EntryBatch, EntryLine, PaneEntry
+from silo.workbench.activity.feed import MOST_ENTRIES, Activity, gathered
+from silo.workbench.tone import Tone
 
 
 def entry(key: str, when: float = 0.0, title: str = "x", rank: int = 0, also: str = "") -> PaneEntry:

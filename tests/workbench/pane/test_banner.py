@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import pytest
 
-from silo.workbench.pane.activity import Do, banner
-from silo.workbench.session.session import PaneState
+from silo.workbench.activity.box import Do
+from silo.workbench.pane.banner import banner
+from silo.workbench.session.state import PaneState
 from silo.workbench.settings.server import ServerChoice
 
 SERVER = ServerChoice("https://silo.example.com")

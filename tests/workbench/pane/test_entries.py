@@ -16,8 +16,11 @@ from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom_sync import counts_text, english
 from silo.workbench import words
-from silo.workbench.pane.activity import Do, PaneEntry
-from silo.workbench.pane.entries import badges, of_event, of_sent, of_team
+from silo.workbench.activity.badges import badges
+from silo.workbench.activity.box import Do, PaneEntry
+from silo.workbench.activity.events import of_event
+from silo.workbench.activity.sent import of_sent
+from silo.workbench.activity.team import of_team
 
 if TYPE_CHECKING:
     from vault import Vault

@@ -13,8 +13,9 @@ from silo.bom.compare.three_states import ThreeLines
 from silo.bom.model import BomEntry
 from silo.outbox.entry import Commit, Entry, State
 from silo.outbox.store import Store
-from silo.workbench.commit.flow import of_held
-from silo.workbench.pane.activity import Do, WaitingRow, can_send, heading, meant_for_another, rows
+from silo.workbench.activity.box import Do
+from silo.workbench.colleagues.theirs import of_held
+from silo.workbench.pane.waiting import WaitingRow, can_send, heading, meant_for_another, rows
 
 HERE = "https://silo.example.com"
 

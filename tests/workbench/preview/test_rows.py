@@ -22,9 +22,9 @@ from silo.cli.common import read_assembly
 from silo.cli.main import main
 from silo.registering.closed_files import proposals_for, register_all
 from silo.testing import FakeSilo
-from silo.workbench.commit.plan import Snapshot
+from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.preview.flow import Preview, PreviewRow, RowKind, ask, rows, summary, to_sync
-from silo.workbench.session import Control
+from silo.workbench.session.worker import Control
 from silo_server.run import running_server
 
 CONTROL = Control(lambda _detail, _fraction: None)

@@ -9,9 +9,9 @@ import pytest
 
 from silo.bom.model import BomEntry, Extraction
 from silo.testing import FakeSilo
-from silo.workbench.commit.plan import Snapshot
+from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.preview.flow import MOST_ROWS, PreviewRow, RowKind, ask, rows
-from silo.workbench.session import Control
+from silo.workbench.session.worker import Control
 
 
 @pytest.fixture(name="silo")

@@ -11,9 +11,10 @@ from desk import Document, Office, RegisterWindow
 from silo.bom.errors import ReadOnlyError, SiloError
 from silo.registering.journal import Journal
 from silo.registering.request import Order
+from silo.workbench.activity.box import Action, Do, EntryLine, PaneEntry
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.pane.activity import Action, Do, EntryLine, PaneEntry, Tone
 from silo.workbench.register.flow import RegisterFlow
+from silo.workbench.tone import Tone
 
 
 @pytest.fixture(name="flow")

@@ -18,7 +18,7 @@ from silo.registering.journal import Journal
 from silo.registering.offer import offer
 from silo.testing import FakeSilo
 from silo.workbench.register.flow import APART, NEW, EditedRow, choose, heading
-from silo.workbench.session import Control
+from silo.workbench.session.worker import Control
 
 
 @pytest.fixture

@@ -18,7 +18,8 @@ from other_disk import other_disk
 from silo.api.files import Origin
 from silo.api.wire import Occurrence, Scene, SceneGeometry
 from silo.inertia.geometry.together import mesh_volume
-from silo.workbench.commit.flow import Choice, CommitFlow, Theirs, of_held
+from silo.workbench.colleagues.theirs import Choice, Theirs, of_held
+from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.revisions.flow import RevisionFlow
 
 

@@ -13,7 +13,8 @@ from fcstd_writer import part
 
 from silo.api.files import Origin
 from silo.bom.errors import UnreachableError
-from silo.workbench.commit.flow import Choice, CommitFlow
+from silo.workbench.colleagues.theirs import Choice
+from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.revisions.flow import ProjectFlow, ProjectView, RevisionFlow, file_in_project
 
 

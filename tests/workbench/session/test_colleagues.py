@@ -8,7 +8,7 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.workbench.session.session import Colleagues, Newer
+from silo.workbench.colleagues.announced import Colleagues, Newer
 
 ITEM = "5f0c"
 

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from silo.workbench.session import Control, Job, Worker, collect_due, collection_off
+from silo.workbench.garbage import collect_due, collection_off
+from silo.workbench.session.worker import Control, Job, Worker
 
 WAIT_S = 300  # reached only if the test fails; a busy machine may need minutes
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from silo.bom.errors import CancelledError, InputError, PackageError, SiloError
-from silo.workbench.session import Busy, Control, Job, Worker
+from silo.workbench.session.worker import Busy, Control, Job, Worker
 
 WAIT_S = 300  # reached only if the test fails; a busy machine may need minutes
 

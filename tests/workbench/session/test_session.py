@@ -24,8 +24,9 @@ from silo.outbox.entry import UNKNOWN, Commit, Entry, State
 from silo.outbox.send import Sent, send_all
 from silo.outbox.store import OutboxError, Store
 from silo.platform import stamp_of
-from silo.workbench.commit.opened import Base
-from silo.workbench.session.online import LastIds, Online
+from silo.workbench.documents.opened import Base
+from silo.workbench.session.last_events import LastIds
+from silo.workbench.session.online import Online
 
 
 def commit(

@@ -9,11 +9,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from silo.workbench.commit.flow import Choice, CommitAnswer, Theirs, choice_texts, line_texts, more_text
+from silo.workbench.colleagues.theirs import Choice, Theirs, choice_texts, line_texts, more_text
+from silo.workbench.commit.desk import CommitAnswer
 from silo.workbench.commit.plan import CommitPlan, DocumentRow, DocumentState
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
-from silo.workbench.pane.activity import Tone
+from silo.workbench.tone import Tone
 from silo.workbench.words import counted, plain, tip, told_apart, translate
 
 _CHOICE = 2

@@ -10,7 +10,7 @@ from typing import Any
 
 from silo.freecads import open_in_others
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile
-from silo.workbench.commit.plan import leaves_first
+from silo.workbench.documents.order import leaves_first
 from silo.workbench.freecad import host, identities, saving
 from silo.workbench.freecad.lost import lost_objects, refuse_loss
 from silo.workbench.freecad.modified import is_modified

@@ -13,12 +13,12 @@ from silo.bom.document import saved_by
 from silo.bom.errors import SiloError
 from silo.outbox.store import KEPT_ASIDE_DAYS
 from silo.platform import replacing
+from silo.workbench.activity.box import PaneEntry, own_box
 from silo.workbench.freecad import host
 from silo.workbench.freecad.lost import lost_objects
 from silo.workbench.freecad.modified import mark_modified
 from silo.workbench.gui import qt
-from silo.workbench.pane.activity import PaneEntry, Tone
-from silo.workbench.pane.entries import own_box
+from silo.workbench.tone import Tone
 from silo.workbench.words import filled, plain, translate
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from silo.workbench.gui import qt
 
 if TYPE_CHECKING:
     from silo.inertia.geometry.together import Floats
-    from silo.workbench.revisions.flow import Differences, Ghost
+    from silo.workbench.ghost import Differences, Ghost
 
 
 MM = 1e-3
@@ -74,7 +74,7 @@ class Overlay:
         top, mine
             the assembly in the document, and the objects that it shows.
         """
-        from silo.workbench.revisions.flow import Differences
+        from silo.workbench.ghost import Differences
 
         self.clear()
         whole = doc.getObject(top)

@@ -61,7 +61,7 @@ class Relay(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
         except Exception as error:  # noqa: BLE001  # an exception may not pass through Qt's event loop
             if self._on_error is not None:
                 self._on_error(error)
-        from silo.workbench.session import collect_due  # late: FreeCAD's start waits for this module
+        from silo.workbench.garbage import collect_due
 
         # Long work reports its progress through here, so garbage does not pile up meanwhile.
         collect_due()

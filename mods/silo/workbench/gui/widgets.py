@@ -23,7 +23,7 @@ from typing import Any
 from silo.workbench import words
 from silo.workbench.freecad import host
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets, run_dialog
-from silo.workbench.pane.activity import Tone
+from silo.workbench.tone import Tone
 from silo.workbench.words import translate
 
 # (on a light ground, on a dark ground)

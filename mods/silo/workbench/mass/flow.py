@@ -16,7 +16,7 @@ from silo.bom.errors import CancelledError, SiloError
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt, widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
-from silo.workbench.pane.activity import Tone
+from silo.workbench.tone import Tone
 from silo.workbench.words import plain, tip, translate
 
 if TYPE_CHECKING:

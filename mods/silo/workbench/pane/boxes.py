@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The parts of the Database Activity pane: a box per entry, the banner, work in progress, what waits.
 
-The content of the Activity dock (spec bom-sync §6): it draws :mod:`silo.workbench.pane.activity`.
+The content of the Activity dock (spec bom-sync §6): it draws what :mod:`silo.workbench.session.state` holds.
 """
 
 from __future__ import annotations
@@ -13,24 +13,14 @@ from functools import partial
 from typing import Any
 
 from silo.outbox.entry import host_of, pause_text
+from silo.workbench.activity.box import Action, Do, EntryLine, PaneEntry
+from silo.workbench.activity.feed import gathered
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
-from silo.workbench.pane.activity import (
-    Action,
-    Banner,
-    Do,
-    EntryLine,
-    PaneEntry,
-    Tone,
-    WaitingRow,
-    banner,
-    can_send,
-    gathered,
-    heading,
-    meant_for_another,
-    rows,
-)
-from silo.workbench.session.session import PaneState
+from silo.workbench.pane.banner import Banner, banner
+from silo.workbench.pane.waiting import WaitingRow, can_send, heading, meant_for_another, rows
+from silo.workbench.session.state import PaneState
+from silo.workbench.tone import Tone
 from silo.workbench.words import plain, spoken, translate
 
 # More boxes than this are made only when somebody asks for them: widgets cost time, values do not.

@@ -12,11 +12,11 @@ from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.words import translate
 
 if TYPE_CHECKING:
-    from silo.workbench.pane.activity import Action
+    from silo.workbench.activity.box import Action
     from silo.workbench.pane.boxes import Pane
     from silo.workbench.revisions.dialog import ProjectPane
     from silo.workbench.revisions.flow import ProjectFlow
-    from silo.workbench.session.session import PaneState
+    from silo.workbench.session.state import PaneState
 
 NAME = "Database Activity"
 PROJECT = "Silo Project"

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from silo.bom.errors import SiloError
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
-from silo.workbench.pane.activity import Tone
 from silo.workbench.preview.flow import MOST_CELL, MOST_ROWS, Preview, PreviewRow, RowKind, rows, summary
+from silo.workbench.tone import Tone
 from silo.workbench.words import counted, plain, spoken, tip, translate
 
 if TYPE_CHECKING:

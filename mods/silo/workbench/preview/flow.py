@@ -21,10 +21,11 @@ from silo.bom.items.naming import display_name
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.report import shorten
 from silo.outbox.entry import new_key
-from silo.workbench.commit.flow import CommitFlow, Desk, commit_of
-from silo.workbench.commit.plan import Snapshot
-from silo.workbench.session import Control
+from silo.workbench.commit.flow import CommitFlow, commit_of
+from silo.workbench.documents.snapshot import Snapshot
+from silo.workbench.preview.desk import PreviewDesk
 from silo.workbench.session.session import Session
+from silo.workbench.session.worker import Control
 from silo.workbench.words import MOST_TIP, counted, plain, quantity, spoken, translate
 
 if TYPE_CHECKING:
@@ -468,7 +469,7 @@ class PreviewFlow:
         self,
         session: Session,
         commits: CommitFlow,
-        desk: Desk,
+        desk: PreviewDesk,
         *,
         register: Callable[[str], None],
         show: Callable[[str, tuple[str, ...]], None],

@@ -15,7 +15,6 @@ from silo.registering.request import Order
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.gui.widgets import KEY, ChoiceDelegate, chosen_key
-from silo.workbench.pane.activity import Tone
 from silo.workbench.register.flow import (
     APART,
     NEW,
@@ -34,6 +33,7 @@ from silo.workbench.register.flow import (
     source_words,
     type_words,
 )
+from silo.workbench.tone import Tone
 from silo.workbench.words import plain, spoken, tip, told_apart, translate, visible
 
 if TYPE_CHECKING:

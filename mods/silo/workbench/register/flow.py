@@ -7,7 +7,7 @@
                                        ▲                                          │ identities: GUI thread
                                        ╰─────────────── next numbers ◀── commits ◀┘
 
-FreeCAD and Qt come in through the :class:`~silo.workbench.commit.flow.Desk` only.
+FreeCAD and Qt come in through the :class:`~silo.workbench.register.desk.RegisterDesk` only.
 
 The rows of the Register Parts dialog while a person edits them. Pure; the dialog only draws them.
 """
@@ -32,11 +32,12 @@ from silo.registering.journal import Journal
 from silo.registering.offer import Offer, next_number, offer
 from silo.registering.request import CHOSEN, Order
 from silo.registering.saved_file import picture_in
-from silo.workbench.commit.flow import CommitFlow, Desk
-from silo.workbench.commit.plan import Snapshot
-from silo.workbench.pane.activity import Tone
+from silo.workbench.commit.flow import CommitFlow
+from silo.workbench.documents.snapshot import Snapshot
+from silo.workbench.register.desk import RegisterDesk
 from silo.workbench.session.session import Session
 from silo.workbench.settings import Preferences
+from silo.workbench.tone import Tone
 from silo.workbench.words import counted, filled, plain, translate
 
 NEW = "new"
@@ -521,7 +522,7 @@ class RegisterFlow:
         session: Session,
         preferences: Preferences,
         commits: CommitFlow,
-        desk: Desk,
+        desk: RegisterDesk,
         *,
         journal: Journal | None = None,
     ) -> None:

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import SiloError
-from silo.workbench.commit.flow import Choice, Theirs, choice_texts, more_text
+from silo.workbench.colleagues.theirs import Choice, Theirs, choice_texts, more_text
 from silo.workbench.freecad import host
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets, run_dialog
-from silo.workbench.pane.activity import Tone
 from silo.workbench.revisions.flow import (
     ItemHistory,
     ProjectFlow,
@@ -24,6 +23,7 @@ from silo.workbench.revisions.flow import (
     left_alone,
     over_edits,
 )
+from silo.workbench.tone import Tone
 from silo.workbench.words import plain, spoken, tip, told_apart, translate
 
 if TYPE_CHECKING:

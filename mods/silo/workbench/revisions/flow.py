@@ -24,22 +24,25 @@ from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.files import PROJECT_FILE, Project
 from silo.outbox.store import KEPT_ASIDE_DAYS
 from silo.platform import cache_folder, one_path
-from silo.workbench.commit.flow import Choice, CommitFlow, Desk, Theirs, theirs_of
-from silo.workbench.commit.opened import Base
-from silo.workbench.commit.plan import MOST_S
-from silo.workbench.pane.activity import Tone
-from silo.workbench.pane.entries import own_box
+from silo.workbench.activity.box import own_box
+from silo.workbench.colleagues.theirs import Choice, Theirs, theirs_of
+from silo.workbench.commit.flow import CommitFlow
+from silo.workbench.desk import MOST_S
+from silo.workbench.documents.opened import Base
+from silo.workbench.ghost import Differences, Ghost
+from silo.workbench.revisions.desk import RevisionDesk
 from silo.workbench.session.session import Session
+from silo.workbench.tone import Tone
 from silo.workbench.words import filled, plain, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.wire import Item, Revision
-    from silo.inertia.geometry.together import Floats, Mesh
+    from silo.inertia.geometry.together import Mesh
     from silo.outbox.store import Store
     from silo.vault.project import ProjectState as StandState
     from silo.vault.pull import Pulled
-    from silo.workbench.session import Control
+    from silo.workbench.session.worker import Control
     from silo.workbench.settings import Preferences
 
 MOST_FOUND = 60
@@ -57,25 +60,6 @@ class ItemHistory:
     revisions: tuple[Revision, ...]
     picture: bytes = b""
     base: int | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Ghost:
-    """An occurrence in another revision: its path, (4, 4) to the axes of the top, its triangles there [m]."""
-
-    path: tuple[str, ...]
-    matrix: Floats
-    mesh: Mesh
-
-
-@dataclass(frozen=True)
-class Differences:
-    """How many are only in the other revision, stand elsewhere there, are only here, cannot be compared."""
-
-    removed: int
-    moved: int
-    added: int
-    unknown: int
 
 
 def ghosts(client: SiloClient, part_number: str, revision: int, control: Control) -> list[Ghost]:
@@ -115,7 +99,7 @@ def _in_words(differences: Differences | None, revision: int) -> str:
 class RevisionFlow:
     """One per FreeCAD."""
 
-    def __init__(self, session: Session, desk: Desk) -> None:
+    def __init__(self, session: Session, desk: RevisionDesk) -> None:
         self._session, self._desk = session, desk
         # Of which server, and what it showed without any words.
         self._recent: tuple[str, list[Item]] = ("", [])
@@ -491,7 +475,12 @@ class ProjectFlow:
     """One per FreeCAD: the project folder, how its files stand, and *Commit All*."""
 
     def __init__(
-        self, session: Session, preferences: Preferences, commits: CommitFlow, desk: Desk, files: RevisionFlow
+        self,
+        session: Session,
+        preferences: Preferences,
+        commits: CommitFlow,
+        desk: RevisionDesk,
+        files: RevisionFlow,
     ) -> None:
         self._session, self._preferences, self._commits = session, preferences, commits
         self._desk, self._files = desk, files

@@ -3,15 +3,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
-from time import monotonic
 from typing import Any
 
 from silo.api.client import SiloClient
-from silo.api.config import resolve_server
 from silo.api.events import Connection, EventListener, Pauses
 from silo.api.pause import Pause
 from silo.api.sse import RESET, ServerEvent
@@ -19,11 +15,14 @@ from silo.bom.errors import ConfigError, InputError
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.send import Report, Sent, send_all
 from silo.outbox.store import Store
-from silo.platform import read_memory, write_memory
-from silo.workbench.pane import entries
-from silo.workbench.pane.activity import PaneEntry
-from silo.workbench.session import Control, collection_off
-from silo.workbench.session.session import Newer
+from silo.workbench.activity.box import PaneEntry
+from silo.workbench.activity.events import commit_of_event, of_event
+from silo.workbench.activity.sent import of_sent
+from silo.workbench.colleagues.announced import Newer
+from silo.workbench.garbage import collection_off
+from silo.workbench.session.last_events import LastIds
+from silo.workbench.session.worker import Control
+from silo.workbench.settings.command_line import file_server
 from silo.workbench.settings.server import ServerChoice, ServerPreferences, TokenStore, choose_server
 from silo.workbench.words import translate
 
@@ -164,9 +163,9 @@ class Online:
             self._last_ids.save()
         if event.type == RESET:
             self._newer("", None)
-        elif (announced := entries.commit_of_event(event)) is not None:
+        elif (announced := commit_of_event(event)) is not None:
             self._newer(*announced)
-        entry = entries.of_event(event, self.client.web_url)
+        entry = of_event(event, self.client.web_url)
         if entry is not None:
             self._entry(entry)
 
@@ -174,7 +173,7 @@ class Online:
         if sent.result is not None:
             self._own.add(sent.sync_id)
             self._last_ids.save()  # the event may have come before the answer
-        self._entry(entries.of_sent(sent, self.client.web_url))
+        self._entry(of_sent(sent, self.client.web_url))
         self._sent(sent)
 
 
@@ -199,47 +198,3 @@ class _SharedPauses(Pauses):
 
 def _client(server: ServerChoice) -> SiloClient:
     return SiloClient(server.url, server.token or None, verify=server.verify)
-
-
-def file_server() -> object | None:
-    """Read the server in the configuration file of the command line; None if there is none."""
-    # The environment was read before; here it only says where the file is.
-    env = {name: value for name, value in os.environ.items() if not name.startswith("SILO_")}
-    try:
-        return resolve_server(env=env)
-    except ConfigError:
-        return None
-
-
-SAVE_EVERY_S = 10.0
-
-
-class LastIds:
-    """The last event seen of each server, so that what happened while FreeCAD was closed is shown too."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._known = {url: str(event_id) for url, event_id in read_memory(path).items()}
-        self._saved = dict(self._known)
-        self._due = 0.0
-
-    def get(self, url: str) -> str | None:
-        """Return the id from which to resume; None for a server that we never listened to."""
-        return self._known.get(url)
-
-    def set(self, url: str, event_id: str) -> None:
-        """Remember an event; after a crash, colleagues' events of the last :data:`SAVE_EVERY_S` may be
-        repeated.
-        """
-        self._known[url] = event_id
-        if monotonic() >= self._due:
-            self.save()
-
-    def save(self) -> None:
-        """Write what is new to disk. A lost write costs repeated events, so the disk is not synced here."""
-        self._due = monotonic() + SAVE_EVERY_S
-        if self._known == self._saved:
-            return
-        written = dict(self._known)
-        if write_memory(self._path, written) is None:
-            self._saved = written

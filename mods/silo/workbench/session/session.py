@@ -4,14 +4,12 @@
 Methods are called in the GUI thread and return at once. Work is done by workers, so that a commit is on
 disk at once even while copies take long or the network hangs: for rows, for copies, for the server. Results
 come back through ``deliver``. No widgets here, and no FreeCAD, so that all of it runs in any test.
-
-What colleagues have committed since this FreeCAD runs, as the server announces it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,8 +18,10 @@ from silo.bom.errors import ConfigError, PackageError, SiloError
 from silo.outbox.entry import Commit, State
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.store import OutboxError, Store
-from silo.workbench.pane.activity import Action, Activity, PaneEntry
-from silo.workbench.session import Busy, Control, Deliver, Job, Worker, in_gui
+from silo.workbench.activity.box import Action, PaneEntry
+from silo.workbench.colleagues.announced import Colleagues, Newer
+from silo.workbench.session.state import Listener, PaneState
+from silo.workbench.session.worker import Busy, Control, Deliver, Job, Worker, in_gui
 from silo.workbench.settings.server import ServerChoice, ServerPreferences, TokenStore
 from silo.workbench.words import spoken, translate
 
@@ -29,129 +29,12 @@ if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.pause import Pause
     from silo.outbox.send import Sent
-    from silo.workbench.commit.flow import Theirs
-    from silo.workbench.commit.opened import Base
+    from silo.workbench.colleagues.theirs import Theirs
+    from silo.workbench.documents.opened import Base
     from silo.workbench.session.online import Online
 
     _Looked = tuple[tuple[Waiting, ...], Pause | None]
     """What waits, and why nothing is sent to the server now; read by a worker."""
-
-
-@dataclass(frozen=True)
-class PaneState:
-    """Everything that the pane shows.
-
-    waiting
-        all that is in the outbox, oldest first.
-    pause
-        why nothing is sent to the server now; None where nothing keeps it.
-    theirs
-        id in the outbox → what a colleague's revision changed, for commits that are held because of one; None
-        where there is nothing to compare.
-    newer
-        UUID of an item → the newest commit of it that another FreeCAD has made since this one runs.
-    presence
-        the same in words, for the documents that are open.
-    """
-
-    server: ServerChoice = field(default_factory=ServerChoice)
-    connection: str = "stopped"
-    reason: str = ""
-    busy: Busy | None = None
-    waiting: tuple[Waiting, ...] = ()
-    pause: Pause | None = None
-    theirs: Mapping[int, Theirs | None] = field(default_factory=dict)
-    activity: Activity = field(default_factory=Activity)
-    newer: Mapping[str, Newer] = field(default_factory=dict)
-    presence: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Listener:
-    """Who hears what happens in a session; all calls come through ``deliver``.
-
-    shown
-        something to show has changed.
-    console
-        a line for the report view.
-    sent
-        a commit of this FreeCAD arrived.
-    bug
-        an exception that should not have been.
-    """
-
-    shown: Callable[[PaneState], None] = lambda _shown: None
-    console: Callable[[str], None] = lambda _text: None
-    sent: Callable[[Sent], None] = lambda _sent: None
-    bug: Callable[[BaseException], None] = lambda _error: None
-
-
-@dataclass(frozen=True)
-class Newer:
-    """A commit that the server announced. ``at``: seconds of :func:`time.monotonic`."""
-
-    part_number: str
-    revision: int
-    who: str
-    at: float
-
-
-class Colleagues:
-    """Keeps colleagues' commits apart from our own, which the server announces as well: before our upload has
-    its answer, or after.
-
-    newer
-        UUID of an item → the newest commit of it by somebody else.
-    """
-
-    def __init__(self) -> None:
-        self.newer: Mapping[str, Newer] = {}
-        self._mine: dict[str, int] = {}
-        self._going: set[str] = set()
-        self._unsure: dict[str, Newer] = {}
-
-    def sending(self, identity: str) -> None:
-        """Note that a commit of this item is on its way to the server."""
-        self._going.add(identity.lower())
-
-    def forget_own(self) -> None:
-        """Forget which revisions are ours: the server counts again after a restore."""
-        self._mine.clear()
-
-    def gone(self, seen: Mapping[str, Newer], identities: Iterable[str]) -> None:
-        """Note that the server has nothing newer of these items; what was announced after ``seen`` stays."""
-        stale = {
-            identity
-            for identity in map(str.lower, identities)
-            if self.newer.get(identity) is seen.get(identity)
-        }
-        self.newer = {key: newer for key, newer in self.newer.items() if key not in stale}
-
-    def heard(self, identity: str, newer: Newer) -> None:
-        """Note that the server announced a commit."""
-        if newer.revision <= self._mine.get(identity, 0):
-            return  # Ours, or one that ours was made from or sent on top of.
-        if identity in self._going:
-            self._unsure[identity] = newer
-        else:
-            self.newer = {**self.newer, identity: newer}
-
-    def arrived(self, identity: str, revision: int) -> None:
-        """Note that the server has our commit of an item, as this revision."""
-        identity = identity.lower()
-        self._mine[identity] = max(revision, self._mine.get(identity, 0))
-        newer = self.newer.get(identity)
-        if newer is not None and newer.revision <= revision:
-            self.newer = {key: later for key, later in self.newer.items() if key != identity}
-
-    def sent(self, still_going: Iterable[str]) -> None:
-        """Note that a run of sending has ended. If a commit that was announced meanwhile is not ours, it is a
-        colleague's. Commits of ``still_going`` are still on their way.
-        """
-        unsure, self._unsure, self._going = self._unsure, {}, set()
-        for identity, newer in unsure.items():
-            self.heard(identity, newer)
-        self._going = {identity.lower() for identity in still_going}
 
 
 class Session:
@@ -345,7 +228,7 @@ class Session:
     def _look_again(self) -> None:
         """Look after a restore of the server if an announced commit of a colleague is gone."""
         if seen := self.shown.newer:
-            from silo.workbench.commit.flow import gone  # late, as all that a start does not need
+            from silo.workbench.colleagues.look import gone
 
             title = translate("Silo", "Looking for colleagues' commits")
             self.ask(
@@ -455,7 +338,7 @@ class Session:
             return
 
         def compare(client: SiloClient, control: Control) -> dict[int, Theirs | None]:
-            from silo.workbench.commit.flow import look_held
+            from silo.workbench.colleagues.look import look_held
 
             return {entry.id: look_held(client, self.outbox, entry, control.cancelled) for entry in left}
 

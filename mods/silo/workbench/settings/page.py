@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt, widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets, Relay
-from silo.workbench.pane.activity import Tone
 from silo.workbench.pane.dock import NAME, Dock
 from silo.workbench.session.session import Session
 from silo.workbench.settings import ALLOW, HOLD, Preferences
@@ -36,6 +35,7 @@ from silo.workbench.settings.server import (
     test,
 )
 from silo.workbench.start import INSTALL, Command, missing_packages, packages_hint
+from silo.workbench.tone import Tone
 from silo.workbench.words import QT_TRANSLATE_NOOP, spoken, translate, visible
 
 if TYPE_CHECKING:

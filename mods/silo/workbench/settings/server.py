@@ -188,7 +188,7 @@ def look(preferences: ServerPreferences, keyring: Keyring) -> tuple[ServerChoice
     """Find the server in use, and the keyring's name ("" for none). Worker, since a keyring may take its
     time.
     """
-    from silo.workbench.session.online import file_server
+    from silo.workbench.settings.command_line import file_server
 
     return choose_server(preferences, keyring, file_server=file_server()), keyring.name()
 
@@ -208,7 +208,7 @@ def test(wanted: ServerPreferences, preferences: ServerPreferences, keyring: Key
         the entries on the page, and what was saved before.
     """
     from silo.api.client import SiloClient
-    from silo.workbench.session.online import file_server
+    from silo.workbench.settings.command_line import file_server
 
     entered = replace(preferences, url=wanted.url or preferences.url, verify=wanted.verify)
     server = choose_server(entered, keyring, file_server=file_server())
