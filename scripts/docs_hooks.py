@@ -79,7 +79,8 @@ def decisions() -> str:
 
 def commands() -> str:
     """The help of every command, by theme."""
-    from silo.cli.main import THEMES, build_parser
+    from silo.cli.command_table import THEMES
+    from silo.cli.parser import build_parser
 
     (known,) = (one.choices for one in build_parser()._actions if isinstance(one, argparse._SubParsersAction))
     lines = ["# Commands", "", "As `silo-mod COMMAND --help` prints them."]
@@ -133,7 +134,7 @@ def executed() -> str:
 
 def schemas() -> str:
     """The JSON Schema of each command's --json."""
-    from silo.cli.shapes import NAMES, schema_of
+    from silo.cli.json_schemas import NAMES, schema_of
 
     lines = ["# JSON", "", "As `silo-mod schema COMMAND` prints them (JSON Schema 2020-12)."]
     for name in NAMES:

@@ -332,7 +332,7 @@ String should have at most {n} characters|String should have at least {n} charac
 # What no person reads as it stands, and what has a catalogue of its own.
 _WITHOUT = re.compile(
     r"silo/(workbench/(gui|pane|preview|register|smoke|headless|settings/__init__)|drawing/page|"
-    r"testing\.py|cli/shapes\.py|bom/(headers|standard)\.py|api/wire\.py|"
+    r"testing\.py|cli/json_schemas\.py|bom/(headers|standard)\.py|api/wire\.py|"
     r"fcstd/properties\.py)|silo_server/services/bom/(frozen|transfer)\.py"
 )
 # No text for people.
@@ -392,7 +392,7 @@ def texts_of_sentences(path: Path) -> Iterator[tuple[str, str, Path]]:
                 continue
             lines = _pattern_of(child).split("\n")
             # Many lines are a program, a style or a schema; those of the command line are a help.
-            is_text = len(lines) < 4 or path.parent.name == "cli"
+            is_text = len(lines) < 4 or "cli" in path.parts
             if is_text and not (isinstance(node, ast.Dict) and child in node.keys):
                 found += [(child.lineno, child.col_offset, line) for line in lines]
     for _line, _column, text in sorted(found):
@@ -455,13 +455,13 @@ def _pattern_of(literal: ast.Constant | ast.JoinedStr) -> str:
 def _texts_of_silo(package: Path) -> Iterator[tuple[str, str, Path]]:
     sys.path.insert(0, str(package.parent))
     from silo.bom.findings import FindingCode
-    from silo.cli.main import THEMES
+    from silo.cli.command_table import THEMES
 
     # Lists of commands and of endings, in tables of options.
     lists = {command for commands in THEMES.values() for command in commands}
     lists |= {"{ask}", "{read}", "{servers}", "html", ".html", ".md", "md", ".json", ".xml", ".csv"}
     for word in (*THEMES, *re.split(r"[|\n]", _WORDS.strip())):
-        yield word, "", package / "cli" / "main.py"
+        yield word, "", package / "cli" / "command_table.py"
     yield from _labels_of_server()
     for path in sorted((*package.rglob("*.py"), *(package.parent / "silo_server").rglob("*.py"))):
         name = path.relative_to(package.parent).as_posix()

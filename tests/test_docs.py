@@ -14,7 +14,7 @@ import pytest
 from warm_reader import stand_in
 
 from silo.bom.findings import FindingCode
-from silo.cli.main import build_parser
+from silo.cli.parser import build_parser
 from silo.workbench.settings import DEFAULTS
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -20,7 +20,7 @@ from other_disk import other_disk
 
 from silo.bom.errors import DocumentError
 from silo.bom.report import bom_json
-from silo.cli.common import read_assembly
+from silo.cli.reading import read_assembly
 from silo.fcstd import Library
 from silo.platform import Spelling
 

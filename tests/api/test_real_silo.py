@@ -43,7 +43,8 @@ from silo.api.policy import Retries
 from silo.batch import SyncOptions, TopResult, sync_top
 from silo.bom.errors import AuthError, BusyError, InputError, ServerFaultError, SiloError
 from silo.bom_sync import Status, compare, resolve
-from silo.cli.common import client_of, read_assembly
+from silo.cli.connection import client_of
+from silo.cli.reading import read_assembly
 from silo.inertia.push import PushItem, PushPlan, push
 from silo.outbox.entry import Commit, State, pause_text
 from silo.outbox.send import Report, send_all

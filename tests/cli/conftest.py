@@ -22,8 +22,8 @@ from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.api.policy import Retries
+from silo.cli.json_schemas import schema_of
 from silo.cli.main import main
-from silo.cli.shapes import schema_of
 from silo_server.run import running_server
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "gearbox"

@@ -15,8 +15,10 @@ import pytest
 from fault_proxy import FAULTS, fault_proxy
 
 from silo.bom.errors import Exit
-from silo.cli.main import THEMES, build_parser, main
-from silo.cli.shapes import NAMES, schema_of
+from silo.cli.command_table import THEMES
+from silo.cli.json_schemas import NAMES, schema_of
+from silo.cli.main import main
+from silo.cli.parser import build_parser
 from silo.files import documents_in
 
 DOCS = Path(__file__).parents[2] / "docs"

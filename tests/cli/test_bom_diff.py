@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from fcstd_writer import Doc, XLink, locals_, part
 
-from silo.cli.demo import remove_from_assembly, set_element_count
+from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
 
 
 @pytest.fixture

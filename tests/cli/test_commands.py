@@ -18,7 +18,7 @@ from running_freecad import opened
 
 from silo.api.client import SiloClient
 from silo.bom.errors import BusyError
-from silo.cli.demo import remove_from_assembly, set_element_count
+from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

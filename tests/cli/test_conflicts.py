@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import requests
 
-from silo.cli.demo import remove_from_assembly, set_element_count
+from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
 
 pytestmark = pytest.mark.usefixtures("synced")
 

@@ -17,7 +17,8 @@ import silo
 from silo import spoken
 from silo.bom.errors import Sentences
 from silo.bom.findings import FindingCode
-from silo.cli.main import THEMES, build_parser
+from silo.cli.command_table import THEMES
+from silo.cli.parser import build_parser
 
 CLI = Path(silo.__file__).parent / "cli"
 WORDS = re.compile(r"[A-Za-z]{2}\b")
@@ -197,7 +198,7 @@ def test_each_sentence_is_known_again(german: None) -> None:
 def test_what_the_command_line_prints_goes_through_the_catalogue() -> None:
     """Headings, marks and prompts are said; standard error, and sentences on a console, are said there."""
     found = []
-    for path in sorted(CLI.glob("*.py")):
+    for path in sorted(CLI.rglob("*.py")):
         tree = ast.parse(path.read_text("utf-8"))
         said = {
             id(inner)

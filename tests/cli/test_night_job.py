@@ -17,7 +17,7 @@ from fault_proxy import Fault, Proxy, fault_proxy
 from fcstd_writer import Doc, locals_, part
 
 from silo.bom.errors import InputError
-from silo.cli.common import ProgressPrinter
+from silo.cli.progress import ProgressPrinter
 from silo.fcstd import Library
 from silo.vault.plan import NAME, only_job
 

@@ -22,7 +22,7 @@ from silo.api.wire import Draft, MergeResult
 from silo.bom.model import BomEntry
 from silo.bom_sync import Outcome, Resolved, Status
 from silo.cli.main import main
-from silo.cli.show import outcome_text
+from silo.cli.sync_display import outcome_text
 
 SILO_MOD = shlex.join([sys.executable, "-m", "silo.cli.main"])
 
@@ -120,7 +120,7 @@ def test_a_term_signal_ends_a_command_as_ctrl_c_does(tmp_path: Path) -> None:
     """Exit code 130, with a sentence: nobody takes it for done."""
     (tmp_path / "x.FCStd").touch()
     code = (
-        "import sys, time\nfrom silo.cli import bom, main\n"
+        "import sys, time\nfrom silo.cli import main\nfrom silo.cli.files import bom\n"
         "bom.run_bom = lambda args: (print('up', flush=True), time.sleep(60))\n"
         "sys.argv = ['silo-mod', 'bom', 'x.FCStd']\nsys.exit(main.main())"
     )

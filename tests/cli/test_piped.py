@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from fcstd_writer import Doc, locals_, part
 
-from silo.cli.main import build_parser
+from silo.cli.parser import build_parser
 
 LONG = "bracket of the left hand side, milled from one piece, with a name as people give them to files"
 DEEP = "mechanics/of the machine/parts that we make ourselves"

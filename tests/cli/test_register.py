@@ -21,8 +21,8 @@ from server_testing import sqlite_database
 
 from silo.bom.items.proposal import Proposal
 from silo.bom.model import BomEntry
-from silo.cli.common import read_assembly
-from silo.cli.register import Dialog
+from silo.cli.reading import read_assembly
+from silo.cli.register.questions import Dialog
 from silo.fcstd import open_document
 from silo.registering.candidate import Candidate, ComponentState, Similar
 from silo.registering.closed_files import carry_out_on_disk, proposals_for

@@ -24,7 +24,7 @@ from urllib.parse import parse_qsl
 import pytest
 import yaml
 
-from silo.cli.demo import set_element_count
+from silo.cli.setup.demo_edits import set_element_count
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NEEDED = ("git", "jq", "curl", "bash", "iconv")

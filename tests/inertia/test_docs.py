@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from silo.cli.main import build_parser
+from silo.cli.parser import build_parser
 from silo.inertia.bom.table import BomCode
 from silo.inertia.codes import Decided, MassCode, Rule, Source
 from silo.inertia.notes import GeometryCode

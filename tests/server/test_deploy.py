@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 from server_testing import Api, reserved_port, sqlite_database, wait_until
 
-from silo.cli.main import build_parser
+from silo.cli.parser import build_parser
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import _ENVIRONMENT, Settings
 

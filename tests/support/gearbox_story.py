@@ -15,8 +15,8 @@ from silo.api.client import SiloClient
 from silo.batch import source_document
 from silo.bom.model import walk_entries
 from silo.bom_sync import Outcome, Resolved, resolve, sync_tree
-from silo.cli.common import read_assembly
-from silo.cli.demo import remove_from_assembly, set_element_count
+from silo.cli.reading import read_assembly
+from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
 from silo.registering.closed_files import proposals_for, register_all
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "gearbox"

@@ -781,7 +781,7 @@ def register_elsewhere(top: str, url: str, home: str) -> int:
     """Register a project as another computer does, with data of its own; how many errors it reports."""
     from silo.api.client import SiloClient
     from silo.api.policy import Retries
-    from silo.cli.common import read_assembly
+    from silo.cli.reading import read_assembly
     from silo.registering.closed_files import proposals_for, register_all
 
     for name in HOMES:

@@ -23,8 +23,8 @@ import pytest
 import yaml
 
 from silo.bom.errors import InputError
-from silo.cli.inertia import read_options
-from silo.cli.main import build_parser
+from silo.cli.masses.geometry import read_options
+from silo.cli.parser import build_parser
 
 Run = Callable[..., Any]
 SCHEMA = Path(__file__).parents[3] / "mods" / "silo" / "inertia" / "schema.json"

@@ -20,7 +20,7 @@ from bodies import box, cylinder, placement, shape_only
 from rich.console import Console
 
 from silo.bom.errors import InputError
-from silo.cli.show import console
+from silo.cli.terminal import console
 from silo.inertia.digits import number
 from silo.inertia.links.frames import ASSEMBLY_FRAME, origin_frame
 from silo.inertia.links.link_map import link_map

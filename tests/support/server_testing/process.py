@@ -153,7 +153,7 @@ def _loaded() -> ForkServerContext:
     modules = [
         "psycopg",
         "silo.cli.main",
-        "silo.cli.setup",
+        "silo.cli.setup.server",
         "silo_server.backup",
         "silo_server.run",
     ]

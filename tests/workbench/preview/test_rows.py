@@ -18,8 +18,8 @@ from silo.api.client import SiloClient
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.model import BomEntry, Extraction
 from silo.bom_sync import resolve, sync
-from silo.cli.common import read_assembly
 from silo.cli.main import main
+from silo.cli.reading import read_assembly
 from silo.registering.closed_files import proposals_for, register_all
 from silo.testing import FakeSilo
 from silo.workbench.documents.snapshot import Snapshot

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 from silo import spoken
 from silo.bom.errors import Exit, UnreachableError, counted, exit_of
 from silo.bom_sync import draft_text
-from silo.cli.common import add_options, client_of, print_json, reach, set_sending_step, set_step
+from silo.cli.connection import client_of, reach
+from silo.cli.json_output import print_json
+from silo.cli.options import add_options
+from silo.cli.progress import set_sending_step, set_step
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -137,7 +140,7 @@ def _send_models(belonging: Belonging, client: SiloClient) -> tuple[int, list[st
 def _show_models(models: int, undrawn: list[str]) -> None:
     from rich.text import Text
 
-    from silo.cli.show import console, plain
+    from silo.cli.terminal import console, plain
 
     if models:
         console().print(Text(spoken(f"Silo can show {counted(models, 'more file')} in 3D"), "dim"))
@@ -199,7 +202,7 @@ _MARKS = {
 def _show(belonging: Belonging, standings: list[FileStanding]) -> None:
     from rich.text import Text
 
-    from silo.cli.show import console, plain
+    from silo.cli.terminal import console, plain
 
     out = console()
     out.print(Text(plain(spoken(f"Project {belonging.project.root}")), "bold"))
@@ -243,7 +246,7 @@ def _show_sent(
 ) -> None:
     from rich.text import Text
 
-    from silo.cli.show import console, plain
+    from silo.cli.terminal import console, plain
 
     out = console()
     for row in sent:

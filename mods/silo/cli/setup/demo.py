@@ -13,26 +13,28 @@ import queue
 import secrets
 import shutil
 import uuid
-import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
-from xml.etree import ElementTree
 
 from silo import spoken
 from silo.batch import source_document
 from silo.bom.consolidation import consolidation_findings
-from silo.bom.errors import DocumentError, Exit, InputError, ServerFaultError
+from silo.bom.errors import Exit, InputError, ServerFaultError
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
 from silo.bom_sync import Outcome, Status, activity_text, resolve, sync_tree
-from silo.cli.common import add_options, read_assembly
-from silo.cli.setup import need_server_extra
-from silo.cli.show import activity_box, bom_tree, console, diff_table, findings_text, outcome_text
+from silo.cli.bom_display import bom_tree, diff_table, findings_text
+from silo.cli.options import add_options
+from silo.cli.reading import read_assembly
+from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
+from silo.cli.setup.server import need_server_extra
+from silo.cli.sync_display import activity_box, outcome_text
+from silo.cli.terminal import console
 from silo.files import shipped
-from silo.platform import replace_patiently, scratch_folder
+from silo.platform import scratch_folder
 from silo.registering.closed_files import proposals_for, register_all
 
 if TYPE_CHECKING:
@@ -41,13 +43,15 @@ if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.wire import MergeEvent
 
+
 EXAMPLE = shipped() / "examples" / "gearbox"
+
 TOP = "TopAssembly.FCStd"
+
 # Left without a number on purpose, to show what becomes of such parts.
 UNREGISTERED = "MotorMount"
-EVENT_SECONDS = 20.0
 
-DOCUMENT_XML = "Document.xml"
+EVENT_SECONDS = 20.0
 
 
 def add_demo(parser: argparse.ArgumentParser) -> None:
@@ -227,70 +231,3 @@ class Demo:
                 self.events.get()
         except KeyboardInterrupt:
             self.out.print("\nStopped.")
-
-
-# --- the designer's edits, as FreeCAD would have saved them; only for files that we wrote ourselves ---------
-
-
-def remove_from_assembly(path: Path, label: str) -> None:
-    """Delete the link with this label from the file, as the Delete key in the tree does."""
-
-    def edit(document: ElementTree.Element) -> None:
-        name = _object_with_label(path, document, label)
-        for members in document.iter("LinkList"):
-            for member in [m for m in members if m.get("value") == name]:
-                members.remove(member)
-            members.set("count", str(len(members)))
-        for part in ("Objects", "ObjectData"):
-            listed = _only(path, document.find(part), part)
-            for obj in [o for o in listed if (o.get("name") or o.get("Name")) == name]:
-                listed.remove(obj)
-            listed.set("Count", str(len(listed.findall("Object"))))
-
-    _edit(path, edit)
-
-
-def set_element_count(path: Path, label: str, added: int) -> tuple[int, int]:
-    """Add elements to a link array; returns the count before and after."""
-    counts: list[int] = []
-
-    def edit(document: ElementTree.Element) -> None:
-        name = _object_with_label(path, document, label)
-        data = document.find(f"ObjectData/Object[@name='{name}']")
-        value = _only(path, data, name).find(".//Property[@name='ElementCount']/Integer")
-        number = _only(path, value, "ElementCount")
-        counts.append(int(number.get("value", "0")))
-        number.set("value", str(counts[0] + added))
-
-    _edit(path, edit)
-    return counts[0], counts[0] + added
-
-
-def _object_with_label(path: Path, document: ElementTree.Element, label: str) -> str:
-    for obj in document.iterfind("ObjectData/Object"):
-        text = obj.find("Properties/Property[@name='Label']/String")
-        if text is not None and text.get("value") == label:
-            return obj.get("name", "")
-    raise DocumentError(str(path), f"it holds no object labelled {label!r}")
-
-
-def _only(path: Path, element: ElementTree.Element | None, what: str) -> ElementTree.Element:
-    if element is None:
-        raise DocumentError(str(path), f"it holds no {what}")
-    return element
-
-
-def _edit(path: Path, edit: Callable[[ElementTree.Element], None]) -> None:
-    with zipfile.ZipFile(path) as archive:
-        entries = {info: archive.read(info) for info in archive.infolist()}
-        comment = archive.comment
-    new = path.with_suffix(".new")
-    with zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.comment = comment
-        for info, content in entries.items():
-            if info.filename == DOCUMENT_XML:
-                document = ElementTree.fromstring(content)  # noqa: S314 - a file of our own example
-                edit(document)
-                content = ElementTree.tostring(document, encoding="utf-8", xml_declaration=True)
-            archive.writestr(info, content)
-    replace_patiently(new, path)

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""How a BOM looks on a terminal: as a tree, as a flat table, beside the server's; with its findings."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+from rich.tree import Tree
+
+from silo import spoken
+from silo.bom.document import relative
+from silo.bom.errors import counted
+from silo.bom.findings import Finding, Severity
+from silo.bom.items.naming import display_name
+from silo.bom.model import BomDiff, BomEntry, Extraction
+from silo.bom.report import MOST_LINES, base_of, check_tree_size, diff_rows, shorten
+from silo.cli.terminal import plain, table_of
+
+if TYPE_CHECKING:
+    from silo.api.wire import ProductSummary
+
+
+_MARK = {
+    Severity.ERROR: ("✗", "bold red"),
+    Severity.WARNING: ("⚠", "yellow"),
+    Severity.INFO: ("·", "dim"),
+}
+
+# A line of a comparison, by the field of the diff.
+_DIFFERENCE = {
+    "added": ("+", "green", "new in the assembly"),
+    "quantity_changed": ("~", "yellow", "quantity changed"),
+    "conflicts": ("⚡", "magenta", "manual line; a person decides"),
+    "removed": ("⚠", "yellow", "not referenced by the assembly; kept"),
+    "kept": ("?", "red", "its file is missing; the line is kept"),
+    "manual": ("✎", "blue", "manual line; not touched"),
+}
+
+# A tree longer than this helps nobody on a terminal; a pipe and --json have it all.
+_MOST_LINES = 2000
+
+
+def entry_text(entry: BomEntry, base: str) -> Text:
+    """Write one line of the tree."""
+    text = Text().append(f"{entry.quantity} × ", "bold")
+    if entry.part_number:
+        text.append(plain(entry.part_number), "cyan").append("  ").append(plain(entry.name or ""))
+    else:
+        text.append(plain(display_name(entry) or entry.object_name))
+    where = relative(entry.doc_path, base)
+    text.append(f"  {plain(where)}#{plain(entry.object_name)}", "dim")
+    if entry.missing:
+        text.append(f"  {spoken('missing')}", "bold red")
+    return text
+
+
+def bom_tree(extraction: Extraction, base: str = "") -> Tree:
+    """Draw the multi-level BOM; quantities are per one parent, paths as in :func:`bom_json`."""
+    base = base or base_of(extraction)
+    head = extraction.assembly
+    title = Text(plain(head.part_number or display_name(head)), "bold")
+    if head.name:
+        title.append("  ").append(plain(head.name))
+    title.append(f"  {plain(relative(head.doc_path, base))}#{plain(head.object_name)}", "dim")
+    tree = Tree(title)
+    if not sys.stdout.isatty():
+        check_tree_size(extraction)
+    left = [_MOST_LINES if sys.stdout.isatty() else MOST_LINES]
+
+    def grow(branch: Tree, entries: Iterable[BomEntry]) -> None:
+        for entry in entries:
+            if left[0] <= 0:
+                branch.add(Text(spoken("… more; --json has all"), "dim"))
+                return
+            left[0] -= 1
+            inner = branch.add(entry_text(entry, base))
+            grow(inner, entry.children)
+            grow_own(inner, entry.own)
+
+    def grow_own(branch: Tree, entries: Iterable[BomEntry]) -> None:
+        for entry in entries:
+            branch.add(entry_text(entry, base).append(spoken("  not an item yet"), "yellow"))
+
+    grow(tree, extraction.entries)
+    grow_own(tree, head.own)
+    return tree
+
+
+def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Draw the flat BOM: a purchaser's table of totals."""
+    table = table_of("Part number", "Name", "Quantity", "Unit", "Standard or file", "")
+    for row in rows:
+        file = f"{row['doc_path']}#{row['object']}"
+        table.add_row(
+            Text(plain(row["part_number"] or "–"), "cyan" if row["part_number"] else "dim"),
+            Text(plain(row["name"])),
+            str(row["quantity"]),
+            row["unit"],
+            Text(plain(row["standard"] or file)),
+            Text(spoken("missing") if row["missing"] else "", "bold red"),
+        )
+    return table
+
+
+def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
+    """Write the findings, the worst first."""
+    order = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
+    lines = []
+    for finding in sorted(findings, key=lambda f: order[f.severity]):
+        mark, style = _MARK[finding.severity]
+        lines.append(
+            Text().append(f"{mark} ", style).append(plain(spoken(shorten(finding.message, base))), "")
+        )
+    return Group(*lines)
+
+
+def summary_text(summary: ProductSummary) -> Text:
+    """Write what the server keeps of a product over all levels: what is open, mass and cost."""
+    from silo.bom_sync import summary_texts
+
+    texts, values = summary_texts(summary)
+    lines = [f"⚠ {plain(text)}" for text in texts]
+    rest = len(lines) - MOST_LINES
+    shown = [*lines[:MOST_LINES], f"… and {rest} more"] if rest > 0 else lines or ["✓ nothing is open"]
+    shown += map(plain, values)
+    return Text("\n").join(Text(spoken(line)) for line in (f"In Silo, {plain(summary.part_number)}:", *shown))
+
+
+def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -> RenderableType:
+    """Draw the difference of CAD and server: a row for each line that differs or that a person added.
+
+    whole
+        False if components are missing or have no number: then it is not known that nothing differs.
+    """
+    table = table_of("", "Part number", "Name", "Quantity", "")
+    for kind, number, quantity in diff_rows(diff):
+        mark, style, note = _DIFFERENCE[kind]
+        name = Text(plain(names.get(number, "")))
+        table.add_row(
+            Text(mark, style), Text(plain(number), style), name, quantity, Text(spoken(note), "dim")
+        )
+    if not table.row_count and not whole:
+        text = f"Lines that agree: {len(diff.unchanged)}; the others cannot be compared."
+        return Text(spoken(text), "yellow")
+    if not table.row_count:
+        return Text(spoken(f"No differences; lines that agree: {len(diff.unchanged)}."), "green")
+    if not diff.unchanged:
+        return table
+    return Group(table, Text(spoken(f"{counted(len(diff.unchanged), 'line')} unchanged."), "dim"))

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod pull``: the file of an item with all that it links to, from Silo into a folder."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from silo import spoken
+from silo.bom.errors import Exit, counted
+from silo.cli.connection import client_of, named_item
+from silo.cli.json_output import print_json
+from silo.cli.options import above_zero, add_each, add_options
+from silo.cli.progress import set_step
+from silo.outbox.store import KEPT_ASIDE_DAYS
+
+if TYPE_CHECKING:
+    from silo.vault.pull import Pulled
+
+
+def _revision(text: str) -> int | str:
+    from silo.api.wire import RELEASE_LABEL
+
+    if re.fullmatch(RELEASE_LABEL, text, re.ASCII):
+        return text
+    if not text.isdigit():
+        raise argparse.ArgumentTypeError(f"{text[:50]!r} is neither a number above 0 nor a label such as B")
+    return above_zero(text)
+
+
+def add_pull(parser: argparse.ArgumentParser) -> None:
+    add_each(parser, "part_number", "--revision", metavar="PART_NUMBER", help="the item")
+    parser.add_argument(
+        "--revision",
+        metavar="REVISION",
+        type=_revision,
+        help="the number of a revision of the file, with the linked files as they were then; or the label of "
+        "a released revision, such as B, with all files as they were frozen; else the newest of all",
+    )
+    add_options(
+        parser, {"--replace": "replace files with edits that are not in Silo; a copy of each is kept"}
+    )
+
+
+def run_pull(args: argparse.Namespace) -> int:
+    """Fetch an item's files into a folder. Returns 1 if a file was left alone, or is not in Silo."""
+    from silo.freecads import open_in_any
+    from silo.outbox.store import Store
+    from silo.vault.pull import Rules, fetched, place, pulled_json
+
+    store, into = Store(), Path(args.into)
+    opened = open_in_any()
+    with client_of(args) as client:
+        rules = Rules(
+            overwrite=args.replace,
+            keep=store.keep_aside,
+            is_open=lambda path: not args.even_if_open and opened.has_file(path),
+            learn=lambda sha256, item, number: store.learn(client.base_url, sha256, item, number),
+        )
+        number = named_item(client, args.part_number).part_number
+        progress = lambda name, count: set_step(f"fetching {name}, {counted(count, 'file')} so far")  # noqa: E731
+        with fetched(client, number, args.revision, progress=progress) as tree:
+            into.mkdir(parents=True, exist_ok=True)
+            pulled = place(tree, into, rules)
+    if args.json:
+        print_json(pulled_json(pulled, Path(os.path.realpath(into))))
+    else:
+        _show_pulled(pulled, into)
+    return Exit.DONE if pulled.complete else Exit.UNDONE
+
+
+_MARKS = {
+    "new": ("+", "green", ""),
+    "same": ("=", "dim", "up to date"),
+    "updated": ("~", "yellow", "updated"),
+    "edited": ("✗", "red", "has edits that are not in Silo; left alone (--replace replaces it)"),
+    "overwritten": ("~", "yellow", f"replaced; your file is kept for {KEPT_ASIDE_DAYS} days at"),
+    "open": ("✗", "red", "is open in FreeCAD; left alone (close it, or --even-if-open)"),
+}
+
+
+def _show_pulled(pulled: Pulled, into: Path) -> None:
+    from rich.text import Text
+
+    from silo.cli.terminal import console, plain
+
+    out = console()
+    for file in pulled.files:
+        mark, style, words = _MARKS[file.state.value]
+        text = Text(f"{mark} ", style).append(plain(os.path.relpath(file.path, os.path.realpath(into))))
+        text.append(spoken(f"  {file.part_number}, revision {file.revision}"), "dim")
+        if words:
+            text.append(f"  {spoken(words)}{f' {file.kept}' if file.kept else ''}", style)
+        out.print(text)
+    for lost in pulled.lost:
+        line = f"{lost.position}: {lost.path} was not fetched: {lost.reason}"
+        out.print(Text("✗ ", "bold red").append(plain(spoken(line)), ""))
+    out.print(Text(plain(spoken(f"Open {pulled.top}")), "bold"))

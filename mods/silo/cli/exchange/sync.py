@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod sync``: BOMs to the server; of one file, or of a whole vault every night."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from silo.batch import SyncOptions, TopResult
+from silo.bom.errors import InputError
+from silo.cli.connection import client_of, reach
+from silo.cli.options import EACH
+from silo.cli.progress import count_steps, set_step
+from silo.cli.reading import reading_of, refuse_assembly_of
+from silo.files import check_writable, documents_in
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+    from silo.batch import RunSummary
+
+
+def add_sync(parser: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser.add_argument(
+        "tops", metavar="TOP", nargs="+", help="assembly files, or folders: all assemblies below them"
+    )
+
+
+def run_sync(args: argparse.Namespace) -> int:
+    """Sync each file; one failure does not stop the rest. Returns 1 or 3 if anything was left undone."""
+    from silo.api.policy import NIGHT
+    from silo.batch import ReportFile, RunSummary
+    from silo.vault.plan import only_job
+
+    refuse_assembly_of(args.tops, args.assembly)
+    tops = documents_in(args.tops)
+    if not tops:
+        raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")
+    check_writable(*args.report)
+    folders = [top for top in args.tops if Path(top).is_dir()]
+    base = os.path.realpath(folders[0]) if len(folders) == len(args.tops) == 1 else ""
+    options = SyncOptions(
+        recursive=args.recursive or bool(folders),
+        allow_missing=args.allow_missing,
+        dry_run=args.dry_run,
+        skip_parts=bool(folders),
+    )
+    summary = RunSummary(base)
+    stop = threading.Event()
+    with ExitStack() as stack:
+        for folder in {os.path.realpath(folder): folder for folder in folders}.values():
+            summary.notes += filter(None, [stack.enter_context(only_job(folder))])
+        client = stack.enter_context(client_of(args, NIGHT, stop=stop))
+        reports = [ReportFile(path) for path in args.report]
+        shown = _Shown(args, many=len(tops) > 1)
+        ended = None
+        try:
+            for result in _results(args, tops, options, client, summary, stop):
+                summary.add(result)
+                shown.add(result)
+                for report in reports:
+                    report.add(result)
+            ended = summary
+        finally:
+            for report in reports:
+                report.close(ended)
+            shown.close(ended)
+    for trouble in filter(None, (report.trouble for report in reports)):
+        print(f"silo-mod: {trouble}", file=sys.stderr)
+    return summary.exit_code or int(any(report.trouble for report in reports))
+
+
+def _results(
+    args: argparse.Namespace,
+    tops: Sequence[str],
+    options: SyncOptions,
+    client: SiloClient,
+    summary: RunSummary,
+    stop: threading.Event,
+) -> Iterator[TopResult]:
+    from silo.vault.plan import SyncJob, make_plan
+
+    begin = time.monotonic()
+    with reading_of(args) as reading:
+        if summary.base:
+            reading.index.expect(summary.base)
+        plan = make_plan(
+            tops,
+            reading,
+            assembly=None if args.assembly == EACH else args.assembly,
+            each=options.skip_parts or args.assembly == EACH,
+            hardware=not args.no_hardware,
+            recursive=options.recursive,
+            skip_parts=options.skip_parts,
+            progress=count_steps(len(tops)),
+        )
+        summary.parts, summary.files, summary.fine = plan.parts, plan.parts, plan.parts
+        reading.index.save()
+        summary.seconds["reading"] = time.monotonic() - begin
+        if not plan.uuids and plan.nodes:
+            reach(client)
+        begin = time.monotonic()
+        set_step("asking the server")
+        progress = count_steps(len({node.top for node in plan.nodes.values()}))
+        for result in SyncJob(plan, reading, client, options, summary.base, stop).results():
+            progress(result.top)
+            yield result
+        summary.seconds["server"] = time.monotonic() - begin
+        summary.add_findings(plan.shared)
+        summary.notes += filter(None, [reading.index.trouble])
+        if summary.base:
+            summary.moved += moved(reading.index.places(summary.base), plan.places, summary.base)
+            summary.before = reading.index.told(summary.base)
+            if not options.dry_run:  # a look takes no news from the report of the night
+                reading.index.keep_places(summary.base, plan.places)
+                if not summary.unsent:  # else the findings are not known, and all would be new the next time
+                    reading.index.keep_told(summary.base, summary.told())
+            reading.index.forget(summary.base, {os.path.realpath(top) for top in tops})
+
+
+class _Shown:
+    """What standard output gets: JSON as the run goes, or what changed, and errors last."""
+
+    def __init__(self, args: argparse.Namespace, *, many: bool) -> None:
+        from silo.batch import Json
+
+        self._json, self._many, self._count = Json() if args.json else None, many, 0
+        if self._json is not None:
+            print(self._json.head(None), end="")
+
+    def add(self, result: TopResult) -> None:
+        if self._json is not None:
+            print(self._json.one(result, self._count), end="")
+            self._count += 1
+        else:
+            _show(result, whole=not self._many)
+
+    def close(self, summary: RunSummary | None) -> None:
+        if self._json is not None:
+            print(self._json.end(summary), end="")
+        elif summary is not None and self._many:
+            _show_summary(summary)
+
+
+def _show(result: TopResult, *, whole: bool) -> None:
+    """Show a result. ``whole``: everything about the one file; otherwise only what changed, since the summary
+    has the rest.
+    """
+    from silo.batch import is_news
+    from silo.bom_sync import Status
+    from silo.cli.bom_display import diff_table, findings_text
+    from silo.cli.sync_display import outcome_text
+    from silo.cli.terminal import console, plain
+
+    out = console()
+    if result.error is not None:
+        words = str(result.error)
+        where = "" if os.path.basename(result.top) in words else f"{result.top}: "
+        out.print(f"✗ {plain(where + words)}", style="red", markup=False)
+        return
+    for outcome in result.outcomes:
+        if not whole and not is_news(outcome):
+            continue
+        out.print(outcome_text(outcome, result.base))
+        if outcome.plan is not None and outcome.status in (Status.MERGED, Status.DRY_RUN):
+            out.print(diff_table(outcome.plan.diff, outcome.names))
+    if whole and result.findings:
+        out.print(findings_text(result.findings, result.base))
+
+
+def _show_summary(summary: RunSummary) -> None:
+    from silo.cli.terminal import console, plain
+
+    out = console()
+    out.print(f"\n{plain(summary.sentence())}", markup=False)
+    for title, lines in summary.sections():
+        if lines:
+            out.print(f"\n{title}", style=_STYLES.get(title, ""))
+        for line, more in lines:
+            out.print(f"  {plain(line)}", markup=False)
+            for text in more:
+                out.print(f"    {plain(text)}", markup=False)
+
+
+_STYLES = {"New since the last run": "bold", "Moved": "cyan", "Warnings": "yellow", "Errors": "bold red"}
+
+
+def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> list[tuple[str, str, str]]:
+    """Find the files that took over the identity of a file that is gone, or that has another item now: (name,
+    before, now).
+    """
+    from silo.bom.document import relative
+
+    here: dict[str, set[str]] = {}
+    for uuid, path in now:
+        here.setdefault(uuid, set()).add(path)
+    taken = {path for _, path in now}
+    result = []
+    for uuid, paths in sorted(before.items()):
+        left = paths - here.get(uuid, set())
+        gone = {path for path in left if path in taken or not os.path.lexists(path)}
+        new = here.get(uuid, set()) - paths
+        if len(gone) == len(new) == 1:
+            (old_path,), (new_path,) = gone, new
+            name = os.path.splitext(os.path.basename(new_path))[0]
+            result.append((name, relative(old_path, base), relative(new_path, base)))
+    return result

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod log``: the revisions of a file's item; with ``--since`` what changed in a product."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from typing import TYPE_CHECKING, Any
+
+from silo import spoken
+from silo.bom.errors import Exit, InputError, SiloError
+from silo.cli.connection import client_of
+from silo.cli.json_output import print_json
+from silo.cli.options import add_each, add_options, only_with
+from silo.cli.progress import set_step
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+    from silo.api.wire import Item, ProductChanges, Revision
+    from silo.outbox.store import Store
+
+
+def add_log(parser: argparse.ArgumentParser) -> None:
+    add_each(
+        parser,
+        "file",
+        metavar="FILE",
+        help="a FreeCAD file that is registered; with --since a part number as well",
+    )
+    points = {
+        "--since POINT": "what changed in the product on all levels since then: a day such as 2026-02-08, "
+        "a revision of the item such as r3, or a frozen revision such as A",
+        "--until POINT": "up to then (now)",
+    }
+    add_options(parser, points)
+    only_with(parser, "--since", "--until")
+    add_options(parser, {"--changes": "what each revision changed in the BOM"})
+
+
+def run_log(args: argparse.Namespace) -> int:
+    """Print the revisions, newest first; or what changed in the product."""
+    from silo.files import sha256_of
+    from silo.outbox.store import Store
+    from silo.vault.pull import RevisionBoms, file_revisions, words
+
+    path = os.path.realpath(args.file)
+    if args.since:
+        with client_of(args) as client:
+            number = args.file
+            if os.path.isfile(path):
+                number = _item_of(client, args.file, _identity(args.file, path)).part_number
+            _show_changes(args, client.get_changes(number, args.since, args.until or ""))
+        return Exit.DONE
+    if not os.path.isfile(path):
+        raise InputError(f"{args.file} is not a file. Give the path of an FCStd file.")
+    identity = _identity(args.file, path)
+    with client_of(args) as client:
+        item = _item_of(client, args.file, identity)
+        revisions = client.revisions(item.part_number)
+        shown = revisions[: args.limit]
+        here = _revision_on_disk(Store(), sha256_of(path), identity, client.base_url, revisions)
+        changes: dict[int, str] = {}
+        if args.changes:
+            files = file_revisions(revisions)
+            with RevisionBoms(client, item.part_number, path) as boms:
+                for number, revision in enumerate(files):
+                    set_step(f"revision {revision.revision_number}")
+                    if revision.revision_number < shown[-1].revision_number:
+                        break
+                    older = files[number + 1].revision_number if number + 1 < len(files) else None
+                    try:
+                        changes[revision.revision_number] = words(
+                            boms.change(older, revision.revision_number)
+                        )
+                    except SiloError as error:
+                        changes[revision.revision_number] = f"cannot be read: {error}"
+    if args.json:
+        print_json(_log_json(item.part_number, shown, here, changes, args.changes))
+    else:
+        _show_log(item.part_number, item.name, shown, here, changes, len(revisions))
+    return Exit.DONE
+
+
+def _identity(name: str, path: str) -> str:
+    from silo.fcstd import Library
+    from silo.fcstd.linked import identity_in
+
+    with Library() as library:
+        library.open(path)
+        identity = identity_in(library, path)
+    if not identity:
+        raise InputError(f"{name} belongs to no single item in Silo; register it (silo-mod register)")
+    return identity
+
+
+def _item_of(client: SiloClient, name: str, identity: str) -> Item:
+    item = client.get_item_by_uuid(identity)
+    if item is None:
+        raise InputError(f"{name}: this server has no item {identity}; is it the right server?")
+    return item
+
+
+def _show_changes(args: argparse.Namespace, changes: ProductChanges) -> None:
+    if args.json:
+        print_json(changes.model_dump(mode="json"))
+        return
+    from rich.text import Text
+
+    from silo.cli.terminal import console, plain, table_of
+
+    out = console()
+    first, last = (when.strftime("%Y-%m-%d %H:%M") if when else "" for when in (changes.since, changes.to))
+    head = f"{changes.part_number}: what changed from {first} to {last} (UTC)"
+    if not changes.changes:
+        out.print(f"{plain(head)}: nothing on any level", markup=False)
+        return
+    out.print(Text(plain(spoken(head)), "bold"))
+    table = table_of("", "Part number", "Name", "In", "Before", "After", "By")
+    styles = {"added": "green", "removed": "red"}
+    for change in changes.changes:
+        when = f", {change.at:%Y-%m-%d %H:%M}" if change.at else ""
+        cells = (
+            change.part_number,
+            change.name,
+            change.within,
+            change.before,
+            change.after,
+            change.username + when,
+        )
+        what = Text(spoken(change.what), styles.get(change.what, "yellow"))
+        table.add_row(what, *(Text(plain(cell)) for cell in cells))
+    out.print(table)
+
+
+def _revision_on_disk(
+    store: Store, sha256: str, identity: str, server: str, revisions: list[Revision]
+) -> tuple[int | None, bool]:
+    """Return the revision that the file is or was made from, and if it has edits since."""
+    from silo.api.revisions import standing
+
+    for content, edited in ((sha256, False), (store.origin_of(sha256), True)):
+        number = store.known_revision(server, content, identity)
+        if (base := standing(revisions, content, number).base) is not None:
+            return base.revision_number, edited
+    return None, True
+
+
+def _log_json(
+    number: str,
+    shown: list[Revision],
+    here: tuple[int | None, bool],
+    changes: dict[int, str],
+    with_bom: bool,
+) -> dict[str, Any]:
+    keys = {
+        "revision_number",
+        "comment",
+        "created_by",
+        "created_at",
+        "file_name",
+        "file_size",
+        "base_revision",
+    }
+    rows = []
+    for revision in shown:
+        row = revision.model_dump(mode="json", include=keys)
+        rows.append({**row, "bom": changes.get(revision.revision_number)} if with_bom else row)
+    return {"part_number": number, "file_is": here[0], "edited": here[1], "revisions": rows}
+
+
+def _show_log(
+    number: str,
+    name: str,
+    shown: list[Revision],
+    here: tuple[int | None, bool],
+    changes: dict[int, str],
+    total: int,
+) -> None:
+    from rich.text import Text
+
+    from silo.cli.terminal import console, plain
+
+    out = console()
+    out.print(Text(plain(f"{number}  {name}"), "bold"))
+    if here[0] is None:
+        out.print("This file is no revision in Silo, and it is not known which one it was made from.")
+    for revision in shown:
+        stamp = revision.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if revision.created_at else ""
+        text = Text(f"{revision.revision_number:>4}  ", "cyan")
+        text.append(f"{stamp}  {plain(revision.created_by or '')}  ", "dim")
+        text.append(plain(revision.comment) or spoken("(no comment)"))
+        if not (revision.file_name or revision.file_checksum):
+            text.append(spoken("  properties only"), "dim")
+        if revision.revision_number == here[0]:
+            text.append(spoken("  ← this file, edited since" if here[1] else "  ← this file"), "green")
+        out.print(text)
+        if said := changes.get(revision.revision_number):
+            out.print(Text(f"      {plain(spoken(said))}", "yellow"))
+    if total > len(shown):
+        out.print(Text(spoken(f"… and {total - len(shown)} older; --limit shows more"), "dim"))

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod order``: what to order for so many pieces of a product."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.text import Text
+
+from silo import spoken
+from silo.bom.errors import Exit, counted
+from silo.cli.connection import client_of, named_item
+from silo.cli.json_output import print_json
+from silo.cli.options import above_zero, add_each, add_options, only_with
+from silo.cli.terminal import console, plain, table_of
+
+if TYPE_CHECKING:
+    from silo.api.wire import OrderList
+
+
+def add_order(parser: argparse.ArgumentParser) -> None:
+    add_each(
+        parser, "part_number", "--revision", "--csv", "--xlsx", metavar="PRODUCT", help="its part number"
+    )
+    parser.add_argument("--quantity", metavar="N", type=above_zero, default=1, help="for so many pieces (1)")
+    add_options(
+        parser,
+        {
+            "--revision REVISION": "of a released revision, such as B (else of the draft)",
+            "--spares PERCENT": "so many percent more of each part",
+            "--rest": "without what was ordered already",
+            "--csv FILE": "write a table as CSV (- for standard output)",
+            "--xlsx FILE": "write a table as a workbook",
+            "--supplier NAME": "only what this supplier sells",
+        },
+    )
+    kinds = ("bought", "made", "unsaid")
+    parser.add_argument("--kind", choices=kinds, default="bought", help="only these parts (bought)")
+    only_with(parser, "--csv --xlsx", "--kind", "--supplier")
+
+
+def run_order(args: argparse.Namespace) -> int:
+    """Print what to order, or write it as a table."""
+    from silo.files import check_writable
+    from silo.platform import replacing
+
+    asked = {"pieces": args.quantity, "spares": args.spares, "release": args.revision, "rest": args.rest}
+    given = {name: str(value) for name, value in asked.items() if value}
+    table = {"kind": args.kind} | ({"supplier": args.supplier} if args.supplier else {})
+    check_writable(*(path for path in (args.csv, args.xlsx) if path and path != "-"))
+    with client_of(args) as client:
+        number = named_item(client, args.part_number).part_number
+        for end, path in (("csv", args.csv), ("xlsx", args.xlsx)):
+            data = client.get_order_table(number, end, **given, **table) if path else b""
+            if end == "csv" and path == "-":
+                sys.stdout.write(data.decode("utf-8-sig").replace("\r\n", "\n"))
+            elif path:
+                with replacing(Path(path)) as file:
+                    file.write(data)
+        if args.json:
+            print_json(client.get_order(number, **given).model_dump(mode="json"))
+        elif args.csv != "-":
+            _print_order(client.get_order(number, **given))
+    return Exit.DONE
+
+
+def _print_order(order: OrderList) -> None:
+    from silo.api.wire import SupplierPart
+
+    out = console()
+    head = (
+        f"{order.part_number}: what to order for {order.pieces} with {order.spares} % spares. {order.state}"
+    )
+    out.print(Text(plain(spoken(head)), "bold"))
+    for warning in order.warnings:
+        out.print(Text(f"⚠ {plain(spoken(warning))}", "yellow"))
+    titles = ("Part number", "Name", "Needed", "Ordered", "Quantity", "Supplier", "Its number", "Cost")
+    table = table_of("", *titles, "")
+    empty = SupplierPart(supplier="", currency="")
+    for part in sorted(order.parts, key=lambda part: (part.kind, (part.supplier_part or empty).supplier)):
+        of = part.supplier_part or empty
+        price = f"{part.quantity} at {part.price} {of.currency}" if part.price else part.quantity or ""
+        cells = (
+            *(spoken(part.kind), part.part_number, part.name, f"{part.needed} {part.unit or ''}"),
+            *(part.ordered, spoken(price), of.supplier, of.number),
+            f"{part.cost or ''} {of.currency}".strip(),
+            "; ".join((*map(spoken, part.remarks), *(file.name for file in part.files))),
+        )
+        table.add_row(*(Text(plain(cell)) for cell in cells))
+    if order.parts:
+        out.print(table)
+        days = "not known" if order.lead_time_days is None else counted(order.lead_time_days, "day")
+        cost, without = f"{order.total_cost} {order.currency}", counted(order.unpriced, "part")
+        total = f"Cost: {cost}, without {without}" if order.unpriced else f"Cost: {cost}"
+        out.print(Text(spoken(f"{total}\nLongest lead time: {days}")))

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""JSON on standard output, in characters that the output can encode."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+
+def print_json(data: Any) -> None:
+    """Print JSON on standard output; escaped if that is not UTF-8, or if a file's name is not."""
+    print(json_text(data, indent=2))
+
+
+def json_text(data: Any, indent: int | None = None) -> str:
+    """Write JSON with characters that standard output can encode."""
+    text = json.dumps(data, indent=indent, ensure_ascii=False)
+    unicode = (getattr(sys.stdout, "encoding", None) or "utf-8").lower().replace("-", "") == "utf8"
+    try:
+        text.encode("utf-8" if unicode else "ascii")
+    except UnicodeEncodeError:
+        return json.dumps(data, indent=indent)
+    return text

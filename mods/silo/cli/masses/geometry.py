@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The geometry of a model, read with the options of a command and with its progress shown."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from silo.cli.progress import set_step
+
+if TYPE_CHECKING:
+    from silo.inertia.assembly import Assembly
+    from silo.inertia.geometry import ReadOptions
+
+
+def read_options(args: argparse.Namespace, **more: Any) -> ReadOptions:
+    """Make the options for reading geometry from the arguments."""
+    from silo.inertia.geometry import ReadOptions
+
+    return ReadOptions(
+        mesh_unit=args.mesh_unit,
+        timeout_s=args.timeout,
+        processes=args.geometry_jobs,
+        siblings=not args.no_siblings,
+        cache=not args.no_cache,
+        **more,
+    )
+
+
+def read_model(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
+    """Read the geometry, and show the progress on standard error; Ctrl-C stops it at once."""
+    from silo.inertia.calculator import read_geometry
+
+    with _progress(Path(path).name) as progress:
+        assembly = read_geometry(path, read_options(args, progress=progress, **more))
+    set_step("calculating")
+    return assembly
+
+
+@contextmanager
+def _progress(name: str) -> Iterator[Any]:
+    if not sys.stderr.isatty():
+        yield lambda progress: set_step(f"{name}: {progress}")
+        return
+    set_step("")  # the bar says it
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    bar = Progress(
+        TextColumn("{task.fields[file]}: {task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total}"),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task("reading", total=None, file=name)
+
+        def told(progress: Any) -> None:
+            bar.update(
+                task, description=progress.stage, completed=progress.done, total=progress.total or None
+            )
+
+        yield told

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The options that ``silo-mod inertia``, ``mass`` and ``links`` share, and the tables that they name.
+
+Bad numbers and files are refused before the geometry is read, which may take minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from silo.bom.errors import ConfigError, InputError
+from silo.cli.options import add_options, job_count, only_with
+
+if TYPE_CHECKING:
+    from silo.inertia.bom.table import BomTable
+    from silo.inertia.materials.table import MaterialTable
+
+
+def add_geometry_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options for how files are read."""
+    group = parser.add_argument_group("geometry")
+    add_options(group, {"--mesh-unit UNIT": "length unit of meshes that state none (mm, cm, m, in)"})
+    group.add_argument(
+        "--timeout", type=float, default=600.0, metavar="S", help="give up reading after S seconds"
+    )
+    group.add_argument(
+        "--jobs",
+        type=job_count,
+        dest="geometry_jobs",
+        default=0,
+        metavar="N",
+        help="processes that read one large file or split assembly (default: the processors)",
+    )
+    add_options(
+        group,
+        {
+            "--no-siblings": "do not look for the files of split assemblies",
+        },
+    )
+
+
+def add_material_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options for where densities come from."""
+    group = parser.add_argument_group("materials")
+    add_options(
+        group,
+        {
+            "--materials FILE...": "your own densities (.csv or .toml)",
+            "--no-freecad-materials": "do not look into an installed FreeCAD's cards",
+        },
+    )
+
+
+def add_bom_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options for how the BOM is read if it is detected wrongly."""
+    group = parser.add_argument_group("BOM")
+    add_options(
+        group,
+        {
+            "--bom BOM": "CSV, XLSX, XLS or ODS; names, masses or materials",
+            "--column ROLE=HEADER...": (
+                "a renamed column; roles: name, part_number, description, material, mass, total_mass,"
+                " mass_unit, quantity, item, level, find_number"
+            ),
+        },
+    )
+    group.add_argument("--encoding", help="of the BOM, for example cp1252")
+    group.add_argument("--delimiter", help="of the BOM, one character")
+    group.add_argument("--decimal", choices=(".", ","), help="decimal mark of the BOM")
+    add_options(group, {"--mass-unit UNIT": "of masses without one (kg, g, lb, …)"})
+    only_with(parser, "--bom", "--column", "--encoding", "--delimiter", "--decimal", "--mass-unit")
+
+
+def add_result_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options for where results go, and when a warning is a failure."""
+    group = parser.add_argument_group("results")
+    add_options(
+        group,
+        {
+            "--preview FILE...": (
+                "write a 3D scene (.glb) with centres of mass and inertia ellipsoids; may be repeated"
+            ),
+            "--strict": "exit 1 where there is any warning",
+            "--allow CODE...": "with --strict: this warning is fine",
+        },
+    )
+    only_with(parser, "--strict", "--allow")
+
+
+def add_push_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options for sending results to Silo."""
+    group = parser.add_argument_group("back to Silo")
+    add_options(
+        group,
+        {
+            "--push": "write mass, volume and centre of mass into the items' properties",
+            "--dry-run": "with --push: only show what would be written",
+        },
+    )
+    only_with(parser, "--push", "--dry-run", "--item", "--server", "--token")
+
+
+def need_inertia_extra() -> None:
+    """Raise ConfigError if the extra is not installed."""
+    missing = [name for name in ("numpy", "OCP", "trimesh", "yaml") if find_spec(name) is None]
+    if missing:
+        raise ConfigError(
+            f"mass and inertia need the packages of the extra “inertia” ({', '.join(missing)} not found); "
+            "install them with: pip install 'silo-mod[inertia]'"
+        )
+
+
+def bom_table(args: argparse.Namespace) -> BomTable | None:
+    """Read the BOM that the user's options name; None if they name none."""
+    from silo.inertia.bom.parser import BOMParser
+
+    columns = named_values(args.column, "--column", "ROLE=HEADER, for example mass=Gewicht")
+    delimiter = "\t" if args.delimiter in ("\\t", "tab") else args.delimiter
+    parser = BOMParser(
+        columns=columns,
+        encoding=args.encoding,
+        delimiter=delimiter,
+        decimal=args.decimal,
+        mass_unit=args.mass_unit,
+    )
+    return parser.parse(args.bom) if args.bom else None
+
+
+def named_values(texts: Sequence[str], option: str, wanted: str) -> dict[str, str]:
+    if bad := [text for text in texts if "=" not in text]:
+        raise InputError(f"{option} wants {wanted}; got “{bad[0]}”")
+    return {name.strip(): value.strip() for name, _, value in (text.partition("=") for text in texts)}
+
+
+def material_table(args: argparse.Namespace) -> MaterialTable:
+    """Load the material table that the user's options name."""
+    from silo.inertia.materials.table import load_materials
+
+    return load_materials(args.materials, freecad=not args.no_freecad_materials)
+
+
+def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
+    """Report bad numbers, output files and a missing server before minutes of reading, not after."""
+    from silo.inertia.materials.densities import checked_density
+
+    if args.default_density is not None:
+        checked_density(args.default_density)
+    if not (args.timeout >= 0 and math.isfinite(args.timeout)):
+        raise InputError(f"--timeout: wanted seconds, 0 for no limit, got {args.timeout:g}")
+    if asks_server:
+        from silo.api.config import resolve_server
+
+        resolve_server(args.server, args.token)
+    check_outputs(args)
+
+
+def check_outputs(args: argparse.Namespace) -> None:
+    """Raise InputError for files that cannot be written, or must not be: an input file, or one file twice."""
+    from silo.inertia.geometry.graph import is_model_name
+
+    report: list[str] = getattr(args, "report", [])
+    single = [getattr(args, name) for name in ("urdf_out", "out") if getattr(args, name, None)]
+    written = [*report, *args.preview, *single]
+    for name in single:
+        if is_model_name(Path(name)) and os.path.lexists(name):
+            raise InputError(f"{name} is there already and is named like a model; write to another file")
+    if bad := [name for name in args.preview if Path(name).suffix.lower() != ".glb"]:
+        raise InputError(f"--preview writes .glb, --report FILE.html a page to look at; got {', '.join(bad)}")
+    read = [getattr(args, "top", args.assembly), *getattr(args, "materials", [])]
+    read += filter(None, (getattr(args, name, None) for name in ("bom", "links", "urdf")))
+    inputs = {os.path.realpath(name) for name in read}
+    for name in written:
+        if not Path(name).absolute().parent.is_dir():
+            raise InputError(f"{name}: there is no folder {Path(name).parent}")
+        if (real := os.path.realpath(name)) in inputs:
+            raise InputError(f"{name} is read by this command, or written twice; write to another file")
+        inputs.add(real)

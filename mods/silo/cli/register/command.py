@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod register``: items for components without a number, and the identity into their files.
+
+Asked one by one, as a table to edit (``--plan``, ``--apply``), or all at once (``--yes``). ``--adopt`` takes
+over what another server knows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from silo.bom.document import relative
+from silo.bom.errors import Exit, InputError
+from silo.bom.model import Extraction, walk_entries
+from silo.bom.report import base_of
+from silo.cli.connection import client_of
+from silo.cli.options import add_options, add_top, not_with, only_with
+from silo.cli.reading import plan_of, read_tops
+from silo.cli.register.declaring import declare, undeclare
+from silo.cli.register.orphans import orphans
+from silo.cli.register.run import RegisterProgress, RegisterRun, warn_of_rules
+from silo.files import check_writable
+from silo.registering.closed_files import seen_on_disk, whole_folder
+from silo.registering.items import Journal
+from silo.registering.offer import Offer, offer
+from silo.registering.table import read_table
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+
+
+def add_register(parser: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    add_top(parser, "--plan", "--apply", "--declare", "--undeclare", "--not-a-part")
+    how = parser.add_mutually_exclusive_group()
+    add_options(
+        how,
+        {
+            "--yes": "take every proposal without asking",
+            "--adopt": (
+                "take over what was registered on another server: an item for each identity that this"
+                " server does not know, with the same UUID"
+            ),
+        },
+    )
+    how.add_argument(
+        "--orphans",
+        choices=("list", "archive"),
+        help="the items of interrupted registrations, which no file names: list or archive them",
+    )
+    add_options(
+        how,
+        {
+            "--plan FILE": "write the proposals as a table (CSV) to edit; no more",
+            "--apply FILE": "register what an edited table says",
+        },
+    )
+    parser.add_argument(
+        "--duplicates",
+        choices=("leave", "join", "new"),
+        default="leave",
+        help="with --yes, what Silo seems to have already: leave it out and say so (default), join the one "
+        "item that it seems to be, or make a new item",
+    )
+    parser.add_argument(
+        "--unclear",
+        choices=("ask", "take", "new"),
+        default="ask",
+        help="an item may be that of a part: made by an interrupted run, or registered from this document "
+        "before (which may be a copy now): ask (default), take it where only one fits, or make a new one",
+    )
+    add_options(
+        parser,
+        {
+            "--declare OBJECT...": (
+                "count what is modelled in the assembly's own file (name or label); equal copies are one item"
+            ),
+            "--apart": "with --declare: an item for each copy",
+            "--undeclare OBJECT...": (
+                "take back a decision about an object in the assembly's own file: its identity, whose"
+                " item stays, or that it is no part"
+            ),
+            "--not-a-part OBJECT...": (
+                "say of what is modelled in the assembly's own file that it is no part; the file keeps that"
+            ),
+        },
+    )
+    parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
+    only_with(parser, "--yes", "--duplicates")
+    only_with(parser, "--declare", "--apart")
+    not_with(parser, "--undeclare", "--declare", "--category", "--not-a-part")
+    not_with(parser, "--not-a-part", "--declare", "--category")
+    not_with(parser, "--apply", "--category")
+
+
+def run_register(args: argparse.Namespace) -> int:
+    """Register what is unregistered; returns 1 if something was skipped or failed."""
+    taken = args.undeclare or args.not_a_part
+    if args.orphans:
+        return orphans(args)
+    if not (args.yes or args.adopt or args.plan or args.apply or taken or sys.stdin.isatty()):
+        raise InputError(
+            "register asks before it creates items, and there is nobody to ask here; say --yes, "
+            "or write a table with --plan FILE, edit it, and use it with --apply FILE"
+        )
+    if args.plan and args.json:
+        raise InputError("--plan writes a table and no JSON; leave out --json")
+    if (args.declare or taken) and (args.plan or args.apply or os.path.isdir(args.top)):
+        raise InputError("--declare, --undeclare and --not-a-part are for one file, and not for a table")
+    if taken:
+        return undeclare(args)
+    if args.declare:
+        return declare(args)
+    if args.plan and args.plan != "-":
+        check_writable(args.plan)
+        if os.path.lexists(args.plan):
+            raise InputError(f"{args.plan} is there already, and may hold edits; name another file")
+    rows = read_table(Path(args.apply).read_bytes(), args.apply) if args.apply else []
+    extraction, unused, unread = _read(args)
+    base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_of(extraction)
+    with client_of(args) as client:
+        schema = client.find_schema(args.schema)
+        offer_made = _offer(extraction, client, schema, args)
+        warn_of_rules(offer_made.categories)
+        if args.category and args.category not in offer_made.categories:
+            text = ", ".join(offer_made.categories)
+            raise InputError(f"--category: schema {schema} has no {args.category}; it has {text}")
+        code = RegisterRun(args, client, schema, offer_made, base).as_asked(rows, unused)
+        return code or (Exit.UNDONE if unread else Exit.DONE)
+
+
+def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
+    """Read the components, the files that no assembly uses, and if any file cannot be read."""
+    if not os.path.isdir(args.top):
+        extraction = read_tops(args)[0]
+        return extraction, frozenset(), _tell_missing(extraction, base_of(extraction))
+    with plan_of(args) as (plan, reading, base):
+        for path, error in plan.errors.items():
+            print(f"silo-mod: {relative(path, base)} is left out: {error}", file=sys.stderr)
+        extraction, unused = whole_folder(plan, reading, base, hardware=not args.no_hardware)
+        return extraction, unused, _tell_missing(extraction, base) or bool(plan.errors)
+
+
+def _tell_missing(extraction: Extraction, base: str) -> bool:
+    """Report the missing files, which nobody can register."""
+    from silo.cli.terminal import plain
+
+    missing = {entry.doc_path for entry in walk_entries(extraction.entries) if entry.missing}
+    for path in sorted(missing):
+        print(f"silo-mod: {plain(relative(path, base))} is left out: it is not there", file=sys.stderr)
+    return bool(missing)
+
+
+def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argparse.Namespace) -> Offer:
+    folder = os.path.isdir(args.top)
+    paths = {entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))}
+    seen = seen_on_disk(paths, even_if_open=args.even_if_open)
+    journal = Journal()
+    offer_made = offer(
+        extraction,
+        seen,
+        client,
+        schema,
+        RegisterProgress(),
+        journal.pending(),
+        most=None,
+        own_file=not folder,
+    )
+    if offer_made.unsearched:
+        print(
+            f"silo-mod: Silo was not searched for probable duplicates: {offer_made.unsearched}",
+            file=sys.stderr,
+        )
+    candidates = [
+        candidate
+        for candidate in offer_made.candidates
+        if not folder or candidate.entry.key != extraction.assembly.key
+    ]
+    if args.category:
+        candidates = [
+            candidate
+            if candidate.entry.is_assembly
+            else replace(
+                candidate, proposal=replace(candidate.proposal, category=args.category, is_guess=False)
+            )
+            for candidate in candidates
+        ]
+    return replace(offer_made, candidates=tuple(candidates))

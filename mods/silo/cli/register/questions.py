@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The questions of ``silo-mod register`` on a terminal, one component at a time.
+
+An answer is taken for what it says and nothing else: what is not understood is asked again, and never becomes
+a name or a category. Nothing is registered before the last question, so Ctrl-C leaves everything as it was.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from silo.bom.document import relative
+from silo.bom.errors import InputError, SiloError
+from silo.cli.progress import set_step
+from silo.cli.terminal import plain
+from silo.registering.offer import Candidate, CandidateFiles, ComponentState, Offer
+from silo.registering.request import ITEM_TYPES, Order, find_item, wrong_name
+from silo.registering.table import doubts, remarks
+
+_HELP = """  y, yes        register it as shown; Enter alone does the same where there is no doubt
+  n, no         leave it out; it stays without a number
+  name TEXT     give it another name
+  type TYPE     part, assembly, consumable or tool
+  cat CODE      another category; cat alone lists them all, cat WORD those with the word
+  join NUMBER   it is this item of Silo already: take its number, make no new one
+  all           register this one and the others, and ask only where there is a doubt
+  q, quit       ask no more: what you said yes to is registered, the rest is left out
+  ?             this list
+Nothing is registered before the last question. Ctrl-C leaves everything as it was."""
+
+
+def read_line(prompt: str) -> str | None:
+    """Ask a person for a line; None at the end of the input. Asks on stderr, since standard output may be
+    JSON.
+    """
+    set_step("")
+    print(prompt, end="", file=sys.stderr, flush=True)
+    try:
+        return input()
+    except EOFError:
+        return None
+
+
+class Dialog:
+    """Asks about candidates; :meth:`ask` gives the orders, and what stays without a number.
+
+    own
+        True where the look-alike on the server is the component's own item.
+    """
+
+    def __init__(
+        self,
+        candidates: Sequence[Candidate],
+        found: Offer,
+        api: Any,
+        base: str,
+        own: Callable[[Candidate], bool],
+        read: Callable[[str], str | None] = read_line,
+    ) -> None:
+        self._candidates, self._found, self._api, self._base = candidates, found, api, base
+        self._own, self._read = own, read
+        self._all = self._quit = False
+        self._earlier = CandidateFiles()
+
+    def ask(self) -> tuple[list[Order], list[Candidate]]:
+        """Ask about each component. Returns the orders, and the components that stay without a number."""
+        orders: list[Order] = []
+        left: list[Candidate] = []
+        for number, candidate in enumerate(self._candidates):
+            fine = candidate.state.usable and candidate.state is not ComponentState.ELSEWHERE
+            # A file that cannot be written is not asked about; carrying it out reports the reason.
+            order = (
+                None if self._quit else self._order_for(candidate, number) if fine else Order.of(candidate)
+            )
+            if order is not None:
+                orders.append(order)
+            elif not candidate.same_as:
+                left.append(candidate)
+        return orders, left
+
+    def _order_for(self, candidate: Candidate, number: int) -> Order | None:
+        self._earlier.add(candidate)
+        doubtful = bool(doubts(candidate, self._earlier)) and not self._own(candidate)
+        order = Order.of(candidate)
+        if self._all and not doubtful:
+            return order
+        entry = candidate.entry
+        where = entry.standard or f"{relative(entry.doc_path, self._base)}#{entry.object_name}"
+        _say(f"\n[{number + 1}/{len(self._candidates)}] {where}")
+        for remark in remarks(candidate, self._earlier):
+            _say(f"  ⚠ {remark}")
+        yes = "y" if doubtful else "Y"
+        while True:
+            _say(f"  {self._described(order)}")
+            answer = self._read(f"  register it? [{yes}/n/name/type/cat/join/all/q/?] ")
+            word, _, rest = ("q" if answer is None else answer.strip()).partition(" ")
+            match word.lower(), rest.strip():
+                case (("q" | "quit"), ""):
+                    self._quit = True
+                    return None
+                case (("n" | "no"), ""):
+                    return None
+                case (("y" | "yes"), ""):
+                    return order
+                case ("" | "all") as said, "":
+                    self._all = self._all or bool(said)
+                    if not doubtful:
+                        return order
+                    _say("  There is a doubt (⚠): please answer y or n, or join NUMBER.")
+                case (("?" | "h" | "help"), _):
+                    _say(_HELP)
+                case ("name" | "type" | "cat" | "join") as what, text:
+                    order = self._changed(order, what, text)
+                case _:
+                    _say(f"  {answer!r} is no answer; ? lists what can be answered.")
+
+    def _described(self, order: Order) -> str:
+        if order.existing is not None:
+            return f"join {order.existing.part_number} {order.existing.name!r}"
+        meaning = self._found.categories.get(order.category, "")
+        return f"{order.item_type} {order.name!r}, category {order.category} ({meaning})"
+
+    def _changed(self, order: Order, what: str, text: str) -> Order:
+        """Return the order with the change; if it is not possible, explain that and return the order
+        unchanged.
+        """
+        if what == "name":
+            if problem := wrong_name(text, order.candidate):
+                _say(f"  {problem}")
+                return order
+            return replace(order, name=text)
+        if what == "type":
+            if text.lower() in ITEM_TYPES:
+                return order.retyped(text.lower(), self._found.categories)
+            _say(f"  type: one of {', '.join(ITEM_TYPES)}")
+            return order
+        if what == "cat":
+            return self._category(order, text)
+        try:
+            return replace(order, existing=find_item(text, order.candidate, self._api) if text else None)
+        except InputError as problem:
+            _say(f"  {problem}")
+        except SiloError as error:
+            _say(f"  Silo cannot say: {error}")
+        return order
+
+    def _category(self, order: Order, text: str) -> Order:
+        categories = self._found.categories
+        if text.upper() in categories:
+            return replace(order, category=text.upper())
+        if text in categories:
+            return replace(order, category=text)
+        codes = [
+            code for code, words in categories.items() if text.casefold() in f"{code} {words}".casefold()
+        ]
+        if not codes:
+            _say(f"  There is no category {text!r}; cat alone lists them all.")
+        for code in codes:
+            _say(f"    {code}  {categories[code]}")
+        return order
+
+
+def _say(text: str) -> None:
+    for line in text.split("\n"):
+        print(plain(line), file=sys.stderr)

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod doctor``: what is where on this machine, which server is meant, what fails. Changes nothing."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import importlib.util
+import os
+import sys
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from silo import spoken
+from silo.bom.errors import ConfigError, Exit, ForbiddenError, NotFoundError, SiloError, exit_of
+from silo.cli.connection import client_of
+from silo.cli.json_output import print_json
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+    from silo.freecads import Installation
+
+
+NOBODY = "00000000-0000-4000-8000-000000000000"
+
+# One package of each extra, and what the extra is for.
+_EXTRAS = {"server": ("fastapi", "serve, demo"), "inertia": ("OCP", "inertia, mass, links")}
+
+Rows = dict[str, "str | SiloError"]
+
+T = TypeVar("T")
+
+
+def run_doctor(args: argparse.Namespace) -> int:
+    """Print what was found; returns 2 or 3 if something that the commands need does not work."""
+    checks = {**_machine(), **_server(args)}
+    failed = {name: value for name, value in checks.items() if isinstance(value, SiloError)}
+    if args.json:
+        print_json({"ok": not failed, **{name: str(value) for name, value in checks.items()}})
+    else:
+        from silo.cli.terminal import plain
+
+        width = max(map(len, map(spoken, checks)))
+        for name, value in checks.items():
+            text = f"{spoken(name):<{width}}  {plain(spoken(str(value)))}"
+            print(f"{'✗' if name in failed else ' '} {text}")
+    return max((exit_of(error) for error in failed.values()), default=Exit.DONE)
+
+
+def _machine() -> Rows:
+    """Describe this machine: versions, folders, extras, FreeCAD and the add-on in it."""
+    from silo.freecads import material_folders
+    from silo.platform import cache_folder, data_folder
+
+    place = _tried(_freecad)
+    return {
+        "silo-mod": _tried(_program),
+        "configuration": _tried(_configuration),
+        "data": _folder(data_folder()),
+        "cache": _folder(cache_folder()),
+        **{name: _extra(name, *about) for name, about in _EXTRAS.items()},
+        "FreeCAD": place if isinstance(place, (str, SiloError)) else place[0],
+        **({} if isinstance(place, (str, SiloError)) else {"add-on": _tried(lambda: _addon(place[1]))}),
+        "materials": _listed(map(str, material_folders())),
+    }
+
+
+def _program() -> str:
+    """Return the versions of silo-mod and Python; ConfigError if another distribution has a package of the
+    same name.
+    """
+    names = {name.replace("_", "-") for name in importlib.metadata.packages_distributions().get("silo", ())}
+    if others := sorted(names - {"silo-mod"}):
+        raise ConfigError(
+            f"{', '.join(others)} also has a package named silo, in the same place. Uninstall it, and "
+            "install silo-mod again"
+        )
+    return f"{importlib.metadata.version('silo-mod')}, Python {sys.version.split()[0]}"
+
+
+def _configuration() -> str:
+    from silo.api.config import checked_config, config_path
+
+    path = config_path()
+    checked_config(path)
+    return str(path) if path.exists() else f"{path} (none yet; everything has a default)"
+
+
+def _folder(path: os.PathLike[str]) -> str | SiloError:
+    """Return the folder, which need not exist yet; an error if nothing can be written to it."""
+    there = os.fspath(path)
+    while not os.path.lexists(there) and os.path.dirname(there) != there:
+        there = os.path.dirname(there)
+    if not (os.path.isdir(there) and os.access(there, os.W_OK)):
+        return ConfigError(f"{path}: {there} is no folder that you can write to; SILO_HOME names another one")
+    return str(path)
+
+
+def _extra(name: str, package: str, used_by: str) -> str:
+    if importlib.util.find_spec(package) is not None:
+        return f"the extra is installed ({used_by})"
+    return f"not installed ({used_by} need it): pip install 'silo-mod[{name}]'"
+
+
+def _freecad() -> str | tuple[str, Installation]:
+    from silo.freecads import ask_freecad, commands, find_freecadcmd
+
+    if not os.environ.get("SILO_FREECADCMD") and next(commands(), None) is None:
+        return "none found (files are read without it; only the add-on and bom --verify need one)"
+    command = find_freecadcmd()
+    place = ask_freecad(command)
+    others = [path for path in commands() if path != command]
+    versions = "{}.{}, Python {}.{}".format(*place.freecad, *place.python)
+    return f"{command}: {versions}" + (f"; also {_listed(others)}" if others else ""), place
+
+
+def _addon(place: Installation) -> str:
+    if not place.mod.exists():
+        return f"not in {place.mod}: silo-mod install-addon puts it there"
+    if place.missing:
+        lacks = ", ".join(f"{name} ({reason})" for name, reason in place.missing.items())
+        them = "it" if len(place.missing) == 1 else "them"
+        return f"{place.mod}, without {lacks}: silo-mod install-addon installs {them}"
+    return str(place.mod)
+
+
+def _listed(texts: Iterable[str]) -> str:
+    return ", ".join(texts) or "none found"
+
+
+def _server(args: argparse.Namespace) -> Rows:
+    from silo.api.abilities import Abilities
+    from silo.api.config import resolve_server
+
+    try:
+        where = resolve_server(args.server, args.token)
+        with client_of(args) as client:
+            client.abilities = Abilities()  # looked at again, and kept for the other commands
+            return {
+                "address": f"{client.base_url} (from {where.url_from})",
+                "token": f"from {where.token_from}" if where.token else "none",
+                **look(client, args.schema),
+            }
+    except ConfigError as error:
+        return {"address": error}
+
+
+def look(client: SiloClient, schema: str) -> dict[str, Any]:
+    """Ask for each fact; an error is an answer too."""
+    return {
+        "mode": _tried(lambda: _mode(client)),
+        "who": _tried(lambda: _who(client)),
+        "items": _tried(lambda: (client.search_items(limit=1), "can be read")[1]),
+        "identities": _tried(lambda: _identities(client)),
+        "schema": _tried(lambda: client.find_schema(schema)),
+        "modules": _tried(lambda: _modules(client)),
+        "events": _tried(lambda: _events(client)),
+    }
+
+
+def _tried(ask: Callable[[], T]) -> T | SiloError:
+    try:
+        return ask()
+    except SiloError as error:
+        return error
+
+
+def _mode(client: SiloClient) -> str:
+    state = client.ready()
+    return f"{state.mode}, version {state.version}" if state.version else state.mode
+
+
+def _who(client: SiloClient) -> str:
+    try:
+        user = client.whoami()
+    except NotFoundError:
+        return "the server does not say"
+    writes = " (reads only: register, sync and push need an editor)" if user.role == "viewer" else ""
+    return f"{user.username}, {user.role}{writes}" if user.role else user.username
+
+
+def _identities(client: SiloClient) -> str:
+    client.get_items_by_uuid([NOBODY])
+    return "many in one question" if client.abilities.batch else "one by one"
+
+
+def _modules(client: SiloClient) -> str:
+    try:
+        return ", ".join(client.modules()) or "none are named"
+    except (NotFoundError, ForbiddenError):
+        return "the server does not say"
+
+
+def _events(client: SiloClient) -> str:
+    client.open_events().close()
+    return "live"

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod install-addon``: the add-on and its Python packages, put into a FreeCAD of this machine."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from silo import spoken
+from silo.bom.errors import Exit
+from silo.cli.json_output import print_json
+from silo.cli.options import add_options
+
+
+def add_install_addon(parser: argparse.ArgumentParser) -> None:
+    add_options(
+        parser,
+        {
+            "--freecadcmd PATH": "freecadcmd (default: found on the PATH)",
+            "--freecad-data DIR": "its data folder (default: FreeCAD is asked)",
+            "--copy": "copy the add-on, do not link to this checkout",
+        },
+    )
+
+
+def run_install_addon(args: argparse.Namespace) -> int:
+    """Install the add-on, and print where it is."""
+    from silo.freecads import ask_freecad, install_folder, install_packages
+
+    place = ask_freecad(args.freecadcmd, Path(args.freecad_data) if args.freecad_data else None)
+    report = {
+        "freecad": "FreeCAD {}.{} with Python {}.{}".format(*place.freecad, *place.python),
+        "addon": str(install_folder(place, copy=args.copy)),
+        "packages": str(install_packages(place)),
+    }
+    if args.json:
+        print_json(report)
+    else:
+        text = f"{report['freecad']}\nAdd-on:   {report['addon']}\nPackages: {report['packages']}"
+        print(spoken(f"{text}\nStart FreeCAD again, and choose the workbench Silo."))
+    return Exit.DONE

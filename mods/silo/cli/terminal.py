@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The terminal that commands print to.
+
+Text of files and servers is shown as text: it may neither steer the terminal nor fill it.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any, TextIO
+
+from rich.console import Console
+from rich.table import Table
+
+from silo import spoken
+
+# A hostile file's name may have 60 MB; a path of the system has 4096 at most.
+_LONGEST = 5000
+
+_ENDLESS = 1_000_000
+
+
+class _Terminal(Console):
+    def on_broken_pipe(self) -> None:
+        """Raise the error when the reader closes the pipe; rich would end with exit code 1."""
+        raise BrokenPipeError
+
+    def print(self, *shown: Any, **how: Any) -> None:
+        """Print; texts of ours in the person's language."""
+        super().print(*(spoken(one) if isinstance(one, str) else one for one in shown), **how)
+
+
+def console(stream: TextIO | None = None) -> Console:
+    """Open the terminal. A file or a pipe has no width: each record is one whole line there."""
+    stream = stream or sys.stdout
+    return _Terminal(file=stream, highlight=False, width=None if stream.isatty() else _ENDLESS)
+
+
+def plain(text: str) -> str:
+    """Replace control characters in text of a file or a server, and cut it: it may neither steer the terminal
+    nor fill it.
+    """
+    shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+    return "".join(c if c.isprintable() else "�" for c in shown)
+
+
+def table_of(*titles: str) -> Table:
+    """Begin a table without lines that has these headings."""
+    table = Table(box=None, pad_edge=False)
+    for title in titles:
+        table.add_column(spoken(title), justify="right" if title == "Quantity" else "left", overflow="fold")
+    return table
