@@ -30,7 +30,7 @@ from gui_cases.window import Window, window  # noqa: E402
 from silo.api.client import SiloClient  # noqa: E402
 from silo.api.wire import MergeEntry, MergeRequest  # noqa: E402
 from silo.cli.reading import read_assembly  # noqa: E402
-from silo.registering.closed_files import proposals_for, register_all
+from silo.registering.closed_files import proposals_for, register_all  # noqa: E402
 
 DOCS = ROOT / "docs" / "images"
 # These have no part number yet when the designer comes.
