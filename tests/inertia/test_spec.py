@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The tests of the spec (bom-inertia, Tasks 1 and 2) as written there, imports aside."""
+"""The tests of the spec (bom-inertia, Tasks 1 and 2) as written there, with the package renamed."""
 
 from __future__ import annotations
 
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +12,11 @@ from pathlib import Path
 import pytest
 
 import silo.inertia
-from silo.inertia import BOMEntry, BOMParser, InertiaReport
+from silo.inertia.bom import BOMEntry, BOMParser
+from silo.inertia.calculator import MATERIAL_DENSITIES, InertiaCalculator
+from silo.inertia.codes import MassCode
+from silo.inertia.report import InertiaReport, PartWarning
+from silo.inertia.types import InertialProperties
 
 
 @pytest.fixture
@@ -82,6 +88,66 @@ def test_report_no_warnings() -> None:
     report = InertiaReport()
     summary = report.get_summary()
     assert "no warnings" in summary.lower() or summary == ""
+
+
+SPEC = Path(__file__).parents[2] / "../shared/spec/bom-inertia.md"
+
+
+@pytest.mark.skipif(not SPEC.exists(), reason="the spec lies beside the checkout, not in it")
+def test_the_tests_in_the_spec_pass(tmp_path: Path) -> None:
+    """The spec's own text, taken out of its page: only the name of the package is another one."""
+    blocks = re.findall(r"```python\n(.*?)```", SPEC.read_text("utf-8"), re.DOTALL)
+    tests = [block.replace("onshape2xacro", "silo") for block in blocks if "import pytest" in block]
+    assert len(tests) == 2
+    (tmp_path / "fixtures").mkdir()
+    shutil.copy(Path(__file__).parents[1] / "data" / "inertia" / "test_bom.csv", tmp_path / "fixtures")
+    (tmp_path / "test_inertia").mkdir()
+    for number, text in enumerate(tests):
+        (tmp_path / "test_inertia" / f"test_task_{number}.py").write_text(text, "utf-8")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "6 passed" in done.stdout
+
+
+def test_names_of_the_spec() -> None:
+    """Each name stands in the module that the spec gives it."""
+    assert MATERIAL_DENSITIES["ppa-cf"] == 1400
+    assert MATERIAL_DENSITIES["default"] == 1000
+    assert InertiaCalculator().default_density == 1000.0
+    assert PartWarning("link", "part", "message").code == "note"
+    assert InertialProperties(mass=0.0, com=(0, 0, 0), ixx=0, iyy=0, izz=0).ixy == 0.0
+
+
+def test_summary_begins_with_the_spec_s_words() -> None:
+    """Parts without a mass come first, each counted once; other warnings are not called missing masses."""
+    report = InertiaReport()
+    report.add_warning("link1", "part_a", "No mass or material")
+    report.add_warning("link1", "part_b", "Part not found in BOM", MassCode.NOT_IN_BOM)
+    report.add_warning("link1", "part_b", "no solid", MassCode.NO_VOLUME)
+    report.add_warning("link2", "part_c", "Unknown material 'custom'", MassCode.UNKNOWN_MATERIAL)
+    lines = report.get_summary().splitlines()
+    assert lines[0] == "⚠️  3 parts with missing mass properties:"
+    assert lines[2:4] == ["  link1:", "    - part_a: No mass or material"]
+
+    report.add_warning("", "", "the file states no unit")
+    report.add_warning("link1", "part_d", "rounded", MassCode.ROUNDED)
+    lines = report.get_summary().splitlines()
+    assert lines[0] == "⚠️  3 parts with missing mass properties:"
+    assert lines[-7:] == [
+        "2 other warnings:",
+        "",
+        "  whole assembly:",
+        "    - the file states no unit",
+        "",
+        "  link1:",
+        "    - part_d: rounded",
+    ]
+
+    alone = InertiaReport()
+    alone.add_warning("link1", "part_d", "rounded", MassCode.ROUNDED)
+    assert alone.get_summary().splitlines()[0] == "⚠️  1 warning:"
+    assert InertiaReport().get_summary() == "No warnings - all parts have mass properties."
 
 
 def test_print_summary_goes_to_the_log(caplog: pytest.LogCaptureFixture) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import logging
 from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import counted
-from silo.inertia.codes import Decided, Rule, Source
+from silo.inertia.codes import Decided, MassCode, Rule, Source
 
 if TYPE_CHECKING:
     from silo.inertia.links.frames import LinkFrame
@@ -19,6 +20,19 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+NO_CODE = "note"
+"""The code of a warning that a caller adds without one."""
+
+MISSING_MASS = (
+    NO_CODE,
+    MassCode.NO_MASS_NO_MATERIAL,
+    MassCode.NOT_IN_BOM,
+    MassCode.NO_BOM,
+    MassCode.UNKNOWN_MATERIAL,
+    MassCode.NO_VOLUME,
+)
+"""The warnings about a part to which neither BOM nor geometry gives a mass."""
+
 
 @dataclass(frozen=True)
 class PartWarning:
@@ -27,7 +41,7 @@ class PartWarning:
     link_name: str
     part_name: str
     message: str
-    code: str = "note"
+    code: str = NO_CODE
 
 
 @dataclass(frozen=True)
@@ -161,7 +175,7 @@ class InertiaReport:
     default_density: float = 1000.0
     _told: set[PartWarning] = field(default_factory=set, init=False, repr=False, compare=False)
 
-    def add_warning(self, link_name: str, part_name: str, message: str, code: str = "note") -> None:
+    def add_warning(self, link_name: str, part_name: str, message: str, code: str = NO_CODE) -> None:
         """Add a warning; equal warnings are kept once."""
         warning = PartWarning(link_name, part_name, message, code)
         if warning not in self._told:
@@ -186,18 +200,22 @@ class InertiaReport:
         return sorted(causes, key=lambda cause: -cause.mass)
 
     def get_summary(self) -> str:
-        """Write all warnings, link by link."""
+        """Write all warnings, link by link: first the parts whose mass is missing, in the spec's words."""
         if not self.warnings:
-            return "No warnings."
-        lines = [f"{counted(len(self.warnings), 'warning')}:"]
-        by_link: dict[str, list[PartWarning]] = {}
-        for warning in self.warnings:
-            by_link.setdefault(warning.link_name, []).append(warning)
-        for link, warnings in by_link.items():
-            lines.append(f"\n  {link or 'whole assembly'}:")
-            lines += [
-                f"    - {w.part_name}: {w.message}" if w.part_name else f"    - {w.message}" for w in warnings
-            ]
+            return "No warnings - all parts have mass properties."
+        missing = [warning for warning in self.warnings if warning.code in MISSING_MASS and warning.part_name]
+        others = [warning for warning in self.warnings if warning not in missing]
+        parts = len({(warning.link_name, warning.part_name) for warning in missing})
+        lines = []
+        if missing:
+            lines += [f"⚠️  {counted(parts, 'part')} with missing mass properties:", *_by_link(missing)]
+        if others:
+            start = (
+                f"\n{counted(len(others), 'other warning')}"
+                if missing
+                else f"⚠️  {counted(len(others), 'warning')}"
+            )
+            lines += [f"{start}:", *_by_link(others)]
         return "\n".join(lines)
 
     def print_summary(self) -> None:
@@ -221,3 +239,15 @@ class InertiaReport:
         """Return (link, part) for all parts: those of links first, then the unclaimed ones under ""."""
         rows = [(link.name, part) for link in self.links.values() for part in link.parts]
         return (*rows, *(("", part) for part in self.unclaimed))
+
+
+def _by_link(warnings: Iterable[PartWarning]) -> Iterator[str]:
+    """Write the warnings below their links."""
+    groups: dict[str, list[PartWarning]] = {}
+    for warning in warnings:
+        groups.setdefault(warning.link_name, []).append(warning)
+    for link, of_link in groups.items():
+        yield f"\n  {link or 'whole assembly'}:"
+        for warning in of_link:
+            name = f"{warning.part_name}: " if warning.part_name else ""
+            yield f"    - {name}{warning.message}"
