@@ -117,7 +117,8 @@ READING_THREADS = 40
 
 def routers() -> tuple[APIRouter, ...]:
     """Import and return all routers; late, as this takes half of the import, and a backup needs none."""
-    from silo_server.routes import bom, items, orders, releases, scene, system
+    from silo_server.routes import items, orders, releases, scene, system
+    from silo_server.routes.bom import changes, exports, history, imports, lines, merge, review, summary, tree
     from silo_server.web import pages
 
     return (
@@ -128,10 +129,16 @@ def routers() -> tuple[APIRouter, ...]:
         items.by_uuid,
         releases.router,
         scene.router,
-        bom.router,
-        bom.several,
-        bom.review_router,
-        bom.transfer_router,
+        lines.router,
+        merge.router,
+        tree.router,
+        summary.router,
+        lines.several,
+        review.router,
+        history.router,
+        exports.router,
+        changes.router,
+        imports.router,
         orders.router,
         *pages.ROUTERS,
     )

@@ -19,7 +19,7 @@ from silo.bom.quantities import as_decimal
 from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
 from silo_server.routes import context
-from silo_server.routes.bom import CSV, IMPORT_BODY, XLSX, content_of, file_of, uploaded
+from silo_server.routes.bom.imports import IMPORT_BODY, uploaded
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
@@ -31,6 +31,7 @@ from silo_server.routes.context import (
     etag_of,
     json_answer,
 )
+from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.routes.models import Brief, RequestBody, Short, Text
 from silo_server.services import orders, suppliers
 from silo_server.services.bom import imports, transfer

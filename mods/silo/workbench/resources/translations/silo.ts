@@ -384,69 +384,69 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../freecad/live_desk.py" />
+            <location filename="../../freecad/loss_guard.py" />
+            <source>This FreeCAD {here} does not know these objects, nor load them: {lost}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>Saving the file here would remove them from it: change it there.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>{name} was saved by FreeCAD {there}. This FreeCAD {here} does not know, and would remove from the file: {lost}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>Newer file</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>Saved over the newer file, without {lost}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>The newer file is kept for {n} days at {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>What you saved is kept for {n} days at {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>The newer file was kept.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>Made by a newer FreeCAD: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/silo_group.py" />
             <location filename="../../revisions/flow.py" />
             <source>in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../freecad/live_desk.py" />
+            <location filename="../../freecad/silo_group.py" />
             <source>not registered: left out of the BOM</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../freecad/live_desk.py" />
+            <location filename="../../freecad/silo_group.py" />
             <source>Part number in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../freecad/live_desk.py" />
+            <location filename="../../freecad/silo_group.py" />
             <source>Silo's data of this component</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>This FreeCAD {here} does not know these objects, nor load them: {lost}.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>Saving the file here would remove them from it: change it there.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>{name} was saved by FreeCAD {there}. This FreeCAD {here} does not know, and would remove from the file: {lost}.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>Newer file</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>Saved over the newer file, without {lost}.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>The newer file is kept for {n} days at {path}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>What you saved is kept for {n} days at {path}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>The newer file was kept.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>Made by a newer FreeCAD: {name}</source>
             <translation type="unfinished" />
         </message>
         <message>

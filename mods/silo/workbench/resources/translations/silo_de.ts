@@ -384,70 +384,70 @@
             <translation>Vor dem Speichern geschlossen: Bitte öffnen und noch einmal einchecken.</translation>
         </message>
         <message>
-            <location filename="../../freecad/live_desk.py" />
+            <location filename="../../freecad/loss_guard.py" />
+            <source>This FreeCAD {here} does not know these objects, nor load them: {lost}.</source>
+            <translation>Dieses FreeCAD {here} kennt nicht und hat nicht geladen: {lost}.</translation>
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>Saving the file here would remove them from it: change it there.</source>
+            <translation>Speichern würde sie hier aus der Datei entfernen: Ändern Sie die Datei dort.</translation>
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>{name} was saved by FreeCAD {there}. This FreeCAD {here} does not know, and would remove from the file: {lost}.</source>
+            <translation>{name} wurde mit FreeCAD {there} gespeichert. Dieses FreeCAD {here} kennt nicht und würde aus der Datei entfernen: {lost}.</translation>
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>Newer file</source>
+            <translation>Neuere Datei</translation>
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>Saved over the newer file, without {lost}.</source>
+            <translation>Über die neuere Datei gespeichert, ohne {lost}.</translation>
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>The newer file is kept for {n} days at {path}</source>
+            <translation>Die neuere Datei wird {n} Tage aufbewahrt: {path}</translation>
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>What you saved is kept for {n} days at {path}</source>
+            <translation>Was Sie gespeichert haben, wird {n} Tage aufbewahrt: {path}</translation>
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>The newer file was kept.</source>
+            <translation>Die neuere Datei wurde behalten.</translation>
+        </message>
+        <message>
+            <location filename="../../freecad/loss_guard.py" />
+            <source>Made by a newer FreeCAD: {name}</source>
+            <translation>Von einem neueren FreeCAD: {name}</translation>
+        </message>
+        <message>
+            <location filename="../../freecad/silo_group.py" />
             <location filename="../../revisions/flow.py" />
             <source>in Silo</source>
             <translation>in Silo</translation>
         </message>
         <message>
-            <location filename="../../freecad/live_desk.py" />
+            <location filename="../../freecad/silo_group.py" />
             <source>not registered: left out of the BOM</source>
             <translation>nicht registriert: fehlt in der Stückliste</translation>
         </message>
         <message>
-            <location filename="../../freecad/live_desk.py" />
+            <location filename="../../freecad/silo_group.py" />
             <source>Part number in Silo</source>
             <translation>Teilenummer in Silo</translation>
         </message>
         <message>
-            <location filename="../../freecad/live_desk.py" />
+            <location filename="../../freecad/silo_group.py" />
             <source>Silo's data of this component</source>
             <translation>Was Silo über diese Komponente weiß</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>This FreeCAD {here} does not know these objects, nor load them: {lost}.</source>
-            <translation>Dieses FreeCAD {here} kennt nicht und hat nicht geladen: {lost}.</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>Saving the file here would remove them from it: change it there.</source>
-            <translation>Speichern würde sie hier aus der Datei entfernen: Ändern Sie die Datei dort.</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>{name} was saved by FreeCAD {there}. This FreeCAD {here} does not know, and would remove from the file: {lost}.</source>
-            <translation>{name} wurde mit FreeCAD {there} gespeichert. Dieses FreeCAD {here} kennt nicht und würde aus der Datei entfernen: {lost}.</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>Newer file</source>
-            <translation>Neuere Datei</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>Saved over the newer file, without {lost}.</source>
-            <translation>Über die neuere Datei gespeichert, ohne {lost}.</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>The newer file is kept for {n} days at {path}</source>
-            <translation>Die neuere Datei wird {n} Tage aufbewahrt: {path}</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>What you saved is kept for {n} days at {path}</source>
-            <translation>Was Sie gespeichert haben, wird {n} Tage aufbewahrt: {path}</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>The newer file was kept.</source>
-            <translation>Die neuere Datei wurde behalten.</translation>
-        </message>
-        <message>
-            <location filename="../../freecad/live_desk.py" />
-            <source>Made by a newer FreeCAD: {name}</source>
-            <translation>Von einem neueren FreeCAD: {name}</translation>
         </message>
         <message>
             <location filename="../../gui/widgets.py" />

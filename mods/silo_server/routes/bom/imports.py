@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The import of a BOM from a table over HTTP."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Annotated, Any
+
+import anyio.to_thread
+from fastapi import Query, Request
+from starlette.datastructures import UploadFile
+from starlette.responses import Response
+
+from silo.bom.errors import RejectedError
+from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
+from silo_server.routes import context
+from silo_server.routes.bom import bom_router
+from silo_server.routes.bom.history import state_to_wire
+from silo_server.routes.context import (
+    FORM_TYPES,
+    WRITE_ERRORS,
+    Editor,
+    ExpectedVersion,
+    etag_of,
+    idempotency_key,
+    json_answer,
+    raw_json,
+)
+from silo_server.routes.made_files import XLSX
+from silo_server.services.bom import imports
+from silo_server.services.bom.lines import locked_parent
+from silo_server.services.revisions import clean_name
+from silo_server.user_json import dumps
+
+router = bom_router("bom transfer")
+
+IMPORT_BODY = {
+    **context.refused(
+        "what is no table with a header row (part number, quantity), and rows that name unknown parts or "
+        "unusable values; without dry_run a wrong row refuses the whole file"
+    ),
+    "requestBody": {
+        "required": True,
+        "content": {
+            "text/csv": {"schema": {"type": "string"}},
+            XLSX: {"schema": {"type": "string", "format": "binary"}},
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "required": ["file"],
+                    "properties": {"file": {"type": "string", "format": "binary"}},
+                }
+            },
+        },
+    },
+}
+
+
+@router.post("/import", responses=WRITE_ERRORS, openapi_extra=IMPORT_BODY)
+async def import_csv(
+    call: Editor,
+    part_number: str,
+    expected: ExpectedVersion,
+    dry_run: Annotated[bool, Query()] = False,
+    make: Annotated[str, Query(max_length=32)] = "",
+    add_up: Annotated[bool, Query()] = False,
+) -> Response:
+    """Import a CSV or a workbook: XLSX, ODS, XLS (as the body, or as the form part ``file``).
+
+    ``dry_run`` says row by row what would happen. Without it everything is imported or, if a row is wrong,
+    nothing (400 with all problems). ``make``: unknown parts are made in this category; ``add_up``: rows of
+    one part are added up. A repeat with the same ``Idempotency-Key`` gets the first answer.
+    """
+    data, name = await uploaded(call.request)
+    allowed = imports.Allowed(make, add_up)
+
+    def work() -> Response:
+        records = imports.read_csv(imports.as_csv(data), call.server.settings.max_merge_entries)
+        if dry_run:
+            with call.read() as tx:
+                return json_answer(
+                    plan_to_wire(imports.plan_import(tx, part_number, records, allowed), dry_run)
+                )
+        with call.write() as tx:
+            parent = locked_parent(tx, part_number)
+            digest = hashlib.sha256(data).hexdigest()
+            request = KeyedRequest.of(
+                f"import {parent.id}",
+                idempotency_key(call.request),
+                digest,
+                name,
+                *filter(None, (make, add_up)),
+            )
+            answer = earlier_answer(tx, request)
+            if answer is None:
+                plan, _, version = imports.apply_import(tx, part_number, records, name, expected, allowed)
+                answer = KeptAnswer(dumps(plan_to_wire(plan, dry_run)), version)
+                keep_answer(tx, request, answer)
+            return raw_json(answer.text, headers={"ETag": etag_of(answer.version)})
+
+    return await anyio.to_thread.run_sync(work)
+
+
+def plan_to_wire(plan: imports.ImportPlan, dry_run: bool) -> dict[str, Any]:
+    """Return the plan of an import as the API sends it."""
+    return {
+        "dry_run": dry_run,
+        "counts": {status: plan.count(status) for status in ("add", "change", "same", "skip", "error")},
+        "problems": plan.problems,
+        "rows": [
+            {
+                "row": row.row,
+                "part_number": row.part_number,
+                "status": row.status,
+                **({"name": row.name} if row.name else {}),
+                **({"new": True} if row.new else {}),
+                "problems": list(row.problems),
+                "before": state_to_wire(row.before),
+                "after": state_to_wire(row.after),
+            }
+            for row in plan.rows
+        ],
+    }
+
+
+async def uploaded(request: Request) -> tuple[bytes, str | None]:
+    """Read the table of an import (the body, or the form part ``file``), and the name of its file."""
+    if not request.headers.get("content-type", "").startswith(FORM_TYPES):
+        return await request.body(), None
+    async with request.form(max_files=1, max_fields=20) as form:
+        file = form.get("file")
+        if not isinstance(file, UploadFile):
+            raise RejectedError("file: wanted a multipart form with the table in a part named 'file'")
+        return await file.read(), clean_name(file.filename or "")

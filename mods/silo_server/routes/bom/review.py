@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The open questions of a BOM over HTTP, and the decisions about them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+from starlette.responses import Response
+
+from silo.bom.quantities import plain
+from silo_server.routes import context
+from silo_server.routes.bom import bom_router
+from silo_server.routes.bom.history import change_to_wire, changed_answer
+from silo_server.routes.context import WRITE_ERRORS, Editor, ExpectedVersion, Viewer, etag_of, json_answer
+from silo_server.routes.models import RequestBody, Short, Text
+from silo_server.services.bom import review
+from silo_server.services.bom.lines import line_to_wire
+from silo_server.services.bom.summary import summary_of
+from silo_server.times import wire_time
+
+router = bom_router("bom review")
+
+
+class DecisionBody(RequestBody):
+    """One decision; ``reason`` says why a line is kept.
+
+    The line is named by ``line_id``, or by its child: then the component is meant.
+    """
+
+    child_part_number: Short = ""
+    line_id: Short | None = None
+    action: review.ReviewAction
+    reason: Text | None = None
+
+
+class ResolveBody(RequestBody):
+    """``POST …/bom/resolve``: all of them as one change."""
+
+    decisions: Annotated[list[DecisionBody], Field(min_length=1, max_length=20_000)]
+
+
+@router.get("/review")
+def get_review(call: Viewer, part_number: str) -> Response:
+    """Return the open questions of a BOM: unreferenced lines, conflicts (both values), and the last merge."""
+    with call.read() as tx:
+        bom_review = review.review(tx, part_number)
+        open_below = summary_of(tx, bom_review.parent).told(bom_review.parent.id)
+    name = bom_review.parent.part_number
+    body = {
+        "part_number": name,
+        "version": bom_review.parent.bom_version,
+        "unreferenced": [line_to_wire(line, name) for line in bom_review.unreferenced],
+        "conflicts": [
+            {
+                "child_part_number": conflict.line.child_part_number,
+                "child_name": conflict.line.child_name,
+                "assembly_quantity": plain(conflict.cad_quantity),
+                "server_quantity": plain(conflict.line.state.quantity),
+                "since": wire_time(conflict.since),
+                "override": conflict.line.state.override,
+            }
+            for conflict in bom_review.conflicts
+        ],
+        "last_merge": change_to_wire(bom_review.last_merge) if bom_review.last_merge else None,
+        "below": dict(open_below),
+    }
+    return json_answer(body, headers={"ETag": etag_of(bom_review.parent.bom_version)})
+
+
+@router.post(
+    "/resolve",
+    responses=WRITE_ERRORS,
+    openapi_extra=context.refused(
+        "a decision that does not fit its line, such as keep for one that is referenced, or a line that the "
+        "BOM does not have; all of them are listed and nothing is changed"
+    ),
+)
+def resolve(call: Editor, part_number: str, body: ResolveBody, expected: ExpectedVersion) -> Response:
+    """Decide on lines: ``remove``, ``keep`` (as intentional), ``take_cad``, ``keep_silo``."""
+    decisions = [review.Decision(d.child_part_number, d.action, d.reason, d.line_id) for d in body.decisions]
+    with call.write() as tx:
+        change_id, version = review.resolve(tx, part_number, decisions, expected)
+        return changed_answer(change_id, version)
