@@ -26,8 +26,8 @@ from silo.cli.masses.report import show_report, verdict
 from silo.cli.options import add_each, add_options, only_with
 
 if TYPE_CHECKING:
-    from silo.inertia.calculator import Task
     from silo.inertia.report import InertiaReport
+    from silo.inertia.task import Task
     from silo.inertia.urdf import Urdf
 
 
@@ -103,7 +103,7 @@ def run_inertia(args: argparse.Namespace) -> int:
         raise InputError("--urdf-out and --in-place name two places for one URDF; give one of them")
     if args.snippet and args.json:
         raise InputError("--snippet and --json both go to standard output; use --report FILE.json")
-    from silo.inertia.calculator import calculate
+    from silo.inertia.calculation import calculate
 
     # The small files first: a mistake in them should not cost the reading of the geometry.
     table = bom_table(args)
@@ -121,10 +121,10 @@ def run_inertia(args: argparse.Namespace) -> int:
 
 
 def _task(args: argparse.Namespace) -> Task:
-    from silo.inertia.calculator import Task
     from silo.inertia.links.frames import FrameChoice
     from silo.inertia.links.link_map import read_link_map
     from silo.inertia.masses import Options
+    from silo.inertia.task import Task
     from silo.inertia.urdf import read_urdf
 
     frame = FrameChoice(args.frame or ("urdf" if args.urdf else "assembly"))

@@ -40,9 +40,8 @@ def run_links(args: argparse.Namespace) -> int:
     if args.clusters is not None and args.urdf:
         raise InputError("--clusters groups by position and --urdf by names; give one of them")
     check_outputs(args)
-    from silo.inertia.links import starting_map
     from silo.inertia.links.claims import ROOT_LINK, claim
-    from silo.inertia.links.starting_map import as_map, as_yaml
+    from silo.inertia.links.starting_map import as_map, as_yaml, starting_map
     from silo.inertia.output import write_whole
     from silo.inertia.urdf import read_urdf
 

@@ -54,10 +54,11 @@ def run_mass(args: argparse.Namespace) -> int:
     need_inertia_extra()
     # The documents hold identities; their part numbers are the server's, for a preview as well.
     check_options(args, asks_server=args.push)
-    from silo.inertia.calculator import Task, calculate
+    from silo.inertia.calculation import calculate
     from silo.inertia.links.link_map import Link, LinkMap
     from silo.inertia.masses import Options
     from silo.inertia.notes import GeometryCode
+    from silo.inertia.task import Task
 
     table = bom_table(args)
     materials = material_table(args)

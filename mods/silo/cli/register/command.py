@@ -26,7 +26,7 @@ from silo.cli.register.orphans import orphans
 from silo.cli.register.run import RegisterProgress, RegisterRun, warn_of_rules
 from silo.files import check_writable
 from silo.registering.closed_files import seen_on_disk, whole_folder
-from silo.registering.items import Journal
+from silo.registering.journal import Journal
 from silo.registering.offer import Offer, offer
 from silo.registering.table import read_table
 

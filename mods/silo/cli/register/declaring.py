@@ -14,9 +14,10 @@ from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
 from silo.cli.register.run import RegisterRun, warn_of_rules
 from silo.freecads import open_in_any
+from silo.registering.candidate import Candidate, ComponentState
 from silo.registering.closed_files import OPEN
-from silo.registering.modelled import chosen
-from silo.registering.offer import Candidate, ComponentState, Offer, modelled
+from silo.registering.modelled import chosen, modelled
+from silo.registering.offer import Offer
 from silo.registering.request import Order
 
 

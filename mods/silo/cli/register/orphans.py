@@ -11,7 +11,8 @@ from silo.bom.errors import Exit
 from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
 from silo.cli.terminal import plain
-from silo.registering.items import Journal, finished
+from silo.registering.items import finished
+from silo.registering.journal import Journal
 
 
 def orphans(args: argparse.Namespace) -> int:

@@ -16,7 +16,8 @@ from silo.bom.document import relative
 from silo.bom.errors import InputError, SiloError
 from silo.cli.progress import set_step
 from silo.cli.terminal import plain
-from silo.registering.offer import Candidate, CandidateFiles, ComponentState, Offer
+from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
+from silo.registering.offer import Offer
 from silo.registering.request import ITEM_TYPES, Order, find_item, wrong_name
 from silo.registering.table import doubts, remarks
 

@@ -17,9 +17,10 @@ from silo.bom.items.proposal import Proposal
 from silo.cli.progress import set_step
 from silo.cli.register.questions import Dialog
 from silo.cli.terminal import plain
+from silo.registering.candidate import Candidate, CandidateFiles
 from silo.registering.closed_files import carry_out_on_disk, is_own
 from silo.registering.items import Ask, Registration, unclear
-from silo.registering.offer import Candidate, CandidateFiles, Offer
+from silo.registering.offer import Offer
 from silo.registering.request import Order
 from silo.registering.table import TableRow, doubts, orders_of, write_table
 
