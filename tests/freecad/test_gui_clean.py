@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 # The names of the commands, read and not imported: there is no FreeCAD here.
 COMMANDS = sorted(
     node.value.value
-    for node in ast.parse((REPOSITORY / "mods/silo/workbench/start.py").read_text("utf-8")).body
+    for node in ast.parse((REPOSITORY / "mods/silo/workbench/commands.py").read_text("utf-8")).body
     if isinstance(node, ast.Assign)
     and isinstance(node.targets[0], ast.Name)
     and isinstance(node.value, ast.Constant)

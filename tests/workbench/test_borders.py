@@ -129,12 +129,15 @@ def test_the_start_loads_next_to_nothing() -> None:
     assert {name for name in loaded if name.startswith("silo.") and "workbench" not in name} == set()
     ours = {name.removeprefix("silo.workbench.") for name in loaded if name.startswith("silo.workbench.")}
     assert ours == {
+        "commands",
         "documents",
         "documents.opened",
         "freecad",
         "freecad.host",
         "gui",
         "gui.qt",
+        "packages",
+        "save_menu",
         "start",
         "words",
     }

@@ -31,7 +31,7 @@ from inside import (
 
 
 def story() -> None:
-    from silo.workbench.start import commands
+    from silo.workbench.commands import commands
 
     one = ready()
     top = project()

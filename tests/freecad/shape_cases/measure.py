@@ -12,8 +12,8 @@ sys.path.insert(0, os.environ["SILO_MODS"])
 
 from silo.inertia.geometry.graph import ReadOptions  # noqa: E402
 from silo.inertia.geometry.read import save  # noqa: E402
+from silo.workbench.freecad import shapes  # noqa: E402
 from silo.workbench.freecad.opening import open_fully  # noqa: E402
-from silo.workbench.mass import shapes  # noqa: E402
 
 document = open_fully(os.environ["SILO_TOP"])
 save(shapes.read_live(document, ReadOptions(), lambda *_: None), Path(os.environ["SILO_OUT"]))

@@ -137,7 +137,7 @@ _TOLD = {
 
 class ShapeSource(Protocol):
     """What a mass needs of objects and a BOM does not, from files (``places.StoredFacts``) or from FreeCAD
-    (``silo.workbench.mass.shapes``)."""
+    (``silo.workbench.freecad.shapes``)."""
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
         """Return (4, 4) of an object's own placement; the identity if it has none."""

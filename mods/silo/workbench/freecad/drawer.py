@@ -112,7 +112,7 @@ class FreeCadDrawer:
         from silo.drawing.models import EPS
         from silo.inertia.geometry.freecad import Leaf, ShapeRef
         from silo.inertia.geometry.together import exact_box
-        from silo.workbench.mass.shapes import measure
+        from silo.workbench.freecad.shapes import measure
 
         leaf = Leaf(tuple(ShapeRef(_stored(*shape), shape[2]) for shape in shapes))
         parts = [part for shape in leaf.shapes for part in shape.handle.Faces or [shape.handle]]

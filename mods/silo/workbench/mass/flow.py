@@ -67,7 +67,7 @@ class MassFlow:
         from silo.inertia.masses import Options
         from silo.inertia.materials.table import load_materials
         from silo.inertia.task import Task
-        from silo.workbench.mass import shapes
+        from silo.workbench.freecad import shapes
         from silo.workbench.mass.rows import shown
 
         with WaitingWindow(plain(doc.Label, 60)) as waiting:

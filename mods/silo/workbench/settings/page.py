@@ -16,10 +16,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo.workbench.commands import INSTALL, Command
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt, widgets
+from silo.workbench.gui.dock import Dock
 from silo.workbench.gui.qt import QtCore, QtWidgets, Relay
-from silo.workbench.pane.dock import NAME, Dock
+from silo.workbench.packages import missing_packages, packages_hint
+from silo.workbench.pane.dock import NAME
 from silo.workbench.session.session import Session
 from silo.workbench.settings import ALLOW, HOLD, Preferences
 from silo.workbench.settings.server import (
@@ -34,7 +37,6 @@ from silo.workbench.settings.server import (
     read_known,
     test,
 )
-from silo.workbench.start import INSTALL, Command, missing_packages, packages_hint
 from silo.workbench.tone import Tone
 from silo.workbench.words import QT_TRANSLATE_NOOP, spoken, translate, visible
 
