@@ -35,6 +35,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from silo_server.services.bom.line_edit import REL_TYPES
+
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "mods" / "silo" / "workbench"
 # Words that the command line shows too.
@@ -258,11 +260,11 @@ def _texts_of_server(package: Path) -> Iterator[tuple[str, str, Path]]:
     from silo.api.wire import ItemTexts, LineTexts
     from silo_server import actors, schema
     from silo_server.services import releases, suppliers
-    from silo_server.services.bom import imports, review
+    from silo_server.services.bom import imports
     from silo_server.web import render
 
     # Words that are stored, of columns and of the built-in schema; a site's own stay as they are.
-    stored = [*actors.Role, *actors.Scope, *schema.ITEM_TYPES, *review.REL_TYPES, *releases.NUMBERED, "draft"]
+    stored = [*actors.Role, *actors.Scope, *schema.ITEM_TYPES, *REL_TYPES, *releases.NUMBERED, "draft"]
     stored += [*suppliers.COLUMNS.values(), *imports.DELIMITERS.values()]
     for field in (*ItemTexts.model_fields.values(), *LineTexts.model_fields.values()):
         stored += [field.title or "", *schema.text_hints(field).get("options", ())]

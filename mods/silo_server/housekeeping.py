@@ -77,8 +77,8 @@ from silo_server.services import items as item_service
 from silo_server.services.access import START_TOKEN, note_token_uses
 from silo_server.services.bom.history import state_at
 from silo_server.services.bom.lines import ChangeKind, LineRecord, history_row
-from silo_server.services.bom.review import keep_looks
 from silo_server.services.bom.summary import keep_summaries
+from silo_server.services.looks import keep_looks
 from silo_server.services.revisions import FileStore
 from silo_server.times import stamp
 from silo_server.user_json import dumps

@@ -31,11 +31,13 @@ from silo_server.actors import Actor, Role
 from silo_server.db.database import Database
 from silo_server.errors import DuplicateError
 from silo_server.run import prepare
-from silo_server.services.bom import history, review
+from silo_server.services.bom import history
+from silo_server.services.bom.decisions import Decision, ReviewAction, resolve
+from silo_server.services.bom.line_edit import add_line, change_line, remove_line
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge import merge_bom, preview_merge
 from silo_server.services.bom.merge_request import read_merge_request
-from silo_server.services.bom.review import Decision, ReviewAction, open_conflicts, resolve
+from silo_server.services.bom.review import open_conflicts
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
 from silo_server.values import LineState
@@ -127,9 +129,9 @@ class Silo(RuleBasedStateMachine):
         before = copy.deepcopy(self.model)
         if number in self.model:
             with pytest.raises(DuplicateError):
-                self.do(who, lambda tx: review.add_line(tx, self.parent, number, new))
+                self.do(who, lambda tx: add_line(tx, self.parent, number, new))
             return
-        self.do(who, lambda tx: review.add_line(tx, self.parent, number, new))
+        self.do(who, lambda tx: add_line(tx, self.parent, number, new))
         self.model[number] = new_line(amount, "manual")
         self.changed(before)
 
@@ -140,7 +142,7 @@ class Silo(RuleBasedStateMachine):
         expected = self.version - 1 if stale else self.version
 
         def change(tx: Any) -> Any:
-            return review.change_line(tx, self.parent, number, {"quantity": amount}, expected)
+            return change_line(tx, self.parent, number, {"quantity": amount}, expected)
 
         if stale or number not in self.model:
             with pytest.raises(VersionConflictError if stale else NotFoundError):
@@ -163,9 +165,9 @@ class Silo(RuleBasedStateMachine):
         before = copy.deepcopy(self.model)
         if number not in self.model:
             with pytest.raises(NotFoundError):
-                self.do(who, lambda tx: review.remove_line(tx, self.parent, number))
+                self.do(who, lambda tx: remove_line(tx, self.parent, number))
             return
-        self.do(who, lambda tx: review.remove_line(tx, self.parent, number))
+        self.do(who, lambda tx: remove_line(tx, self.parent, number))
         del self.model[number]
         self.changed(before)
 

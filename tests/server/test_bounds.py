@@ -30,12 +30,15 @@ from silo_server.db.transaction import Tx
 from silo_server.db.turnstile import Turnstile
 from silo_server.errors import TooLargeError
 from silo_server.run import RunningServer, running_server
-from silo_server.services.bom import imports, review, tree
+from silo_server.services.bom import imports, tree
+from silo_server.services.bom.decisions import Decision, ReviewAction, resolve
 from silo_server.services.bom.last_sync import record_refusal
+from silo_server.services.bom.line_edit import add_line, change_line
 from silo_server.services.bom.lines import state_columns
 from silo_server.services.bom.merge import merge_bom
 from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.summary import keep_all
+from silo_server.services.bom.waiting import waiting, waiting_count
 from silo_server.services.items import NewItem, archive_item, create_item, get_item
 from silo_server.settings import Settings
 from silo_server.values import LineState
@@ -277,7 +280,7 @@ def test_what_waits_is_listed_and_counted_without_reading_all_lines(db: Database
                 None,
             )
         merge_bom(tx, "T0", read_merge_request(merge_body({"C1": 2}), 9), None)
-        review.change_line(tx, "T1", "C0", {"quantity": 3})
+        change_line(tx, "T1", "C0", {"quantity": 3})
         merge_bom(tx, "T1", read_merge_request(merge_body({"C0": 5, "C1": 2}), 9), None)
         gaps = [{"reason": reason, "name": reason} for reason in ("missing", "unregistered", "unregistered")]
         body = {**merge_body(dict.fromkeys(parts, 2)), "left_out": gaps}
@@ -288,21 +291,21 @@ def test_what_waits_is_listed_and_counted_without_reading_all_lines(db: Database
         # Settled: the one by a person's edit, the other by a decision.
         for child in ("C2", "C3"):
             create_item(tx, NewItem(part_number=child, name="Part"))
-            review.add_line(tx, "T4", child, LineState(3.0, "manual"))
+            add_line(tx, "T4", child, LineState(3.0, "manual"))
         cad = merge_body({**dict.fromkeys(parts, 2), "C2": 5, "C3": 5})
         merge_bom(tx, "T4", read_merge_request(cad, 9), None)
-        assert [one.conflicts for one in review.waiting(tx) if one.part_number == "T4"] == [2]
-        review.change_line(tx, "T4", "C2", {"quantity": 5.0})
-        assert [one.conflicts for one in review.waiting(tx) if one.part_number == "T4"] == [1]
-        review.resolve(tx, "T4", [review.Decision("C3", review.ReviewAction.KEEP_SILO)])
+        assert [one.conflicts for one in waiting(tx) if one.part_number == "T4"] == [2]
+        change_line(tx, "T4", "C2", {"quantity": 5.0})
+        assert [one.conflicts for one in waiting(tx) if one.part_number == "T4"] == [1]
+        resolve(tx, "T4", [Decision("C3", ReviewAction.KEEP_SILO)])
     with db.read() as tx:
 
         def note(_conn: Any, _cursor: Any, sql: str, values: Any, *_: Any) -> None:
             asked.append((sql, values))
 
         event.listen(tx.conn, "before_cursor_execute", note)
-        found = review.waiting(tx)
-        assert review.waiting_count(tx) == len(found) == 3
+        found = waiting(tx)
+        assert waiting_count(tx) == len(found) == 3
         event.remove(tx.conn, "before_cursor_execute", note)
         plans = [str(row) for sql, p in asked for row in tx.conn.exec_driver_sql(_plan(tx) + sql, p)]
     counts = [(one.unreferenced, one.conflicts, one.left_out, one.unregistered) for one in found]

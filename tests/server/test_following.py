@@ -10,8 +10,8 @@ from server_testing import Api, bom
 from web_visitor import Visitor
 
 from silo_server.run import RunningServer
-from silo_server.services.bom import review
-from silo_server.services.bom.review import keep_looks
+from silo_server.services import following
+from silo_server.services.looks import keep_looks
 
 
 def badge(visitor: Visitor) -> int:
@@ -102,7 +102,7 @@ def test_a_person_follows_so_much_and_no_more(
     first, second = (f"item:{api.get(f'/api/items/{number}')['id']}" for number in api.items(2))
     admin = visitors["admin"]
     follow(admin, target=first, on="yes")
-    monkeypatch.setattr(review, "MOST_FOLLOWED", 1)
+    monkeypatch.setattr(following, "MOST_FOLLOWED", 1)
     follow(admin, target=first, on="yes")
     refused = admin.post("/mine/follow", target=second, on="yes")
     assert (refused.status, b"at most 1 items" in refused.body) == (400, True)

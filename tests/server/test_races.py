@@ -21,7 +21,8 @@ from silo.bom.errors import CycleError
 from silo_server.db.database import Database
 from silo_server.db.transaction import Tx
 from silo_server.run import prepare
-from silo_server.services.bom import history, review
+from silo_server.services.bom import history
+from silo_server.services.bom.line_edit import add_line
 from silo_server.services.bom.merge import merge_bom
 from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.items import NewItem, create_item, get_item
@@ -100,7 +101,7 @@ def test_two_edges_of_a_ring_are_not_added_together(pg: Database) -> None:
     """TOP → SUB here and SUB → TOP there, at the same moment: one of them is refused."""
 
     def add(parent: str, child: str) -> Callable[[Tx], Any]:
-        return lambda tx: review.add_line(tx, parent, child, LineState(1.0, "manual"))
+        return lambda tx: add_line(tx, parent, child, LineState(1.0, "manual"))
 
     raised = one_waits_for_the_other(pg, add("TOP", "SUB"), add("SUB", "TOP"))
     assert [type(error) for error in raised] == [CycleError]

@@ -36,9 +36,9 @@ from silo_server.services.access import (
     secret_of_form,
     use_login_link,
 )
+from silo_server.services.bom.line_edit import check_state, edited_state
 from silo_server.services.bom.lines import state_to_json, stored_state
 from silo_server.services.bom.merge_request import read_merge_request
-from silo_server.services.bom.review import check_state, edited_state
 from silo_server.services.bom.transfer import _numbered
 from silo_server.services.bom.tree import positive_number
 from silo_server.services.field_checks import quantity_problem

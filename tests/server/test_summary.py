@@ -28,8 +28,10 @@ from silo_server.db.tables import product_summaries
 from silo_server.db.transaction import Tx
 from silo_server.events import log
 from silo_server.run import prepare
-from silo_server.services.bom import history, review, transfer, tree
+from silo_server.services.bom import history, transfer, tree
+from silo_server.services.bom.decisions import Decision, ReviewAction, resolve
 from silo_server.services.bom.last_sync import record_refusal
+from silo_server.services.bom.line_edit import add_line, change_line
 from silo_server.services.bom.merge import merge_bom
 from silo_server.services.bom.merge_request import read_merge_request
 from silo_server.services.bom.summary import (
@@ -95,18 +97,18 @@ def refuse(tx: Tx, numbers: list[str], dice: random.Random) -> None:
 def add(tx: Tx, numbers: list[str], dice: random.Random) -> None:
     kind = dice.choice(["component", "component", "reference"])
     state = LineState(dice.choice([1.0, 3.0]), "manual", kind, child_revision=dice.choice([None, 0]))
-    review.add_line(tx, dice.choice(numbers[:ASSEMBLIES]), dice.choice(numbers), state)
+    add_line(tx, dice.choice(numbers[:ASSEMBLIES]), dice.choice(numbers), state)
 
 
 def edit(tx: Tx, numbers: list[str], dice: random.Random) -> None:
     change = dice.choice([{"quantity": 9.0}, {"child_revision": 0}, {"rel_type": "alternate"}])
-    review.change_line(tx, dice.choice(numbers[:ASSEMBLIES]), dice.choice(numbers), change)
+    change_line(tx, dice.choice(numbers[:ASSEMBLIES]), dice.choice(numbers), change)
 
 
 def decide(tx: Tx, numbers: list[str], dice: random.Random) -> None:
-    action = dice.choice(list(review.ReviewAction))
-    decision = review.Decision(dice.choice(numbers), action)
-    review.resolve(tx, dice.choice(numbers[:ASSEMBLIES]), [decision])
+    action = dice.choice(list(ReviewAction))
+    decision = Decision(dice.choice(numbers), action)
+    resolve(tx, dice.choice(numbers[:ASSEMBLIES]), [decision])
 
 
 def state(tx: Tx, numbers: list[str], dice: random.Random) -> None:

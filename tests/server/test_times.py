@@ -13,10 +13,10 @@ from hunting import over
 from silo_server.db.database import Database
 from silo_server.run import prepare
 from silo_server.services.bom.history import change_at, list_changes, state_at
+from silo_server.services.bom.line_edit import add_line, change_line
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge import merge_bom
 from silo_server.services.bom.merge_request import read_merge_request
-from silo_server.services.bom.review import add_line, change_line
 from silo_server.services.items import ItemChange, NewItem, change_item, create_item, get_item
 from silo_server.services.revisions import list_revisions
 from silo_server.settings import Settings

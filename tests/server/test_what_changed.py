@@ -18,8 +18,8 @@ from web_visitor import Visitor
 from silo_server.db.database import Database
 from silo_server.db.tables import bom_change_lines, bom_changes, product_looks
 from silo_server.run import RunningServer
-from silo_server.services.bom.review import SAME_LOOK, keep_looks, last_look
 from silo_server.services.items import NewItem, create_item
+from silo_server.services.looks import SAME_LOOK, keep_looks, last_look
 from silo_server.times import stamp
 
 

@@ -22,7 +22,7 @@ from silo.bom.quantities import LARGEST_QUANTITY
 from silo.bom.text import character_problem
 from silo_server.routes import context
 from silo_server.schema import text_hints
-from silo_server.services.bom.review import REL_TYPES, SOURCES
+from silo_server.services.bom.line_edit import REL_TYPES, SOURCES
 from silo_server.services.field_checks import quantity_problem
 from silo_server.services.search import LookAlike
 

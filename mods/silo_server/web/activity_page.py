@@ -26,8 +26,8 @@ from silo_server.routes.context import Call, PageFrom
 from silo_server.services import revisions
 from silo_server.services.bom import history, tree
 from silo_server.services.bom.frozen import changes_of
-from silo_server.services.bom.review import last_look
 from silo_server.services.items import get_by_uuids, get_item
+from silo_server.services.looks import last_look
 from silo_server.services.releases import NUMBERED, list_releases
 from silo_server.values import Item
 from silo_server.web.accounts import Reader, Writer

@@ -31,7 +31,6 @@ from silo_server.services import revisions
 from silo_server.services.bom import tree
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import lines_of_many
-from silo_server.services.bom.review import is_followed, last_look
 from silo_server.services.bom.summary import (
     MOST_NAMED,
     MassAndCost,
@@ -44,7 +43,9 @@ from silo_server.services.bom.summary import (
     summary_of,
 )
 from silo_server.services.bom.tree import RolledItem
+from silo_server.services.following import is_followed
 from silo_server.services.items import ItemQuery, get_item, list_items
+from silo_server.services.looks import last_look
 from silo_server.values import Item, Line
 from silo_server.web.accounts import Reader
 from silo_server.web.item_edit_page import shown_properties

@@ -28,10 +28,11 @@ from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.events import log
 from silo_server.routes.context import Call
 from silo_server.schema import text_hints
-from silo_server.services.bom import history, review
+from silo_server.services.bom import history, line_edit, review
+from silo_server.services.bom.assignees import assignee_of, editors
+from silo_server.services.bom.decisions import Decision, resolve
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
-from silo_server.services.bom.review import Decision
 from silo_server.services.bom.summary import summary_of
 from silo_server.services.items import get_item
 from silo_server.services.revisions import files_until, has_file
@@ -129,7 +130,7 @@ def decide(call: Writer, part_number: str, form: Form) -> Response:
         if not decisions:
             return _("No line was chosen, so nothing was changed."), 0
         try:
-            change, _lines = review.resolve(tx, part_number, decisions)
+            change, _lines = resolve(tx, part_number, decisions)
         except LinesChangedError as error:
             story = line_form.meanwhile(tx, parent, error.line_ids, whole(form, "at") or 0)
             gone = [names.get(line_id, _("a line that is gone")) for line_id in error.line_ids]
@@ -173,7 +174,7 @@ def add_line(call: Writer, part_number: str, form: Form) -> Response:
             raise RejectedError(_("part number: wanted the number of an item, got nothing"))
         new = LineState(**{"quantity": 1.0, "source": "manual", **line_form.values_of(sent.typed)})
         try:
-            added = review.add_line(tx, part_number, child, new, why=sent.why or None)
+            added = line_edit.add_line(tx, part_number, child, new, why=sent.why or None)
         except DuplicateError as error:
             parent = get_item(tx, part_number)
             line = component_of(lines_of(tx, parent), child, parent)
@@ -204,7 +205,9 @@ def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
             )
             raise RefusedDecision(replace(asked, problem=problem, story=news, clashes=edit.clashes), 412)
         why = sent.why or None
-        edited = review.change_line(tx, part_number, LineId(line.id), line_form.values_of(edit.mine), why=why)
+        edited = line_edit.change_line(
+            tx, part_number, LineId(line.id), line_form.values_of(edit.mine), why=why
+        )
         also = _(" Meanwhile: %(told)s.", told="; ".join(news)) if edit.theirs and news else ""
         if not edited.change_id or edited.line is None:
             return _("Your values are the same as in Silo, so nothing was changed.") + also, 0
@@ -221,7 +224,7 @@ def remove_line(call: Writer, part_number: str, line_id: str, form: Form) -> Res
     def remove(tx: Tx, line: Line, sent: LineForm, asked: PageState, news: list[str]) -> tuple[str, int]:
         seen, why = text(form, "mark") or None, sent.why or None
         try:
-            edited = review.remove_line(tx, part_number, LineId(line.id), seen=seen, why=why)
+            edited = line_edit.remove_line(tx, part_number, LineId(line.id), seen=seen, why=why)
         except LinesChangedError:
             problem = _(
                 "Nothing was removed: %(number)s was changed by somebody else meanwhile.",
@@ -316,7 +319,7 @@ def _show(call: Call, part_number: str, asked: PageState, status: int = 200) -> 
         asked_at = min(filter(None, since), default=merge.at if merge else "")
         before = files_until(tx, item, asked_at, 2)[1:]
         drawn = has_file(tx, item)
-        assignee, people = review.assignee_of(tx, item), review.editors(tx)
+        assignee, people = assignee_of(tx, item), editors(tx)
     conflicts = {conflict.line.id: conflict for conflict in review_of.conflicts}
     editing = _editing(lines, asked, item)
     problem = asked.problem

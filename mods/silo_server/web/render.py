@@ -41,7 +41,8 @@ from silo.bom.quantities import as_decimal
 from silo_server.actors import Actor, Role
 from silo_server.db.state import mode_of
 from silo_server.routes.context import Call, masked, server_of
-from silo_server.services.bom.review import badge, waiting_count
+from silo_server.services.badge import badge
+from silo_server.services.bom.waiting import waiting_count
 from silo_server.times import wire_time
 
 # The key of a notice in the address of the page that shows it, and the cookies (one for each key) it is in.

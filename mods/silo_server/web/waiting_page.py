@@ -19,8 +19,12 @@ from silo.bom.errors import SiloError, VersionConflictError
 from silo.bom.numbers import whole_number
 from silo_server.db.transaction import Tx
 from silo_server.routes.context import Call
-from silo_server.services.bom import history, review
-from silo_server.services.bom.review import ReviewAction, Waiting, decide_all, lines_for, waiting
+from silo_server.services import following
+from silo_server.services.bom import assignees, history
+from silo_server.services.bom.assignees import editors
+from silo_server.services.bom.decisions import ReviewAction, decide_all, lines_for
+from silo_server.services.bom.waiting import Waiting, waiting
+from silo_server.services.following import have_seen
 from silo_server.services.scene import with_model
 from silo_server.services.search import fits
 from silo_server.values import Line
@@ -130,7 +134,7 @@ def assign(call: Writer, form: Form) -> Response:
         return _show(call, view, _("Nothing was changed."), [_("No BOM was chosen.")], status=400)
     with call.write() as tx:
         for part_number in chosen:
-            review.assign(tx, part_number, who)
+            assignees.assign(tx, part_number, who)
     name = isolate(who) if who else _("nobody in particular")
     return back(
         back_to(form, Address("/waiting", view).url()),
@@ -143,7 +147,7 @@ def mine_page(call: Reader) -> Response:
     """Show the open BOMs that are the person's own, and what the person follows, news first."""
     with call.read() as tx:
         rows = waiting(tx)
-        subjects = review.followed(tx, call.actor)
+        subjects = following.followed(tx, call.actor)
     followed = {subject.folder for subject in subjects}
     return page(
         call,
@@ -162,7 +166,7 @@ def follow(call: Reader, form: Form) -> Response:
     on = bool(text(form, "on"))
     target = text(form, "target", 1024) or f"folder:{text(form, 'folder', 1000)}"
     with call.write(even_when_read_only=True) as tx:
-        review.follow(tx, target, on=on)
+        following.follow(tx, target, on=on)
     notice = (
         _("You follow it now: the page For me says what changes.") if on else _("You no longer follow it.")
     )
@@ -173,7 +177,7 @@ def follow(call: Reader, form: Form) -> Response:
 def seen(call: Reader, form: Form) -> Response:
     """Mark all news as seen."""
     with call.write(even_when_read_only=True) as tx:
-        review.have_seen(tx)
+        have_seen(tx)
     return back("/mine", _("All news is marked as seen."))
 
 
@@ -231,7 +235,7 @@ def _show(
     changes: Sequence[int] = (),
 ) -> Response:
     with call.read() as tx:
-        rows, people = waiting(tx), review.editors(tx)
+        rows, people = waiting(tx), editors(tx)
     who = view.get("who", "")
     folders = Counter(part for row in rows for part in _folders(row.folder))
     test, kind, folder = fits(view.get("q", "")), KINDS.get(view.get("kind", "")), view.get("folder", "")

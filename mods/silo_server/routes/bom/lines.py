@@ -29,8 +29,9 @@ from silo_server.routes.models import (
     NewLineBody,
     NumbersBody,
 )
-from silo_server.services.bom import review
+from silo_server.services.bom import line_edit
 from silo_server.services.bom.last_sync import NEVER, last_syncs
+from silo_server.services.bom.line_edit import Edited
 from silo_server.services.bom.lines import (
     LineId,
     check_line_count,
@@ -93,7 +94,7 @@ def add_line(call: Editor, part_number: str, body: NewLineBody, expected: Expect
     values = body.model_dump(exclude={"child_part_number"})
     state = LineState(**{**values, "reference_designators": tuple(body.reference_designators)})
     with call.write() as tx:
-        edited = review.add_line(tx, part_number, body.child_part_number, state, expected)
+        edited = line_edit.add_line(tx, part_number, body.child_part_number, state, expected)
         return _edited(edited, 201)
 
 
@@ -142,16 +143,16 @@ def _change(
     call: Call, part_number: str, which: str | LineId, body: LineChangeBody, expected: int | None
 ) -> Response:
     with call.write() as tx:
-        return _edited(review.change_line(tx, part_number, which, line_changes(body), expected), 200)
+        return _edited(line_edit.change_line(tx, part_number, which, line_changes(body), expected), 200)
 
 
 def _remove(call: Call, part_number: str, which: str | LineId, expected: int | None) -> Response:
     with call.write() as tx:
-        edited = review.remove_line(tx, part_number, which, expected)
+        edited = line_edit.remove_line(tx, part_number, which, expected)
     return Response(status_code=204, headers={"ETag": etag_of(edited.version)})
 
 
-def _edited(edited: review.Edited, status: int) -> Response:
+def _edited(edited: Edited, status: int) -> Response:
     assert edited.line is not None  # add and change leave a line behind
     return json_answer(
         line_to_wire(edited.line, edited.parent.part_number), status, {"ETag": etag_of(edited.version)}

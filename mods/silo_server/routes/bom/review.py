@@ -14,7 +14,8 @@ from silo_server.routes.bom import bom_router
 from silo_server.routes.bom.history import change_to_wire, changed_answer
 from silo_server.routes.context import WRITE_ERRORS, Editor, ExpectedVersion, Viewer, etag_of, json_answer
 from silo_server.routes.models import RequestBody, Short, Text
-from silo_server.services.bom import review
+from silo_server.services.bom import decisions, review
+from silo_server.services.bom.decisions import Decision, ReviewAction
 from silo_server.services.bom.lines import line_to_wire
 from silo_server.services.bom.summary import summary_of
 from silo_server.times import wire_time
@@ -30,7 +31,7 @@ class DecisionBody(RequestBody):
 
     child_part_number: Short = ""
     line_id: Short | None = None
-    action: review.ReviewAction
+    action: ReviewAction
     reason: Text | None = None
 
 
@@ -78,7 +79,7 @@ def get_review(call: Viewer, part_number: str) -> Response:
 )
 def resolve(call: Editor, part_number: str, body: ResolveBody, expected: ExpectedVersion) -> Response:
     """Decide on lines: ``remove``, ``keep`` (as intentional), ``take_cad``, ``keep_silo``."""
-    decisions = [review.Decision(d.child_part_number, d.action, d.reason, d.line_id) for d in body.decisions]
+    asked = [Decision(d.child_part_number, d.action, d.reason, d.line_id) for d in body.decisions]
     with call.write() as tx:
-        change_id, version = review.resolve(tx, part_number, decisions, expected)
+        change_id, version = decisions.resolve(tx, part_number, asked, expected)
         return changed_answer(change_id, version)

@@ -42,6 +42,7 @@ from silo_server.db.tables import items
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
 from silo_server.schema import find_schema
+from silo_server.services.bom.line_edit import check_state, edited_state
 from silo_server.services.bom.lines import (
     ChangeKind,
     ChangeNote,
@@ -53,7 +54,6 @@ from silo_server.services.bom.lines import (
     new_line_id,
     parent_to_change,
 )
-from silo_server.services.bom.review import check_state, edited_state
 from silo_server.services.items import (
     ItemQuery,
     NewItem,

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The BOMs that wait for a reviewer.
+
+Every page shows how many BOMs wait, so finding them reads nothing but what waits
+(``db.tables.UNREFERENCED``, ``INCOMPLETE``).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Callable, Collection
+from typing import NamedTuple
+
+from sqlalchemy import ColumnElement, func, or_, select, text, true, union
+
+from silo.bom.report import Reason
+from silo_server.db.rows import one_of
+from silo_server.db.tables import INCOMPLETE, UNREFERENCED, assignees, bom_last_syncs, bom_lines, items, users
+from silo_server.db.transaction import Tx
+from silo_server.services.bom.tree import Told, conflicts_in
+
+
+class Waiting(NamedTuple):
+    """A BOM that waits, and for what. ``left_out`` counts what was left out, without unregistered parts.
+
+    told
+        CAD's quantities in its conflicts, by the child's internal id.
+    """
+
+    item_id: int
+    part_number: str
+    name: str
+    version: int
+    folder: str
+    document_file: str
+    synced_at: str | None
+    told: Told
+    assignee: str
+    unreferenced: int
+    left_out: int
+    unregistered: int
+
+    @property
+    def conflicts(self) -> int:
+        """Count the lines for which CAD has another quantity."""
+        return len(self.told)
+
+    @property
+    def mark(self) -> str:
+        """Make the mark of what is decided about: the BOM's version, and CAD's quantities in conflict."""
+        return conflicts_mark(self.version, self.told)
+
+
+def waiting(tx: Tx) -> list[Waiting]:
+    """Find all BOMs that wait for a person, by part number; archived assemblies never wait.
+
+    Reads only what a list of them is filtered and sorted by: there may be thousands.
+    """
+    unreferenced, conflicts, gaps = _unreferenced(tx), conflicts_in(tx), _gaps(tx)
+    row, last, nobody = items.c, bom_last_syncs.c, Told()
+    shown = (row.id, row.part_number, row.name, row.bom_version, last.folder, last.document_file, last.at)
+    query = (
+        select(*shown, users.c.username)
+        .outerjoin_from(items, bom_last_syncs, last.parent_id == row.id)
+        .outerjoin(assignees, assignees.c.item_id == row.id)
+        .outerjoin(users, users.c.id == assignees.c.user_id)
+        .where(one_of(tx, row.id, {*unreferenced, *conflicts, *gaps}), row.archived_at.is_(None))
+    )
+    waitings = [
+        Waiting(
+            *(record, number, name, version, folder or "", file or "", at),
+            *(
+                conflicts.get(record, nobody),
+                who or "",
+                unreferenced[record],
+                *gaps.get(record, (0, 0)),
+            ),
+        )
+        for record, number, name, version, folder, file, at, who in tx.conn.execute(query)
+    ]
+    return sorted(waitings, key=lambda record: record.part_number.casefold())
+
+
+def waiting_count(tx: Tx) -> int:
+    """Count the BOMs that wait."""
+    return _count(tx, lambda _: true())
+
+
+def open_among(tx: Tx, item_ids: Collection[int]) -> int:
+    """Count how many of these BOMs wait."""
+    return _count(tx, lambda element: one_of(tx, element, item_ids))
+
+
+def waiting_in(tx: Tx, folder: str) -> int:
+    """Count the BOMs that wait in a project folder and in the folders below it."""
+    last = bom_last_syncs.c
+    inside = or_(last.folder == folder, last.folder.startswith(f"{folder}/", autoescape=True))
+    return _count(tx, lambda element: element.in_(select(last.parent_id).where(inside)))
+
+
+def _count(tx: Tx, which: Callable[[ColumnElement[int]], ColumnElement[bool]]) -> int:
+    unreferenced = select(bom_lines.c.parent_id).where(text(f"bom_lines.{UNREFERENCED}"))
+    incomplete = select(bom_last_syncs.c.parent_id).where(text(f"({INCOMPLETE})"))
+    disputed = select(items.c.id).where(one_of(tx, items.c.id, conflicts_in(tx)))
+    parent_id = union(unreferenced, incomplete, disputed).subquery().c.parent_id
+    # Archived items are few: PostgreSQL reads all items, for each page, if asked which of these are not.
+    archived = select(items.c.id).where(items.c.archived_at.is_not(None))
+    return (
+        tx.conn.scalar(select(func.count(parent_id)).where(parent_id.not_in(archived), which(parent_id))) or 0
+    )
+
+
+def conflicts_mark(version: int, conflicts: Told) -> str:
+    """Make the mark of a BOM's version and of CAD's quantities in conflict."""
+    # A sync that only brings other conflicts changes no line, and so not the version.
+    digest = repr(sorted((child, conflict[0]) for child, conflict in conflicts.items()))
+    return f"{version}-{hashlib.sha256(digest.encode()).hexdigest()[:16]}"
+
+
+def _unreferenced(tx: Tx) -> Counter[int]:
+    query = select(bom_lines.c.parent_id, func.count()).where(text(f"bom_lines.{UNREFERENCED}"))
+    return Counter({row[0]: row[1] for row in tx.conn.execute(query.group_by(bom_lines.c.parent_id))})
+
+
+def _gaps(tx: Tx) -> dict[int, tuple[int, int]]:
+    """Count by BOM what its last sync left out: all but the unregistered parts, and these."""
+    row = bom_last_syncs.c
+    query = select(row.parent_id, row.left_out, row.refused_at).where(text(f"({INCOMPLETE})"))
+    gaps: dict[int, tuple[int, int]] = {}
+    for parent_id, left_out, refused_at in tx.conn.execute(query):
+        reasons = [gap["reason"] for gap in json.loads(left_out)]
+        unregistered = reasons.count(Reason.UNREGISTERED)
+        gaps[parent_id] = len(reasons) + bool(refused_at) - unregistered, unregistered
+    return gaps
