@@ -60,17 +60,17 @@ def blocking(assemblies: int, count: int) -> Callable[[], object]:
     """Return what finds the errors of each of many assemblies among ``count`` findings."""
     from dataclasses import replace
 
-    from silo import bom_sync
     from silo.bom.findings import Finding, FindingCode, Place, Severity
     from silo.bom.model import BomEntry
+    from silo.bom_sync.resolved import Resolved, blocking
 
     findings = tuple(
         Finding(FindingCode.MISSING_FILE, Severity.ERROR, "m", (Place(f"/v/{number % assemblies}.FCStd"),))
         for number in range(count)
     )
-    whole = bom_sync.Resolved(BomEntry("/v/top.FCStd", object_name="Top"), (), (), findings)
+    whole = Resolved(BomEntry("/v/top.FCStd", object_name="Top"), (), (), findings)
     heads = [BomEntry(f"/v/{number}.FCStd", object_name="A") for number in range(assemblies)]
-    return lambda: [bom_sync.blocking(replace(whole, assembly=head)) for head in heads]
+    return lambda: [blocking(replace(whole, assembly=head)) for head in heads]
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ from hypothesis import HealthCheck, settings
 from sharing import scheduler
 from warm_reader import warm_reader
 
-from silo.bom_sync import Memory
+from silo.bom_sync.memory import Memory
 
 # Time is measured in benchmarks; a test on a busy machine is not wrong for being slow. The examples are the
 # same in each run, so that no landing fails by chance; SILO_LONG=1 hunts with new ones, and more of them.
@@ -98,7 +98,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def _nothing_told(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """No test knows what another one told a server at the same address about unreferenced lines."""
     monkeypatch.setattr(
-        "silo.bom_sync._reported_lines", cache(lambda: Memory(tmp_path_factory.mktemp("told") / "told.json"))
+        "silo.bom_sync.reported_lines.reported_lines",
+        cache(lambda: Memory(tmp_path_factory.mktemp("told") / "told.json")),
     )
 
 

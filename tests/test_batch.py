@@ -22,7 +22,8 @@ from silo.bom.compare.merge import MergePlan
 from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
 from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
 from silo.bom.report import diff_rows
-from silo.bom_sync import Outcome, Resolved, Status
+from silo.bom_sync.resolved import Resolved
+from silo.bom_sync.steps import Outcome, Status
 from silo.fcstd import Library
 from silo.files import documents_in
 from silo.platform import scratch_folder

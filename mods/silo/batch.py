@@ -35,17 +35,8 @@ from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, diff_json, diff_rows, entry_json, finding_json, project_folder, shorten
-from silo.bom_sync import (
-    Outcome,
-    Resolved,
-    Status,
-    SyncApi,
-    assemblies,
-    blocking,
-    resolve,
-    server_lines,
-    sync_tree,
-)
+from silo.bom_sync.resolved import Resolved, assemblies, blocking, resolve
+from silo.bom_sync.steps import Outcome, Status, SyncApi, server_lines, sync_tree
 from silo.files import sha256_of
 from silo.platform import replacing
 

@@ -42,7 +42,8 @@ from silo.api.client import SiloClient
 from silo.api.policy import Retries
 from silo.batch import SyncOptions, TopResult, sync_top
 from silo.bom.errors import AuthError, BusyError, InputError, ServerFaultError, SiloError
-from silo.bom_sync import Status, compare, resolve
+from silo.bom_sync.resolved import resolve
+from silo.bom_sync.steps import Status, compare
 from silo.cli.connection import client_of
 from silo.cli.reading import read_assembly
 from silo.inertia.push import PushItem, PushPlan, push

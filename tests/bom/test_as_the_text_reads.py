@@ -121,7 +121,7 @@ def test_anything_with_a_number_and_a_quantity_can_be_compared() -> None:
 
 
 def test_the_names_of_the_spec_are_where_the_spec_has_them() -> None:
-    """``bom_sync.py`` is "assembly walker, quantity counter, UUID resolver" (spec §7)."""
+    """``bom_sync`` is "assembly walker, quantity counter, UUID resolver" (spec §7)."""
     for name in ("BomEntry", "BomDiff", "extract_bom_links", "resolve_part_numbers", "diff_bom"):
         assert getattr(silo.bom_sync, name) is getattr(silo.bom, name)
 

@@ -11,7 +11,7 @@ from gearbox_story import GearboxStory
 from playwright.sync_api import Page, expect
 
 from silo.api.client import SiloClient
-from silo.bom_sync import Status
+from silo.bom_sync.steps import Status
 from silo_server.run import RunningServer
 
 Visit = Callable[..., Page]

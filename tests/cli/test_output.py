@@ -20,7 +20,8 @@ from fcstd_writer import Doc, locals_, part
 
 from silo.api.wire import Draft, MergeResult
 from silo.bom.model import BomEntry
-from silo.bom_sync import Outcome, Resolved, Status
+from silo.bom_sync.resolved import Resolved
+from silo.bom_sync.steps import Outcome, Status
 from silo.cli.main import main
 from silo.cli.sync_display import outcome_text
 

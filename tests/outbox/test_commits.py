@@ -14,7 +14,7 @@ from silo.bom.errors import (
     SiloError,
     UnreachableError,
 )
-from silo.bom_sync import Status
+from silo.bom_sync.steps import Status
 from silo.outbox.entry import ASKED, Commit, State
 
 if TYPE_CHECKING:

@@ -12,7 +12,9 @@ import pytest
 from silo.bom.items.proposal import Proposal, crowded_files
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.standard import standard_uuid
-from silo.bom_sync import Memory, by_description, find_items, resolve
+from silo.bom_sync.memory import Memory
+from silo.bom_sync.resolved import resolve
+from silo.bom_sync.standard_items import by_description, find_items
 from silo.registering.items import register_standard
 from silo.testing import FakeSilo
 

@@ -14,7 +14,8 @@ from pathlib import Path
 from silo.api.client import SiloClient
 from silo.batch import source_document
 from silo.bom.model import walk_entries
-from silo.bom_sync import Outcome, Resolved, resolve, sync_tree
+from silo.bom_sync.resolved import Resolved, resolve
+from silo.bom_sync.steps import Outcome, sync_tree
 from silo.cli.reading import read_assembly
 from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
 from silo.registering.closed_files import proposals_for, register_all

@@ -22,7 +22,8 @@ from silo.batch import SyncOptions, TopResult
 from silo.bom.errors import AuthError, SiloError, UnreachableError
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
-from silo.bom_sync import Status, resolve, sync_tree
+from silo.bom_sync.resolved import resolve
+from silo.bom_sync.steps import Status, sync_tree
 from silo.fcstd import Library
 from silo.files import documents_in
 from silo.testing import FakeSilo

@@ -121,7 +121,7 @@ def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
 
 def summary_text(summary: ProductSummary) -> Text:
     """Write what the server keeps of a product over all levels: what is open, mass and cost."""
-    from silo.bom_sync import summary_texts
+    from silo.bom_sync.activity_text import summary_texts
 
     texts, values = summary_texts(summary)
     lines = [f"⚠ {plain(text)}" for text in texts]

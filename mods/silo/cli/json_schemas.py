@@ -18,7 +18,7 @@ import silo.inertia
 from silo.api.wire import MergeResult, OrderList, ProductSummary
 from silo.bom.errors import InputError
 from silo.bom.findings import FindingCode, Severity
-from silo.bom_sync import Status
+from silo.bom_sync.steps import Status
 
 
 def schema_of(name: str) -> dict[str, Any]:

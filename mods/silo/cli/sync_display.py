@@ -14,7 +14,8 @@ from silo.bom.items.naming import display_name
 from silo.cli.terminal import plain
 
 if TYPE_CHECKING:
-    from silo.bom_sync import ActivityText, Outcome
+    from silo.bom_sync.activity_text import ActivityText
+    from silo.bom_sync.steps import Outcome
 
 
 _STATUS = {
@@ -31,7 +32,7 @@ def outcome_text(outcome: Outcome, base: str) -> Text:
     """Write which assembly it was, what became of it, and its file relative to ``base``."""
     from silo.api.merging import unusual
     from silo.batch import STATUS_WORDS
-    from silo.bom_sync import draft_text
+    from silo.bom_sync.activity_text import draft_text
 
     mark, style = _STATUS[outcome.status]
     head = outcome.assembly

@@ -51,7 +51,10 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.report import from_plain, project_folder
-from silo.bom_sync import Resolved, Status, decide, merge_request, merged, resolve, server_lines, server_of
+from silo.bom_sync.memory import server_of
+from silo.bom_sync.reported_lines import remember_reported
+from silo.bom_sync.resolved import Resolved, resolve
+from silo.bom_sync.steps import Status, decide, merge_request, server_lines
 from silo.outbox.entry import ASKED, SAME_PART, Entry, InFile, State, new_key
 from silo.outbox.store import OutboxError, Store
 
@@ -575,7 +578,7 @@ class _SendRun:
             raise _PassingError(str(error)) from error
         self.store.arrived(entry, "bom")
         if sent.resolved is not None and sent.plan is not None:
-            merged(sent.resolved, sent.plan, server_of(self.client))
+            remember_reported(sent.resolved, sent.plan, server_of(self.client))
         return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
 
     def _at_revision(self, entry: Entry) -> Entry:

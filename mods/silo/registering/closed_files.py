@@ -12,7 +12,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding
 from silo.bom.items.proposal import Proposal, propose_all
 from silo.bom.model import BomEntry, Extraction
-from silo.bom_sync import resolve
+from silo.bom_sync.resolved import resolve
 from silo.fcstd import check_stampable, stamp
 from silo.freecads import OpenInFreecad, open_in_any
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile

@@ -34,7 +34,8 @@ from silo.bom.errors import (
 )
 from silo.bom.items.proposal import Proposal
 from silo.bom.model import BomEntry, as_uuid
-from silo.bom_sync import Memory, by_description, server_of
+from silo.bom_sync.memory import Memory, server_of
+from silo.bom_sync.standard_items import by_description, standard_item_memory
 from silo.registering.journal import Journal, RegistrationRecord, Turn, component_key
 from silo.registering.saved_file import on_disk
 
@@ -343,7 +344,7 @@ def register_standard(
     """
     entry = proposal.entry
     uuid, designation = entry.silo_uuid or "", entry.standard or ""
-    memory = memory or Memory()
+    memory = memory or standard_item_memory()
     try:
         item = api.get_item_by_uuid(uuid) or by_description(designation, api)
         existing = item is not None

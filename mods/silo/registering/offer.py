@@ -90,7 +90,7 @@ def offer(
         interrupted registrations (:meth:`Journal.pending`): an item that they made is the component's own,
         not a look-alike.
     """
-    from silo.bom_sync import resolve
+    from silo.bom_sync.resolved import resolve
 
     resolved = resolve(extraction, api)
     schema = api.find_schema(schema)

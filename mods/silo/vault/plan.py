@@ -39,17 +39,8 @@ from silo.bom.model import BomEntry, Extraction, copied_identity
 from silo.bom.report import shorten, whole_row
 from silo.bom.roots import choose_assembly, find_assemblies
 from silo.bom.standard import standard_uuid
-from silo.bom_sync import (
-    Outcome,
-    Resolved,
-    Status,
-    SyncApi,
-    blocking,
-    known_items,
-    plain_lines,
-    resolve_known,
-    sync,
-)
+from silo.bom_sync.resolved import Resolved, blocking, known_items, resolve_known
+from silo.bom_sync.steps import Outcome, Status, SyncApi, plain_lines, sync
 from silo.fcstd import Library
 from silo.fcstd.suggest import with_suggestions
 from silo.files import documents_in, folder_lock

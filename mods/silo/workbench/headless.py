@@ -40,7 +40,7 @@ from silo.files import check_writable, documents_in, job_text
 if TYPE_CHECKING:
     from silo.batch import TopResult
     from silo.bom.model import Extraction
-    from silo.bom_sync import Outcome
+    from silo.bom_sync.steps import Outcome
     from silo.workbench.freecad.witness import SolidCount
 
 
@@ -290,7 +290,7 @@ def _in_words(result: TopResult) -> str:
 
 def _outcome_words(outcome: Outcome) -> str:
     from silo.api.merging import unusual
-    from silo.bom_sync import blocking
+    from silo.bom_sync.resolved import blocking
 
     text = f"{outcome.assembly.part_number or outcome.assembly.label} {outcome.status.value}"
     reasons = [str(outcome.error)] if outcome.error is not None else []

@@ -12,9 +12,9 @@ from activities import activity_of, entry_text
 from silo.api.merging import NOT_ATOMIC
 from silo.api.sse import ServerEvent
 from silo.api.wire import CostTotal, Draft, Lacking, MergeDiff, MergeWarning, ProductSummary, Revision
-from silo.bom.errors import InputError
+from silo.bom.errors import InputError, english
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom_sync import counts_text, english
+from silo.bom_sync.activity_text import counts_text
 from silo.workbench import words
 from silo.workbench.activity.badges import badges
 from silo.workbench.activity.box import Do, PaneEntry

@@ -17,7 +17,8 @@ from server_testing import sqlite_database
 from silo.api.client import SiloClient
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.model import BomEntry, Extraction
-from silo.bom_sync import resolve, sync
+from silo.bom_sync.resolved import resolve
+from silo.bom_sync.steps import sync
 from silo.cli.main import main
 from silo.cli.reading import read_assembly
 from silo.registering.closed_files import proposals_for, register_all

@@ -19,7 +19,7 @@ from silo.api.pause import Pause
 from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeEvent, MergeResult
 from silo.bom.errors import SiloError, UnreachableError
-from silo.bom_sync import Status
+from silo.bom_sync.steps import Status
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
 from silo.outbox.send import Sent, send_all
 from silo.outbox.store import OutboxError, Store

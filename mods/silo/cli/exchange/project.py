@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo import spoken
 from silo.bom.errors import Exit, UnreachableError, counted, exit_of
-from silo.bom_sync import draft_text
+from silo.bom_sync.activity_text import draft_text
 from silo.cli.connection import client_of, reach
 from silo.cli.json_output import print_json
 from silo.cli.options import add_options

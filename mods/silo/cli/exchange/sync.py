@@ -154,7 +154,7 @@ def _show(result: TopResult, *, whole: bool) -> None:
     has the rest.
     """
     from silo.batch import is_news
-    from silo.bom_sync import Status
+    from silo.bom_sync.steps import Status
     from silo.cli.bom_display import diff_table, findings_text
     from silo.cli.sync_display import outcome_text
     from silo.cli.terminal import console, plain

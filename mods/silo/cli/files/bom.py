@@ -59,7 +59,7 @@ def run_bom(args: argparse.Namespace) -> int:
     extraction, summary = read_tops(args)[0], None
     if args.resolve:
         from silo.batch import ask_for_moved
-        from silo.bom_sync import resolve
+        from silo.bom_sync.resolved import resolve
 
         with client_of(args) as client:
             reach(client, extraction)

@@ -19,7 +19,7 @@ from silo.cli.options import add_top
 from silo.cli.reading import plan_of, read_tops
 
 if TYPE_CHECKING:
-    from silo.bom_sync import Resolved
+    from silo.bom_sync.resolved import Resolved
 
 
 def add_diff(parser: argparse.ArgumentParser) -> None:
@@ -31,7 +31,8 @@ def run_diff(args: argparse.Namespace) -> int:
     components.
     """
     from silo.batch import suggest_by_identity
-    from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
+    from silo.bom_sync.resolved import assemblies, blocking, names_of, resolve
+    from silo.bom_sync.steps import server_lines
 
     if os.path.isdir(args.top):
         return _folder_diff(args)
@@ -67,7 +68,7 @@ def run_diff(args: argparse.Namespace) -> int:
 def _folder_diff(args: argparse.Namespace) -> int:
     """Compare every assembly of a folder with the server, and show those that differ."""
     from silo.batch import RunSummary, SyncOptions, is_news
-    from silo.bom_sync import blocking
+    from silo.bom_sync.resolved import blocking
     from silo.cli.bom_display import diff_table
     from silo.cli.sync_display import outcome_text
     from silo.cli.terminal import console, plain
@@ -128,7 +129,7 @@ def _head(resolved: Resolved, base: str) -> dict[str, Any]:
 def _show(
     whole: Resolved, compared: list[tuple[Resolved, BomDiff]], names: dict[str, str], base: str
 ) -> None:
-    from silo.bom_sync import blocking
+    from silo.bom_sync.resolved import blocking
     from silo.cli.bom_display import diff_table, entry_text, findings_text
     from silo.cli.terminal import console, plain
 

@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import AuthError, Exit, NotFoundError, RouteMissingError
-from silo.bom_sync import activity_text
+from silo.bom_sync.activity_text import activity_text
 from silo.cli.connection import client_of, named_item
 from silo.cli.json_output import json_text
 from silo.cli.options import above_zero

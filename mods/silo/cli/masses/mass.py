@@ -86,7 +86,7 @@ def _push(args: argparse.Namespace, report: InertiaReport) -> int:
     of the top assembly.
     """
     from silo.bom.report import base_of
-    from silo.bom_sync import resolve
+    from silo.bom_sync.resolved import resolve
     from silo.inertia.geometry.freecad import product_key
 
     extraction = read_tops(args)[0]

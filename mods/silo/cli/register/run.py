@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 def warn_of_rules(categories: Mapping[str, str]) -> None:
     """Report a mistake in the site's rules on standard error; it only costs proposals."""
-    from silo.bom_sync import rules_text
+    from silo.bom_sync.activity_text import rules_text
     from silo.cli.terminal import plain
 
     if problem := getattr(categories, "problem", ""):

@@ -25,7 +25,9 @@ from silo.bom.consolidation import consolidation_findings
 from silo.bom.errors import Exit, InputError, ServerFaultError
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
-from silo.bom_sync import Outcome, Status, activity_text, resolve, sync_tree
+from silo.bom_sync.activity_text import activity_text
+from silo.bom_sync.resolved import resolve
+from silo.bom_sync.steps import Outcome, Status, sync_tree
 from silo.cli.bom_display import bom_tree, diff_table, findings_text
 from silo.cli.options import add_options
 from silo.cli.reading import read_assembly

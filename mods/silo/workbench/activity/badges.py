@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from silo.api.wire import MergeDiff, MergeWarning
-from silo.bom_sync import MergeCount, count_texts, no_changes
+from silo.bom_sync.activity_text import MergeCount, count_texts, no_changes
 from silo.workbench.activity.box import EntryLine
 from silo.workbench.tone import Tone
 from silo.workbench.words import translate

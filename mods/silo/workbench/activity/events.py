@@ -9,7 +9,7 @@ from typing import Any
 
 from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeEvent
-from silo.bom_sync import headline
+from silo.bom_sync.activity_text import headline
 from silo.workbench.activity.badges import badges
 from silo.workbench.activity.box import EntryBatch, EntryLine, PaneEntry, revision_key
 from silo.workbench.activity.links import Page, view_actions

@@ -11,14 +11,14 @@ from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
 from silo.bom.model import BomEntry, walk_entries
 from silo.bom.report import shorten
-from silo.bom_sync import (
-    Resolved,
-    Status,
+from silo.bom_sync.activity_text import (
     draft_text,
     headline,
     summary_texts,
     unregistered_text,
 )
+from silo.bom_sync.resolved import Resolved
+from silo.bom_sync.steps import Status
 from silo.outbox.send import Sent
 from silo.workbench.activity.badges import badges
 from silo.workbench.activity.box import (

@@ -30,7 +30,7 @@ from silo.workbench.words import MOST_TIP, counted, plain, quantity, spoken, tra
 
 if TYPE_CHECKING:
     from silo.bom.objects import Key
-    from silo.bom_sync import Resolved
+    from silo.bom_sync.resolved import Resolved
 
 
 # Letters of a cell; its tool tip has the rest.
@@ -149,7 +149,8 @@ class Preview:
 def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
     """Compare a snapshot with the server, sub-assemblies included. Worker."""
     from silo.batch import suggest_by_identity
-    from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
+    from silo.bom_sync.resolved import assemblies, blocking, names_of, resolve
+    from silo.bom_sync.steps import server_lines
     from silo.fcstd.suggest import with_suggestions
 
     extraction = snapshot.extraction or Extraction(BomEntry(snapshot.path, label=snapshot.label))
@@ -169,7 +170,7 @@ def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
 
 
 def _compared(resolved: Resolved, lines: tuple[Mapping[str, Any], ...]) -> Compared:
-    from silo.bom_sync import Status, decide
+    from silo.bom_sync.steps import Status, decide
 
     # Whether what is missing may be left out is asked in the window, so it does not count here.
     outcome = decide(resolved, lines, allow_missing=True)

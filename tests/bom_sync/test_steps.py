@@ -17,7 +17,8 @@ from silo.bom.compare.merge import apply_merge, plan_merge
 from silo.bom.errors import UnreachableError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
-from silo.bom_sync import Status
+from silo.bom_sync.resolved import blocking
+from silo.bom_sync.steps import Status
 
 
 @dataclass
@@ -199,7 +200,7 @@ def test_what_blocks_an_assembly_is_an_error_in_its_file_or_a_loop_anywhere(
 ) -> None:
     """In the order of the walk, each once; the same for a copy with another assembly or other findings."""
     one = bom_sync.Resolved(BomEntry("/v/other.FCStd", object_name="A"), (), (), tuple(findings))
-    bom_sync.blocking(one)
+    blocking(one)
     other = replace(one, assembly=replace(one.assembly, doc_path=path))
     loops = (FindingCode.CYCLE, FindingCode.TOO_DEEP)
     wanted = [
@@ -208,8 +209,8 @@ def test_what_blocks_an_assembly_is_an_error_in_its_file_or_a_loop_anywhere(
         if finding.severity is Severity.ERROR
         and (finding.code in loops or any(place.doc_path == path for place in finding.where))
     ]
-    assert list(bom_sync.blocking(other)) == wanted
-    assert bom_sync.blocking(replace(other, findings=())) == ()
+    assert list(blocking(other)) == wanted
+    assert blocking(replace(other, findings=())) == ()
 
 
 def synced(*entries: BomEntry, lines: list[dict[str, object]], at: str | None) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from silo.api.wire import MergeDiff, MergeResult
-from silo.bom_sync import activity_text, counts_text, unregistered_text
+from silo.bom_sync.activity_text import activity_text, counts_text, unregistered_text
 
 LINE = {"part_number": "P", "quantity": 1}
 CHANGE = {"part_number": "P", "old_quantity": 1, "new_quantity": 2}
