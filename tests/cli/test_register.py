@@ -28,7 +28,7 @@ from silo.registering.candidate import Candidate, ComponentState, Similar
 from silo.registering.closed_files import carry_out_on_disk, proposals_for
 from silo.registering.journal import Journal, component_key
 from silo.registering.offer import Offer
-from silo.registering.request import ITEM_TYPES, Order
+from silo.registering.request import ITEM_TYPES, RegistrationRequest
 from silo.registering.saved_file import on_disk
 from silo.testing import FakeSilo
 from silo_server.run import running_server
@@ -50,8 +50,8 @@ def talk(
     queue = iter(answers)
 
     found = Offer(candidates, CATEGORIES)
-    orders, left = Dialog(candidates, found, silo, "/v", lambda _one: own, lambda _: next(queue)).ask()
-    rows = [(o.name, o.item_type, o.category, o.existing and o.existing.part_number) for o in orders]
+    requests, left = Dialog(candidates, found, silo, "/v", lambda _one: own, lambda _: next(queue)).ask()
+    rows = [(o.name, o.item_type, o.category, o.existing and o.existing.part_number) for o in requests]
     assert not list(queue), "an answer was not asked for"
     return rows, [one.proposal.name for one in left]
 
@@ -315,9 +315,9 @@ def test_what_was_done_before_ctrl_c_is_known(gearbox: Path) -> None:
     silo, done = Interrupted(), []
     extraction = read_assembly(str(gearbox))
     proposals = proposals_for(extraction, silo, "kindred-rd")
-    orders = [Order.of(Candidate(one, ComponentState.READY)) for one in proposals]
+    requests = [RegistrationRequest.of(Candidate(one, ComponentState.READY)) for one in proposals]
     with pytest.raises(KeyboardInterrupt):
-        carry_out_on_disk(orders, silo, schema="kindred-rd", done=done)
+        carry_out_on_disk(requests, silo, schema="kindred-rd", done=done)
     (first,) = done
     assert open_document(first.proposal.entry.doc_path).Meta["SiloUUID"] == first.item_id
 

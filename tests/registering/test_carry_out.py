@@ -17,7 +17,7 @@ from silo.registering.items import Registration
 from silo.registering.journal import Journal
 from silo.registering.learnt import Learnt, LearntChoice
 from silo.registering.modelled import Modelled
-from silo.registering.request import Order
+from silo.registering.request import RegistrationRequest
 from silo.testing import FakeSilo
 from silo.workbench.session.worker import Control
 
@@ -25,12 +25,12 @@ from silo.workbench.session.worker import Control
 def carried_out(
     silo: FakeSilo, folder: Path, *, apart: bool = False, source: str = ""
 ) -> tuple[list[Registration], dict[tuple[str, ...], str]]:
-    """What became of an order for two equal motors, and which objects got which identity."""
+    """What became of a request for two equal motors, and which objects got which identity."""
     entry = BomEntry(str(folder / "machine.FCStd"), object_name="Motor", label="Motor", quantity=2)
     article = Modelled(entry, ("Motor", "Motor001"), "shape", source)
     proposal = propose(entry, {"M01": "Machined part"}, shares_file=True)
     candidate = Candidate(proposal, ComponentState.READY, article=article)
-    order = Order(candidate, "Motor", "part", "M01", apart=apart)
+    request = RegistrationRequest(candidate, "Motor", "part", "M01", apart=apart)
     done: list[Registration] = []
     written: dict[tuple[str, ...], str] = {}
 
@@ -39,13 +39,13 @@ def carried_out(
         written[one.article.objects] = identity
 
     carry_out(
-        [order],
+        [request],
         silo,
         Journal(folder / "journal"),
         write,
         schema="kindred-rd",
         control=Control(lambda _detail, _fraction: None),
-        done=lambda _order, result: done.append(result),
+        done=lambda _request, result: done.append(result),
     )
     return done, written
 
@@ -113,9 +113,11 @@ def test_undo_leaves_what_others_use(tmp_path: Path) -> None:
         (BomEntry("/v/joined.FCStd"), True),
         (BomEntry("/v/new.FCStd"), False),
     ):
-        order = Order.of(Candidate(propose(entry, {"M01": "Machined part"}), ComponentState.READY))
+        request = RegistrationRequest.of(
+            Candidate(propose(entry, {"M01": "Machined part"}), ComponentState.READY)
+        )
         item = silo.create_item("kindred-rd", "M01", entry.doc_path)
-        done.append((order, Registration(order.proposal, item.part_number, item.id, found=found)))
+        done.append((request, Registration(request.proposal, item.part_number, item.id, found=found)))
     restored: list[str] = []
     take_back(
         done,
@@ -123,12 +125,12 @@ def test_undo_leaves_what_others_use(tmp_path: Path) -> None:
         Journal(tmp_path / "journal"),
         lambda candidate: restored.append(candidate.entry.doc_path),
         control=Control(lambda _detail, _fraction: None),
-        back=lambda _order, _error: None,
+        back=lambda _request, _error: None,
     )
     assert restored == ["/v/new.FCStd", "/v/joined.FCStd"]
     left = {
-        order.candidate.entry.doc_path
-        for order, result in done
+        request.candidate.entry.doc_path
+        for request, result in done
         if silo.get_item_by_uuid(str(result.item_id)) is not None
     }
     assert left == {"", "/v/foreign.FCStd", "/v/joined.FCStd"}

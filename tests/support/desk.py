@@ -23,7 +23,7 @@ from silo.platform import stamp_of
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.registering.items import Registration
 from silo.registering.offer import Offer
-from silo.registering.request import Order
+from silo.registering.request import RegistrationRequest
 from silo.testing import FakeSilo
 from silo.workbench.commit.desk import CommitAnswer, Look
 from silo.workbench.commit.plan import CommitPlan
@@ -226,17 +226,17 @@ class RegisterWindow:
     def set_number(self, category: str, number: str) -> None:
         self.numbers[category] = number
 
-    def registered(self, _order: Order, result: Registration) -> None:
+    def registered(self, _order: RegistrationRequest, result: Registration) -> None:
         self.results.append(result)
 
-    def register(self, orders: Iterable[Order]) -> None:
-        self.flow.register(self.path, orders)
+    def register(self, requests: Iterable[RegistrationRequest]) -> None:
+        self.flow.register(self.path, requests)
 
     def undeclared(self, row: Any, *, no_part: bool) -> None:
         self.undone.append((row, no_part))
 
-    def taken_back(self, order: Order, error: SiloError | None) -> None:
-        self.back.append((order.name, error))
+    def taken_back(self, request: RegistrationRequest, error: SiloError | None) -> None:
+        self.back.append((request.name, error))
 
     def show_pictures(self, pictures: Mapping[str, bytes]) -> None:
         self.pictures.update(pictures)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Registering components: what is offered, what a person edits, what is carried out."""
+"""Registering components: what is offered, what the user requests, what is carried out."""

@@ -20,7 +20,7 @@ from silo.registering.items import Registration, RegistrationApi, register, regi
 from silo.registering.journal import Journal, component_key
 from silo.registering.learnt import Learnt, LearntChoice
 from silo.registering.modelled import Modelled, source_identity
-from silo.registering.request import Order
+from silo.registering.request import RegistrationRequest
 
 # Writes an identity into the component's document and saves it: (candidate, identity).
 Write = Callable[[Candidate, str], None]
@@ -29,29 +29,33 @@ Write = Callable[[Candidate, str], None]
 Check = Callable[[Candidate], None]
 
 # Which of the items that fit an interrupted run made: one of them, or None for a new item.
-AskOrder = Callable[[Order, Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None]
+AskForRequest = Callable[
+    [RegistrationRequest, Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None
+]
 
 
-def seen_before(order: Order, proposal: Proposal, matches: Sequence[Mapping[str, Any]]) -> None:
-    """Allow a new item if the person saw all these items in the dialog and took none of them. Raises
+def seen_before(
+    request: RegistrationRequest, proposal: Proposal, matches: Sequence[Mapping[str, Any]]
+) -> None:
+    """Allow a new item if the user saw all these items in the dialog and took none of them. Raises
     ConflictError otherwise.
     """
-    shown = {similar.item_id for similar in order.candidate.similar}
+    shown = {similar.item_id for similar in request.candidate.similar}
     if not all(str(item["id"]) in shown for item in matches):
         unclear(proposal, matches)
 
 
 def carry_out(
-    orders: Sequence[Order],
+    requests: Sequence[RegistrationRequest],
     api: RegistrationApi,
     journal: Journal,
     write: Write,
     *,
     schema: str,
     control: RegisterControl,
-    done: Callable[[Order, Registration], object],
+    done: Callable[[RegistrationRequest, Registration], object],
     check: Check = lambda _candidate: None,
-    ask: AskOrder = seen_before,
+    ask: AskForRequest = seen_before,
 ) -> None:
     """Register one component after another; ``done`` is called with each result. Worker.
 
@@ -61,44 +65,44 @@ def carry_out(
     from silo.api.policy import ends_run
 
     gone: SiloError | None = None
-    run = _OrderRun(api, journal, write, schema, check, ask, control)
+    run = _CarryOut(api, journal, write, schema, check, ask, control)
     learnt = []
-    for number, order in enumerate(orders):
+    for number, request in enumerate(requests):
         control.check()
-        control.progress(order.name, number / len(orders))
-        result = Registration(order.proposal, error=gone) if gone is not None else run.one(order)
+        control.progress(request.name, number / len(requests))
+        result = Registration(request.proposal, error=gone) if gone is not None else run.one(request)
         gone = result.error if result.error is not None and ends_run(result.error, api) else None
-        done(order, result)
-        if result.error is None and order.teaches:
-            choice = LearntChoice((), order.category, order.sourcing, order.supplier)
-            learnt.append((order.candidate.entry, order.candidate.proposal.name, choice))
+        done(request, result)
+        if result.error is None and request.teaches:
+            choice = LearntChoice((), request.category, request.sourcing, request.supplier)
+            learnt.append((request.candidate.entry, request.candidate.proposal.name, choice))
     if learnt:
         Learnt().learn(learnt)
 
 
 def take_back(
-    done: Sequence[tuple[Order, Registration]],
+    done: Sequence[tuple[RegistrationRequest, Registration]],
     api: RegistrationApi,
     journal: Journal,
     restore: Callable[[Candidate], None],
     *,
     control: RegisterControl,
-    back: Callable[[Order, SiloError | None], object],
+    back: Callable[[RegistrationRequest, SiloError | None], object],
 ) -> None:
     """Undo registrations, the last one first: files as they were before, and new items archived. Worker.
 
     restore
         gives a component's file the identity that it had before, or none.
     back
-        called with each order, and with the error that kept it from being undone.
+        called with each request, and with the error that kept it from being undone.
 
     The items of standard parts stay, because other projects have them too. Items with identities of another
     server, which the files had before, stay as well.
     """
-    for number, (order, result) in enumerate(reversed(done)):
+    for number, (request, result) in enumerate(reversed(done)):
         control.check()
-        control.progress(order.name, number / len(done))
-        candidate = order.candidate
+        control.progress(request.name, number / len(done))
+        candidate = request.candidate
         if candidate.entry.is_standard or candidate.foreign:
             continue
         error = None
@@ -109,30 +113,30 @@ def take_back(
                 api.archive_item(part_number)
         except SiloError as problem:
             error = problem
-        back(order, error)
+        back(request, error)
 
 
 @dataclass(frozen=True)
-class _OrderRun:
+class _CarryOut:
     api: RegistrationApi
     journal: Journal
     write: Write
     schema: str
     check: Check
-    ask: AskOrder
+    ask: AskForRequest
     control: RegisterControl
 
-    def one(self, order: Order) -> Registration:
-        candidate = replace(order.candidate, proposal=order.proposal)
+    def one(self, request: RegistrationRequest) -> Registration:
+        candidate = replace(request.candidate, proposal=request.proposal)
         if candidate.entry.is_standard:
-            return register_standard(order.proposal, self.api, schema=self.schema)
-        if order.existing is not None:
-            return self._join(candidate, order.existing.part_number, order.existing.item_id)
+            return register_standard(request.proposal, self.api, schema=self.schema)
+        if request.existing is not None:
+            return self._join(candidate, request.existing.part_number, request.existing.item_id)
         if candidate.article is not None:
-            return self._declare(order, candidate.article)
-        return self._register(order, candidate)
+            return self._declare(request, candidate.article)
+        return self._register(request, candidate)
 
-    def _register(self, order: Order, candidate: Candidate) -> Registration:
+    def _register(self, request: RegistrationRequest, candidate: Candidate) -> Registration:
         return register(
             candidate.proposal,
             self.api,
@@ -143,7 +147,7 @@ class _OrderRun:
             schema=self.schema,
             properties={"file_sha256": candidate.sha256} if candidate.sha256 else None,
             check=lambda _entry: self.check(candidate),
-            ask=lambda proposal, matches: self.ask(order, proposal, matches),
+            ask=lambda proposal, matches: self.ask(request, proposal, matches),
             copy=bool(candidate.same_as),
             tell=self.control.progress,
         )
@@ -156,24 +160,24 @@ class _OrderRun:
             return Registration(candidate.proposal, error=error)
         return Registration(candidate.proposal, part_number=number, item_id=item_id, found=True)
 
-    def _declare(self, order: Order, article: Modelled) -> Registration:
+    def _declare(self, request: RegistrationRequest, article: Modelled) -> Registration:
         """Give all objects of an article one identity: that of the file from which it was imported, or of a
         new item.
 
         An error of one copy leaves the others as they are.
         """
         done = []
-        for modelled in article.apart() if order.apart else (article,):
+        for modelled in article.apart() if request.apart else (article,):
             entry: BomEntry = replace(modelled.entry, silo_uuid=None)
-            name = f"{order.name} {entry.object_name}" if order.apart else order.name
-            proposal = replace(order.proposal, entry=entry, name=name)
-            candidate = replace(order.candidate, article=modelled, proposal=proposal)
-            result = self._as_imported(candidate, modelled) or self._register(order, candidate)
+            name = f"{request.name} {entry.object_name}" if request.apart else request.name
+            proposal = replace(request.proposal, entry=entry, name=name)
+            candidate = replace(request.candidate, article=modelled, proposal=proposal)
+            result = self._as_imported(candidate, modelled) or self._register(request, candidate)
             if result.error is not None:
-                return replace(result, proposal=order.proposal)
+                return replace(result, proposal=request.proposal)
             done.append(result)
         numbers = ", ".join(str(result.part_number) for result in done)
-        return replace(done[0], proposal=order.proposal, part_number=numbers)
+        return replace(done[0], proposal=request.proposal, part_number=numbers)
 
     def _as_imported(self, candidate: Candidate, article: Modelled) -> Registration | None:
         """Register with the identity of the file from which A2plus imported it; None if Silo has no such

@@ -20,7 +20,7 @@ from silo.registering.carry_out import carry_out
 from silo.registering.control import RegisterControl
 from silo.registering.items import Ask, Registration, unclear
 from silo.registering.journal import Journal, begun_beside, component_key
-from silo.registering.request import Order
+from silo.registering.request import RegistrationRequest
 from silo.registering.saved_file import on_disk
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def is_own(candidate: Candidate) -> bool:
 
 
 def carry_out_on_disk(
-    orders: Sequence[Order],
+    requests: Sequence[RegistrationRequest],
     client: SiloClient,
     *,
     schema: str,
@@ -138,15 +138,15 @@ def carry_out_on_disk(
             check_stampable(candidate.entry.doc_path, object_name=own, item_object=item, replace=again)
 
     carry_out(
-        orders,
+        requests,
         client,
         Journal(),
         write,
         schema=schema,
         control=control,
-        done=lambda _order, result: results.append(result),
+        done=lambda _request, result: results.append(result),
         check=check,
-        ask=lambda _order, proposal, items: ask(proposal, items),
+        ask=lambda _request, proposal, items: ask(proposal, items),
     )
     return results
 
@@ -162,5 +162,5 @@ def register_all(
     proposals: Sequence[Proposal], client: SiloClient, *, schema: str, **more: Any
 ) -> list[Registration]:
     """Register these as they were proposed (:func:`carry_out_on_disk`)."""
-    orders = [Order.of(Candidate(proposal, ComponentState.READY)) for proposal in proposals]
-    return carry_out_on_disk(orders, client, schema=schema, **more)
+    requests = [RegistrationRequest.of(Candidate(proposal, ComponentState.READY)) for proposal in proposals]
+    return carry_out_on_disk(requests, client, schema=schema, **more)

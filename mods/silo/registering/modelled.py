@@ -23,7 +23,7 @@ from silo.bom.objects import survey_of
 from silo.bom.roles import DECLARABLE
 from silo.bom.roots import choose_assembly, silent_reader
 from silo.fcstd import Library
-from silo.fcstd.document import FcstdObject
+from silo.fcstd.objects import FcstdObject
 
 # FreeCAD numbers copies with three digits.
 _NUMBER = re.compile(r"\d{3}$")

@@ -18,15 +18,15 @@ CHOSEN = ("name", "item_type", "category", "sourcing", "supplier", "supplier_par
 
 
 @dataclass(frozen=True)
-class Order:
-    """A row that is to be registered, as the person left it.
+class RegistrationRequest:
+    """What is to be registered, as the user left it.
 
     existing
         item to join instead of making a new one.
     apart
         of equal copies that are modelled in the file, each gets an item of its own.
     sourcing
-        "manufactured" or "purchased"; "" while nobody has said.
+        "manufactured" or "purchased"; "" if it is not known.
     """
 
     candidate: Candidate
@@ -40,8 +40,8 @@ class Order:
     supplier_part_number: str = ""
 
     @classmethod
-    def of(cls, candidate: Candidate) -> Order:
-        """Make an order of a candidate, as it was proposed."""
+    def of(cls, candidate: Candidate) -> RegistrationRequest:
+        """Make a request of a candidate, as it was proposed."""
         return cls(candidate, **{name: getattr(candidate.proposal, name) for name in CHOSEN})
 
     @property
@@ -50,13 +50,13 @@ class Order:
 
     @property
     def teaches(self) -> bool:
-        """Return True if a person chose something that is proposed for the next part with such a name."""
+        """Return True if the user chose something that is proposed for the next part with such a name."""
         before, entry = self.candidate.proposal, self.candidate.entry
         changed = (self.category, self.sourcing) != (before.category, before.sourcing)
         return changed and not entry.is_standard and not entry.is_assembly and self.existing is None
 
-    def retyped(self, item_type: str, categories: Mapping[str, str]) -> Order:
-        """Change the type of the order; the category follows if it is one that was proposed.
+    def retyped(self, item_type: str, categories: Mapping[str, str]) -> RegistrationRequest:
+        """Change the type of the request; the category follows if it is one that was proposed.
 
         categories
             code → description, as the schema has them.

@@ -21,7 +21,7 @@ from silo.bom.errors import InputError
 from silo.bom.headers import plain_cell, safe_cell
 from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
 from silo.registering.offer import Offer
-from silo.registering.request import AS_UTF_8, ITEM_TYPES, Order, find_item, wrong_name
+from silo.registering.request import AS_UTF_8, ITEM_TYPES, RegistrationRequest, find_item, wrong_name
 from silo.registering.saved_file import fingerprint
 from silo.workbook import unicode_name
 
@@ -222,13 +222,13 @@ class Planned:
         components without a number that the table does not know.
     """
 
-    orders: tuple[Order, ...]
+    requests: tuple[RegistrationRequest, ...]
     done: int
     unlisted: tuple[Candidate, ...]
 
 
-def orders_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name: str) -> Planned:
-    """Make the orders of a table. InputError lists all problems with their lines; then nothing is
+def requests_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name: str) -> Planned:
+    """Make the requests of a table. InputError lists all problems with their lines; then nothing is
     registered.
     """
     candidates = {
@@ -237,28 +237,28 @@ def orders_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name:
     registered = {(relative(path, base), obj): number for (path, obj), number in offer.registered.items()}
     counts = Counter(row.key for row in rows)
     problems: list[str] = []
-    orders = []
-    joined: dict[str, list[Order]] = {}
+    requests = []
+    joined: dict[str, list[RegistrationRequest]] = {}
     done = 0
     for row in rows:
-        order_problems: list[str] = []
+        row_problems: list[str] = []
         wanted = _ANSWERS.get(row.cells["register"].lower())
         if wanted is None:
-            order_problems.append(f"register: wanted yes or no, got {row.cells['register']!r}")
+            row_problems.append(f"register: wanted yes or no, got {row.cells['register']!r}")
         if counts[row.key] > 1:
-            order_problems.append("the component is there more than once")
+            row_problems.append("the component is there more than once")
         candidate = candidates.get(row.key)
         if candidate is not None and wanted:
-            orders.append(order := _order(row, candidate, offer, api, order_problems))
-            if order is not None and order.existing is not None:
-                order_problems += _joined_before(order, joined.setdefault(order.existing.item_id, []))
+            requests.append(request := _request(row, candidate, offer, api, row_problems))
+            if request is not None and request.existing is not None:
+                row_problems += _joined_before(request, joined.setdefault(request.existing.item_id, []))
         elif candidate is None and row.key in registered and wanted:
             done += 1
         elif candidate is None and wanted:
             what = row.cells["standard"] or f"{row.cells['file']}#{row.cells['object']}"
             hint = "" if what.isprintable() else f"; {AS_UTF_8}"
-            order_problems.append(f"{what} is no component here{hint}")
-        problems += [f"line {row.line}: {words}" for words in order_problems]
+            row_problems.append(f"{what} is no component here{hint}")
+        problems += [f"line {row.line}: {words}" for words in row_problems]
     if problems:
         raise InputError(f"{name}: nothing was registered, because some rows have problems", problems)
     listed = {row.key for row in rows}
@@ -267,31 +267,31 @@ def orders_of(rows: Sequence[TableRow], offer: Offer, base: str, api: Any, name:
         for key, component in candidates.items()
         if key not in listed and component.article is None and not component.same_as
     )
-    return Planned(tuple(order for order in orders if order is not None), done, unlisted)
+    return Planned(tuple(request for request in requests if request is not None), done, unlisted)
 
 
-def _order(
-    row: TableRow, candidate: Candidate, offer: Offer, api: Any, order_remarks: list[str]
-) -> Order | None:
+def _request(
+    row: TableRow, candidate: Candidate, offer: Offer, api: Any, row_problems: list[str]
+) -> RegistrationRequest | None:
     cells = row.cells
-    before = len(order_remarks)
-    order_remarks += filter(None, [wrong_name(cells["name"], candidate)])
+    before = len(row_problems)
+    row_problems += filter(None, [wrong_name(cells["name"], candidate)])
     if cells["source"] not in SOURCES:
-        order_remarks.append(f"source: wanted made, bought or nothing; got {cells['source']!r}")
+        row_problems.append(f"source: wanted made, bought or nothing; got {cells['source']!r}")
     elif cells["source"] != "bought" and (cells["supplier"] or cells["supplier_number"]):
-        order_remarks.append(
+        row_problems.append(
             "source: a part with a supplier is bought; say bought, or leave the supplier empty"
         )
     if cells["type"] not in ITEM_TYPES:
-        order_remarks.append(f"type: wanted {', '.join(ITEM_TYPES)}; got {cells['type']!r}")
+        row_problems.append(f"type: wanted {', '.join(ITEM_TYPES)}; got {cells['type']!r}")
     if cells["category"] not in offer.categories:
-        order_remarks.append(
+        row_problems.append(
             f"category: there is no {cells['category']!r}; there are {', '.join(offer.categories)}"
         )
     if not candidate.state.usable or candidate.state is ComponentState.ELSEWHERE:
-        order_remarks.append(f"{cells['file']}: {_FILES.get(candidate.state, 'the file cannot be written')}")
+        row_problems.append(f"{cells['file']}: {_FILES.get(candidate.state, 'the file cannot be written')}")
     elif cells["fingerprint"] not in ("", _fingerprint(candidate)):
-        order_remarks.append(
+        row_problems.append(
             f"{cells['file']} has changed since the table was written; look at it, write a new one"
         )
     existing = None
@@ -299,18 +299,20 @@ def _order(
         try:
             existing = find_item(number, candidate, api)
         except InputError as error:
-            order_remarks.append(f"part_number: {error}")
-    if len(order_remarks) > before:
+            row_problems.append(f"part_number: {error}")
+    if len(row_problems) > before:
         return None
     supply = (SOURCES[cells["source"]], cells["supplier"], cells["supplier_number"])
-    return Order(candidate, cells["name"], cells["type"], cells["category"], existing, False, *supply)
+    return RegistrationRequest(
+        candidate, cells["name"], cells["type"], cells["category"], existing, False, *supply
+    )
 
 
-def _joined_before(order: Order, earlier: list[Order]) -> list[str]:
+def _joined_before(request: RegistrationRequest, earlier: list[RegistrationRequest]) -> list[str]:
     """Find a number that was copied down a column, which would make one item of several parts."""
-    others = [other for other in earlier if other.candidate.sha256 != order.candidate.sha256]
-    earlier.append(order)
-    number = order.existing.part_number if order.existing else ""
+    others = [other for other in earlier if other.candidate.sha256 != request.candidate.sha256]
+    earlier.append(request)
+    number = request.existing.part_number if request.existing else ""
     return [
         f"part_number: {number} is already for {other.name!r} above, another file; "
         "register one of them with it"

@@ -16,7 +16,7 @@ from silo.files import Project
 from silo.outbox.entry import Commit
 from silo.outbox.store import Store
 from silo.registering.journal import Journal
-from silo.registering.request import Order
+from silo.registering.request import RegistrationRequest
 from silo.workbench.activity.box import Do
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.register.flow import RegisterFlow
@@ -185,7 +185,7 @@ def test_an_unregistered_one_is_registered_with_its_comment(office: Office) -> N
     registering.start(new)
     office.settle()
     (window,) = office.desk.registers
-    window.register([Order(c, "New", "part", "M01") for c in window.offers[0].candidates])
+    window.register([RegistrationRequest(c, "New", "part", "M01") for c in window.offers[0].candidates])
     office.settle()
     (number,) = (s.item.part_number for s in office.silo.items.values())
     assert [r.comment for r in office.silo.revisions(number) if r.file_name] == ["a comment"]

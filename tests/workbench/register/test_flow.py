@@ -10,7 +10,7 @@ from desk import Document, Office, RegisterWindow
 
 from silo.bom.errors import ReadOnlyError, SiloError
 from silo.registering.journal import Journal
-from silo.registering.request import Order
+from silo.registering.request import RegistrationRequest
 from silo.workbench.activity.box import Action, Do, EntryLine, PaneEntry
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.register.flow import RegisterFlow
@@ -46,7 +46,9 @@ def opened(office: Office, flow: RegisterFlow, doc: Document) -> RegisterWindow:
 
 def register(office: Office, window: RegisterWindow) -> None:
     """Register all that is offered, as a part each."""
-    window.register([Order(c, c.proposal.name, "part", "M01") for c in window.offers[-1].candidates])
+    window.register(
+        [RegistrationRequest(c, c.proposal.name, "part", "M01") for c in window.offers[-1].candidates]
+    )
     office.settle()
 
 
@@ -158,7 +160,9 @@ def test_a_dialog_that_was_closed_meanwhile_is_not_drawn(
 ) -> None:
     """What it had asked for is done anyway."""
     window = opened(office, flow, top)
-    window.register([Order(c, c.proposal.name, "part", "M01") for c in window.offers[-1].candidates])
+    window.register(
+        [RegistrationRequest(c, c.proposal.name, "part", "M01") for c in window.offers[-1].candidates]
+    )
     window.flow.closed(window.path)
     office.settle()
     assert (window.results, window.stops) == ([], 0)

@@ -49,7 +49,7 @@ def order(row: EditedRow, silo: FakeSilo) -> list[Any]:
             stamp(candidate.entry.doc_path, identity, object_name=name, item_object=name)
 
     carry_out(
-        [row.order()],
+        [row.request()],
         silo,
         Journal(),
         write,

@@ -66,7 +66,7 @@ def test_an_item_that_has_this_very_file_is_not_doubled_by_default() -> None:
     assert list(one.choices()) == [NEW, "M01-0001"]
     choose([one], one, "M01-0001")
     assert one.checked
-    existing = one.order().existing
+    existing = one.request().existing
     assert existing is not None
     assert existing.part_number == "M01-0001"
 
@@ -140,13 +140,13 @@ def test_one_value_is_set_for_all_chosen_rows() -> None:
     set_all(rows, "category", "M02", {})
     assert [(one.category, one.checked) for one in rows] == [("M02", True), ("M02", True), ("M01", False)]
     set_all(rows[:1], "supplier", "Misumi", {})
-    made = [one.order().proposal for one in rows]
+    made = [one.request().proposal for one in rows]
     assert [(one.sourcing, one.supply) for one in made[:2]] == [
         ("purchased", {"supplier": "Misumi"}),
         ("", {}),
     ]
     set_all(rows[:1], "sourcing", "manufactured", {})
-    assert rows[0].order().supplier == ""
+    assert rows[0].request().supplier == ""
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from silo.registering.candidate import Candidate, ComponentState
 from silo.registering.closed_files import OPEN
 from silo.registering.modelled import chosen, modelled
 from silo.registering.offer import Offer
-from silo.registering.request import Order
+from silo.registering.request import RegistrationRequest
 
 
 def declare(args: argparse.Namespace) -> int:
@@ -42,11 +42,11 @@ def declare(args: argparse.Namespace) -> int:
             ),
             categories,
         )
-        orders = [Order.of(part) for part in own_offer.candidates[: len(wanted)]]
+        requests = [RegistrationRequest.of(part) for part in own_offer.candidates[: len(wanted)]]
         if args.category:
-            orders = [replace(part, category=args.category) for part in orders]
+            requests = [replace(part, category=args.category) for part in requests]
         base = os.path.dirname(os.path.realpath(args.top))
-        return RegisterRun(args, client, schema, own_offer, base).register(orders, ())
+        return RegisterRun(args, client, schema, own_offer, base).register(requests, ())
 
 
 def undeclare(args: argparse.Namespace) -> int:

@@ -18,7 +18,7 @@ from silo.cli.progress import set_step
 from silo.cli.terminal import plain
 from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
 from silo.registering.offer import Offer
-from silo.registering.request import ITEM_TYPES, Order, find_item, wrong_name
+from silo.registering.request import ITEM_TYPES, RegistrationRequest, find_item, wrong_name
 from silo.registering.table import doubts, remarks
 
 _HELP = """  y, yes        register it as shown; Enter alone does the same where there is no doubt
@@ -46,7 +46,7 @@ def read_line(prompt: str) -> str | None:
 
 
 class Dialog:
-    """Asks about candidates; :meth:`ask` gives the orders, and what stays without a number.
+    """Asks about candidates; :meth:`ask` gives the requests, and what stays without a number.
 
     own
         True where the look-alike on the server is the component's own item.
@@ -66,28 +66,32 @@ class Dialog:
         self._all = self._quit = False
         self._earlier = CandidateFiles()
 
-    def ask(self) -> tuple[list[Order], list[Candidate]]:
-        """Ask about each component. Returns the orders, and the components that stay without a number."""
-        orders: list[Order] = []
+    def ask(self) -> tuple[list[RegistrationRequest], list[Candidate]]:
+        """Ask about each component. Returns the requests, and the components that stay without a number."""
+        requests: list[RegistrationRequest] = []
         left: list[Candidate] = []
         for number, candidate in enumerate(self._candidates):
             fine = candidate.state.usable and candidate.state is not ComponentState.ELSEWHERE
             # A file that cannot be written is not asked about; carrying it out reports the reason.
-            order = (
-                None if self._quit else self._order_for(candidate, number) if fine else Order.of(candidate)
+            request = (
+                None
+                if self._quit
+                else self._request_for(candidate, number)
+                if fine
+                else RegistrationRequest.of(candidate)
             )
-            if order is not None:
-                orders.append(order)
+            if request is not None:
+                requests.append(request)
             elif not candidate.same_as:
                 left.append(candidate)
-        return orders, left
+        return requests, left
 
-    def _order_for(self, candidate: Candidate, number: int) -> Order | None:
+    def _request_for(self, candidate: Candidate, number: int) -> RegistrationRequest | None:
         self._earlier.add(candidate)
         doubtful = bool(doubts(candidate, self._earlier)) and not self._own(candidate)
-        order = Order.of(candidate)
+        request = RegistrationRequest.of(candidate)
         if self._all and not doubtful:
-            return order
+            return request
         entry = candidate.entry
         where = entry.standard or f"{relative(entry.doc_path, self._base)}#{entry.object_name}"
         _say(f"\n[{number + 1}/{len(self._candidates)}] {where}")
@@ -95,7 +99,7 @@ class Dialog:
             _say(f"  ⚠ {remark}")
         yes = "y" if doubtful else "Y"
         while True:
-            _say(f"  {self._described(order)}")
+            _say(f"  {self._described(request)}")
             answer = self._read(f"  register it? [{yes}/n/name/type/cat/join/all/q/?] ")
             word, _, rest = ("q" if answer is None else answer.strip()).partition(" ")
             match word.lower(), rest.strip():
@@ -105,55 +109,55 @@ class Dialog:
                 case (("n" | "no"), ""):
                     return None
                 case (("y" | "yes"), ""):
-                    return order
+                    return request
                 case ("" | "all") as said, "":
                     self._all = self._all or bool(said)
                     if not doubtful:
-                        return order
+                        return request
                     _say("  There is a doubt (⚠): please answer y or n, or join NUMBER.")
                 case (("?" | "h" | "help"), _):
                     _say(_HELP)
                 case ("name" | "type" | "cat" | "join") as what, text:
-                    order = self._changed(order, what, text)
+                    request = self._changed(request, what, text)
                 case _:
                     _say(f"  {answer!r} is no answer; ? lists what can be answered.")
 
-    def _described(self, order: Order) -> str:
-        if order.existing is not None:
-            return f"join {order.existing.part_number} {order.existing.name!r}"
-        meaning = self._found.categories.get(order.category, "")
-        return f"{order.item_type} {order.name!r}, category {order.category} ({meaning})"
+    def _described(self, request: RegistrationRequest) -> str:
+        if request.existing is not None:
+            return f"join {request.existing.part_number} {request.existing.name!r}"
+        meaning = self._found.categories.get(request.category, "")
+        return f"{request.item_type} {request.name!r}, category {request.category} ({meaning})"
 
-    def _changed(self, order: Order, what: str, text: str) -> Order:
-        """Return the order with the change; if it is not possible, explain that and return the order
+    def _changed(self, request: RegistrationRequest, what: str, text: str) -> RegistrationRequest:
+        """Return the request with the change; if it is not possible, explain that and return the request
         unchanged.
         """
         if what == "name":
-            if problem := wrong_name(text, order.candidate):
+            if problem := wrong_name(text, request.candidate):
                 _say(f"  {problem}")
-                return order
-            return replace(order, name=text)
+                return request
+            return replace(request, name=text)
         if what == "type":
             if text.lower() in ITEM_TYPES:
-                return order.retyped(text.lower(), self._found.categories)
+                return request.retyped(text.lower(), self._found.categories)
             _say(f"  type: one of {', '.join(ITEM_TYPES)}")
-            return order
+            return request
         if what == "cat":
-            return self._category(order, text)
+            return self._category(request, text)
         try:
-            return replace(order, existing=find_item(text, order.candidate, self._api) if text else None)
+            return replace(request, existing=find_item(text, request.candidate, self._api) if text else None)
         except InputError as problem:
             _say(f"  {problem}")
         except SiloError as error:
             _say(f"  Silo cannot say: {error}")
-        return order
+        return request
 
-    def _category(self, order: Order, text: str) -> Order:
+    def _category(self, request: RegistrationRequest, text: str) -> RegistrationRequest:
         categories = self._found.categories
         if text.upper() in categories:
-            return replace(order, category=text.upper())
+            return replace(request, category=text.upper())
         if text in categories:
-            return replace(order, category=text)
+            return replace(request, category=text)
         codes = [
             code for code, words in categories.items() if text.casefold() in f"{code} {words}".casefold()
         ]
@@ -161,7 +165,7 @@ class Dialog:
             _say(f"  There is no category {text!r}; cat alone lists them all.")
         for code in codes:
             _say(f"    {code}  {categories[code]}")
-        return order
+        return request
 
 
 def _say(text: str) -> None:

@@ -21,8 +21,8 @@ from silo.registering.candidate import Candidate, CandidateFiles
 from silo.registering.closed_files import carry_out_on_disk, is_own
 from silo.registering.items import Ask, Registration, unclear
 from silo.registering.offer import Offer
-from silo.registering.request import Order
-from silo.registering.table import TableRow, doubts, orders_of, write_table
+from silo.registering.request import RegistrationRequest
+from silo.registering.table import TableRow, doubts, requests_of, write_table
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -51,7 +51,7 @@ class RegisterProgress:
 
 
 class RegisterRun:
-    """One registration, from orders to the report."""
+    """One registration, from requests to the report."""
 
     def __init__(
         self, args: argparse.Namespace, client: SiloClient, schema: str, found: Offer, base: str
@@ -64,8 +64,8 @@ class RegisterRun:
         if self.args.plan:
             return self.write_plan(unused)
         if self.args.apply:
-            planned = orders_of(rows, self.found, self.base, self.client, self.args.apply)
-            return self.register(planned.orders, planned.unlisted, already=planned.done)
+            planned = requests_of(rows, self.found, self.base, self.client, self.args.apply)
+            return self.register(planned.requests, planned.unlisted, already=planned.done)
         if self.args.yes or self.args.adopt:
             return self.register(*self.all_but_duplicates(unused))
         counted = (candidate for candidate in self.found.candidates if candidate.article is None)
@@ -97,11 +97,11 @@ class RegisterRun:
         )
         return Exit.DONE
 
-    def all_but_duplicates(self, unused: frozenset[str]) -> tuple[list[Order], list[Candidate]]:
-        """Divide the components into orders and those to leave; ``--duplicates`` decides about components
+    def all_but_duplicates(self, unused: frozenset[str]) -> tuple[list[RegistrationRequest], list[Candidate]]:
+        """Divide the components into requests and those to leave; ``--duplicates`` decides about components
         that seem to be items already.
         """
-        orders, left = [], []
+        requests, left = [], []
         earlier = CandidateFiles()
         for candidate in self.found.candidates:
             if candidate.article is not None or candidate.same_as or candidate.entry.doc_path in unused:
@@ -112,22 +112,24 @@ class RegisterRun:
             if is_foreign != self.args.adopt:
                 left.append(candidate)
             elif not doubtful or self.args.duplicates == "new":
-                orders.append(Order.of(candidate))
+                requests.append(RegistrationRequest.of(candidate))
             elif self.args.duplicates == "join" and len(candidate.similar) == 1:
-                orders.append(replace(Order.of(candidate), existing=candidate.similar[0]))
+                requests.append(replace(RegistrationRequest.of(candidate), existing=candidate.similar[0]))
             else:
                 left.append(candidate)
         if unused:
             files = counted(len(unused), "file")
             words = f"{files} that no assembly uses: left alone (name the file, or use --plan)"
             print(words, file=sys.stderr)
-        return orders, left
+        return requests, left
 
-    def register(self, orders: Sequence[Order], left: Sequence[Candidate], *, already: int = 0) -> int:
-        """Register the orders; the result is reported even if Ctrl-C ends it."""
+    def register(
+        self, requests: Sequence[RegistrationRequest], left: Sequence[Candidate], *, already: int = 0
+    ) -> int:
+        """Register the requests; the result is reported even if Ctrl-C ends it."""
         try:
             done = carry_out_on_disk(
-                orders,
+                requests,
                 self.client,
                 schema=self.schema,
                 ask=_asker(self.args.unclear),

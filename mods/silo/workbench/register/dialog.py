@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.errors import SiloError
 from silo.registering.items import Registration
 from silo.registering.offer import Offer
-from silo.registering.request import Order
+from silo.registering.request import RegistrationRequest
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.gui.widgets import KEY, ChoiceDelegate, chosen_key
@@ -298,10 +298,10 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._problem.setText(visible(spoken(text), 1000))
         self._problem.setVisible(bool(text))
 
-    def registered(self, order: Order, result: Registration) -> None:
+    def registered(self, request: RegistrationRequest, result: Registration) -> None:
         """Show that a component was registered, or why it was not."""
         for row in self._rows:
-            if row.candidate is order.candidate:
+            if row.candidate is request.candidate:
                 row.result, row.running = result, False
                 row.checked = row.checked and result.error is not None
         self._refresh()
@@ -315,11 +315,11 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
                 row.candidate, row.checked = replace(row.candidate, article=article), False
             self._refresh()
 
-    def taken_back(self, order: Order, error: SiloError | None) -> None:
+    def taken_back(self, request: RegistrationRequest, error: SiloError | None) -> None:
         """Show that a registration was undone, or why it was not."""
         for row in self._rows:
-            if row.candidate is order.candidate:
-                row.result = Registration(order.proposal, error=error) if error is not None else None
+            if row.candidate is request.candidate:
+                row.result = Registration(request.proposal, error=error) if error is not None else None
                 row.running, row.checked = False, False
         self._refresh()
 
@@ -519,10 +519,10 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.tell("")
         for row in ready:
             row.running, row.result = True, None
-            if row.number not in (NEW, APART) and row.order().existing is None:
+            if row.number not in (NEW, APART) and row.request().existing is None:
                 row.number = NEW
         self._refresh()
-        self._flow.register(self._path, [row.order() for row in ready])
+        self._flow.register(self._path, [row.request() for row in ready])
 
 
 def _button_text(row: EditedRow) -> str:

@@ -3,7 +3,7 @@
 
 ::
 
-    start ── a worker looks ──▶ the dialog is filled ──▶ a person orders ──▶ a worker registers, one by one
+    start ── a worker looks ──▶ the dialog is filled ──▶ the user confirms ──▶ a worker registers, one by one
                                        ▲                                          │ identities: GUI thread
                                        ╰─────────────── next numbers ◀── commits ◀┘
 
@@ -30,7 +30,7 @@ from silo.registering.carry_out import carry_out, take_back
 from silo.registering.items import Registration
 from silo.registering.journal import Journal
 from silo.registering.offer import Offer, next_number, offer
-from silo.registering.request import CHOSEN, Order
+from silo.registering.request import CHOSEN, RegistrationRequest
 from silo.registering.saved_file import picture_in
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.documents.snapshot import Snapshot
@@ -203,13 +203,13 @@ class EditedRow:
         self.result = Registration(self.candidate.proposal, part_number=self.candidate.same_as)
         self.checked = False
 
-    def order(self) -> Order:
-        """Make an order of the row, for the worker."""
+    def request(self) -> RegistrationRequest:
+        """Make a request of the row, for the worker."""
         existing = next((s for s in self.candidate.similar if s.part_number == self.number), None)
         chosen = {name: getattr(self, name).strip() for name in CHOSEN}
         if self.sourcing != "purchased":
             chosen |= {"supplier": "", "supplier_part_number": ""}
-        return Order(self.candidate, existing=existing, apart=self.number == APART, **chosen)
+        return RegistrationRequest(self.candidate, existing=existing, apart=self.number == APART, **chosen)
 
     def fits(self, only: Filter, words: str) -> bool:
         """Return True if a filter shows the row, and the row contains all of these words."""
@@ -421,8 +421,8 @@ def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> Non
     categories
         code → description, as the schema has them.
     """
-    order = row.order().retyped(item_type, categories)
-    row.item_type, row.category = order.item_type, order.category
+    request = row.request().retyped(item_type, categories)
+    row.item_type, row.category = request.item_type, request.category
 
 
 def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]:
@@ -499,11 +499,11 @@ class RegisterWindow(Protocol):
 
     def set_number(self, category: str, number: str, /) -> None: ...
 
-    def registered(self, order: Order, result: Registration, /) -> None: ...
+    def registered(self, request: RegistrationRequest, result: Registration, /) -> None: ...
 
     def undeclared(self, row: EditedRow, /, *, no_part: bool) -> None: ...
 
-    def taken_back(self, order: Order, error: SiloError | None, /) -> None: ...
+    def taken_back(self, request: RegistrationRequest, error: SiloError | None, /) -> None: ...
 
     def show_pictures(self, pictures: Mapping[str, bytes], /) -> None: ...
 
@@ -531,7 +531,7 @@ class RegisterFlow:
         self._journal = journal or Journal()
         self._open: dict[str, RegisterWindow] = {}
         # Path → what the last press of Register did there.
-        self._last: dict[str, list[tuple[Order, Registration]]] = {}
+        self._last: dict[str, list[tuple[RegistrationRequest, Registration]]] = {}
 
     def start(self, doc: Any) -> None:
         """Open a dialog with the components of a document that have no number."""
@@ -625,7 +625,7 @@ class RegisterFlow:
 
     # -- registering ------------------------------------------------------------------------------------
 
-    def register(self, path: str, orders: Sequence[Order]) -> None:
+    def register(self, path: str, requests: Sequence[RegistrationRequest]) -> None:
         """Give these components their numbers, one after another."""
         schema = self._preferences.text("Schema")
         registered: list[Candidate] = []
@@ -633,14 +633,14 @@ class RegisterFlow:
         clean = self._desk.unedited()
 
         def run(client: Any, control: Any) -> None:
-            def tell(order: Order, result: Registration) -> None:
+            def tell(request: RegistrationRequest, result: Registration) -> None:
                 if result.error is None:
-                    registered.append(order.candidate)
-                    last.append((order, result))
-                self._session.in_gui(lambda: self._show_registered(path, order, result), control)
+                    registered.append(request.candidate)
+                    last.append((request, result))
+                self._session.in_gui(lambda: self._show_registered(path, request, result), control)
 
             carry_out(
-                orders,
+                requests,
                 client,
                 self._journal,
                 lambda candidate, identity: self._session.in_gui(
@@ -654,7 +654,7 @@ class RegisterFlow:
         def finished(_result: Any = None) -> None:
             self._with_dialog(path, lambda dialog: dialog.stopped())
             # The numbers that were shown before are used now.
-            for category in sorted({order.category for order in orders}):
+            for category in sorted({request.category for request in requests}):
                 self.number(path, category)
             self._save_parents(clean if registered else [], lambda: self._send(path, registered))
 
@@ -667,7 +667,7 @@ class RegisterFlow:
 
     def can_take_back(self, path: str) -> bool:
         """Return True if the last press of Register did something that can be undone."""
-        return any(not order.candidate.entry.is_standard for order, _ in self._last.get(path, ()))
+        return any(not request.candidate.entry.is_standard for request, _ in self._last.get(path, ()))
 
     def take_back(self, path: str) -> None:
         """Undo the last press of Register: new items are archived, and the files forget them."""
@@ -679,9 +679,9 @@ class RegisterFlow:
                 self._session.discard(entry.id)
 
         def run(client: Any, control: Any) -> None:
-            def back(order: Order, error: SiloError | None) -> None:
+            def back(request: RegistrationRequest, error: SiloError | None) -> None:
                 def tell() -> None:
-                    self._with_dialog(path, lambda dialog: dialog.taken_back(order, error))
+                    self._with_dialog(path, lambda dialog: dialog.taken_back(request, error))
 
                 self._session.in_gui(tell, control)
 
@@ -716,8 +716,8 @@ class RegisterFlow:
             self._desk.save_marked(clean[0])
         self._desk.later(lambda: self._save_parents(clean[1:], then))
 
-    def _show_registered(self, path: str, order: Order, result: Registration) -> None:
-        self._with_dialog(path, lambda dialog: dialog.registered(order, result))
+    def _show_registered(self, path: str, request: RegistrationRequest, result: Registration) -> None:
+        self._with_dialog(path, lambda dialog: dialog.registered(request, result))
 
     def _send(self, path: str, registered: Sequence[Candidate]) -> None:
         """Upload the files that have an item now, and sync the assembly's BOM with the new lines."""
