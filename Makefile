@@ -66,7 +66,7 @@ test-postgres: setup
 # PostgreSQL's test library is POSIX only.
 ON_WINDOWS = $(addprefix tests/,api/test_config.py api/test_files.py contract/test_files.py fcstd/test_relink.py \
 	fcstd/test_stamp.py outbox/test_send.py outbox/test_store.py vault/test_git.py vault/test_index.py \
-	vault/test_pull.py workbench/commit workbench/register/test_flow.py workbench/revisions workbench/session \
+	vault/test_pull.py workbench/commit workbench/register/test_flow.py workbench/documents workbench/revisions workbench/session \
 	$(addprefix cli/test_,bom_diff.py commands.py login.py night_job.py project.py register.py) \
 	$(addprefix inertia/,geometry/test_cache.py output/test_files.py) registering/test_carry_out.py \
 	$(addprefix server/test_,backup.py file_store.py housekeeping.py) \
@@ -77,7 +77,7 @@ test-windows-files: setup
 
 # Where files are found by their names, on a mounted disk that finds a name in any case and normal form.
 BY_NAME = $(addprefix tests/,fcstd/test_links.py fcstd/test_relink.py fcstd/test_stamp.py fcstd/test_suggest.py \
-	vault/test_git.py vault/test_index.py vault/test_pull.py workbench/commit workbench/register \
+	vault/test_git.py vault/test_index.py vault/test_pull.py workbench/commit workbench/documents workbench/register \
 	workbench/revisions $(addprefix cli/test_,bom_diff.py night_job.py project.py) \
 	$(addprefix test_,batch.py open_in_freecad.py spelling.py))
 test-other-disk: setup

@@ -31,7 +31,7 @@ from silo.workbench.colleagues.theirs import Choice, Theirs, of_held
 from silo.workbench.commit.desk import CommitAnswer, Look
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.plan import CommitPlan, DocumentRow
-from silo.workbench.documents.opened import Base, Opened
+from silo.workbench.documents.opened import DocumentOrigin, Opened
 from silo.workbench.revisions.flow import RevisionFlow
 from silo.workbench.session.session import Session
 
@@ -65,7 +65,7 @@ class Watched(Documents):
         super().__init__()
         self.opened = opened
 
-    def base(self, doc: Any, /) -> Base:
+    def base(self, doc: Any, /) -> DocumentOrigin:
         if doc.closed:
             raise ReferenceError("Cannot access attribute of deleted object")
         return self.opened.of(doc)

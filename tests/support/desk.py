@@ -27,7 +27,7 @@ from silo.registering.request import RegistrationRequest
 from silo.testing import FakeSilo
 from silo.workbench.commit.desk import CommitAnswer, Look
 from silo.workbench.commit.plan import CommitPlan
-from silo.workbench.documents.opened import Base
+from silo.workbench.documents.opened import DocumentOrigin
 from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.ghost import Differences, Ghost
 from silo.workbench.preview.flow import Preview
@@ -135,10 +135,10 @@ class Documents:
     """Saving writes a new file and renames it, as FreeCAD does."""
 
     saved: list[str] = field(default_factory=list)
-    bases: dict[str, Base] = field(default_factory=dict)
+    bases: dict[str, DocumentOrigin] = field(default_factory=dict)
 
-    def base(self, doc: Any, /) -> Base:
-        return self.bases.setdefault(doc.Name, Base(doc.FileName, stamp_of(doc.FileName)))
+    def base(self, doc: Any, /) -> DocumentOrigin:
+        return self.bases.setdefault(doc.Name, DocumentOrigin(doc.FileName, stamp_of(doc.FileName)))
 
     def linked(self, doc: Any, /) -> list[Any]:
         return [doc, *(found for below in doc.OutList for found in self.linked(below))]

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
-from silo.workbench.documents.opened import Base
+from silo.workbench.documents.opened import DocumentOrigin
 from silo.workbench.documents.snapshot import Snapshot
 
 # Seconds of the GUI thread; what has not been compared with its file by then counts as edited.
@@ -36,7 +36,7 @@ class Documents(Protocol):
 
     def save(self, doc: Any, /) -> None: ...
 
-    def base(self, doc: Any, /) -> Base: ...
+    def base(self, doc: Any, /) -> DocumentOrigin: ...
 
 
 def is_edited(documents: Documents, doc: Any) -> bool:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from silo.bom.errors import DocumentError
 from silo.workbench.commit.plan import CommitPlan, DocumentRow, DocumentState, plan
 from silo.workbench.commit.take import CommittedDocument, take_each
-from silo.workbench.documents.opened import Base
+from silo.workbench.documents.opened import DocumentOrigin
 from silo.workbench.documents.order import leaves_first
 from silo.workbench.documents.snapshot import Snapshot
 
@@ -35,8 +35,8 @@ class Documents:
     def __init__(self) -> None:
         self.saved: list[str] = []
 
-    def base(self, doc: Any, /) -> Base:
-        return Base(doc.FileName, None)
+    def base(self, doc: Any, /) -> DocumentOrigin:
+        return DocumentOrigin(doc.FileName, None)
 
     def linked(self, doc: Any, /) -> list[Any]:
         found, left = {doc.Name: doc}, [doc]

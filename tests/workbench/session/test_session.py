@@ -24,7 +24,7 @@ from silo.outbox.entry import UNKNOWN, Commit, Entry, State
 from silo.outbox.send import Sent, send_all
 from silo.outbox.store import OutboxError, Store
 from silo.platform import stamp_of
-from silo.workbench.documents.opened import Base
+from silo.workbench.documents.opened import DocumentOrigin
 from silo.workbench.session.last_events import LastIds
 from silo.workbench.session.online import Online
 
@@ -39,7 +39,7 @@ def commit(
     return replace(made, file=office.session.outbox.hold(doc.FileName, made.key)) if hold else made
 
 
-def keep(office: Office, made: Commit, base: Base | None = None) -> None:
+def keep(office: Office, made: Commit, base: DocumentOrigin | None = None) -> None:
     """Hand a commit to the session, which must not fail."""
 
     def failing(error: SiloError) -> None:
@@ -203,7 +203,7 @@ def test_a_commit_that_a_full_disk_kept_is_not_reported_as_lost(office: Office, 
     """It is reported as kept, and goes by itself as soon as there is room."""
     office.session.outbox = disk = FullDisk(office.session.outbox.path)
     made = commit(office, "Bolt", hold=hold)
-    base = Base(made.path, stamp_of(made.path), UNKNOWN)
+    base = DocumentOrigin(made.path, stamp_of(made.path), UNKNOWN)
     keep(office, made, base)
     office.session._waits(((), None))  # read before there was anything
     office.settle()
@@ -221,7 +221,7 @@ def test_a_document_knows_what_it_is_made_from_whoever_sends_its_commit(
 ) -> None:
     """No other worker sends what is being copied; another program, such as the command line, may."""
     made, later = commit(office, "Bolt", hold=hold), commit(office, "Plate", hold=True)
-    base = Base(made.path, stamp_of(made.path), UNKNOWN)
+    base = DocumentOrigin(made.path, stamp_of(made.path), UNKNOWN)
     keep(office, later)
     keep(office, replace(made, origin=UNKNOWN), base)
     wait_until(lambda: len(slow.entries()) == 2, "both rows are there")

@@ -16,7 +16,7 @@ from silo.bom.compare.states import ComparedAssembly
 from silo.bom.compare.three_states import ThreeLines
 from silo.bom.errors import NotFoundError, RouteMissingError, SiloError
 from silo.workbench.colleagues.theirs import Theirs
-from silo.workbench.documents.opened import Base
+from silo.workbench.documents.opened import DocumentOrigin
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -33,7 +33,7 @@ class FileToCheck:
 
     path: str
     identity: str
-    base: Base
+    base: DocumentOrigin
 
 
 def look(

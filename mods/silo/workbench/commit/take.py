@@ -13,7 +13,7 @@ from silo.outbox.entry import new_key
 from silo.platform import Stamp, one_path, stamp_of
 from silo.workbench.commit.plan import DocumentRow, DocumentState
 from silo.workbench.desk import Documents, is_edited
-from silo.workbench.documents.opened import Base
+from silo.workbench.documents.opened import DocumentOrigin
 from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.words import translate
 
@@ -38,7 +38,7 @@ class CommittedDocument:
     held: Path | None = None
     stamp: Stamp | None = None
     error: SiloError | None = None
-    base: Base | None = None
+    base: DocumentOrigin | None = None
 
 
 class Keeping(Protocol):

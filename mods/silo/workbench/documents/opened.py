@@ -35,7 +35,7 @@ class Origins(Protocol):
     def derived(self, sha256: str, origin: str, /) -> None: ...
 
 
-class Base:
+class DocumentOrigin:
     """What one document was made from.
 
     stamp
@@ -92,7 +92,7 @@ def _unchanged_hash(path: str, stamp: Stamp | None) -> str:
 
 
 class Opened:
-    """A document observer: document → :class:`Base`.
+    """A document observer: document → :class:`DocumentOrigin`.
 
     outbox
         gives the store; called by workers, and in the GUI thread where a document is saved at once.
@@ -100,7 +100,7 @@ class Opened:
 
     def __init__(self, outbox: Callable[[], Origins]) -> None:
         self._outbox = outbox
-        self._bases: dict[str, Base] = {}
+        self._bases: dict[str, DocumentOrigin] = {}
         self._work: Callable[[Callable[[], object]], object] | None = None
         self._left: list[Callable[[], object]] = []
 
@@ -111,11 +111,11 @@ class Opened:
             work(call)
         self._left.clear()
 
-    def of(self, doc: Any) -> Base:
+    def of(self, doc: Any) -> DocumentOrigin:
         """Return the base of a document, even of one that was opened before we watched."""
         base = self._bases.get(doc.Name)
         if base is None:
-            base = self._bases[doc.Name] = Base(doc.FileName, _stamp(doc.FileName))
+            base = self._bases[doc.Name] = DocumentOrigin(doc.FileName, _stamp(doc.FileName))
         return base
 
     def forget(self, doc: Any) -> None:
@@ -128,7 +128,7 @@ class Opened:
         else:
             self._work(call)
 
-    def _settle(self, base: Base) -> None:
+    def _settle(self, base: DocumentOrigin) -> None:
         base.settle(self._outbox())
 
     # FreeCAD calls these; an exception in them would only be printed.
@@ -146,7 +146,7 @@ class Opened:
         stamp = _stamp(doc.FileName)
         # A document that has objects before it has a file was made here.
         made_here = stamp is None or bool(doc.Objects)
-        base = self._bases[doc.Name] = Base(doc.FileName, None if made_here else stamp)
+        base = self._bases[doc.Name] = DocumentOrigin(doc.FileName, None if made_here else stamp)
         if not made_here:
             self._later(lambda: self._settle(base))
 

@@ -70,9 +70,9 @@ def take(doc: Any, *, assembly: Any = None, walk: Walk = extract) -> Snapshot:
     path = one_path(doc.FileName) if doc.FileName else ""
     label = str(getattr(doc, "Label", "") or os.path.basename(path))
     try:
-        sha256, extraction = file_bom(doc, assembly, walk)
+        item_id, extraction = file_bom(doc, assembly, walk)
     except SeveralAssembliesError as error:
         here = translate("Silo", "Make the right assembly active: double-click it in the tree.")
         return Snapshot(path, label, sole_identity(doc), problem=str(error).replace(NAME_ONE, here))
-    several = not sha256 and len({identity for identity, _ in held_items(doc)}) > 1
-    return Snapshot(path, label, sha256, extraction, several=several)
+    several = not item_id and len({identity for identity, _ in held_items(doc)}) > 1
+    return Snapshot(path, label, item_id, extraction, several=several)

@@ -28,7 +28,7 @@ from silo.workbench.activity.box import own_box
 from silo.workbench.colleagues.theirs import Choice, Theirs, theirs_of
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.desk import MOST_S
-from silo.workbench.documents.opened import Base
+from silo.workbench.documents.opened import DocumentOrigin
 from silo.workbench.ghost import Differences, Ghost
 from silo.workbench.revisions.desk import RevisionDesk
 from silo.workbench.session.session import Session
@@ -349,7 +349,7 @@ class RevisionFlow:
     def history(
         self,
         identity: str,
-        base: Base,
+        base: DocumentOrigin,
         done: Callable[[ItemHistory], None],
         failed: Callable[[SiloError], None],
     ) -> None:

@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from silo.api.pause import Pause
     from silo.outbox.send import Sent
     from silo.workbench.colleagues.theirs import Theirs
-    from silo.workbench.documents.opened import Base
+    from silo.workbench.documents.opened import DocumentOrigin
     from silo.workbench.session.online import Online
 
     _Looked = tuple[tuple[Waiting, ...], Pause | None]
-    """What waits, and why nothing is sent to the server now; read by a worker."""
+    """The outbox entries, and the server's pause; read by a worker."""
 
 
 class Session:
@@ -82,7 +82,7 @@ class Session:
         self._colleagues = Colleagues()
         self._comparing = False
         # The outbox could not be used, as on a full disk: something may wait that is not shown.
-        self._owed = False
+        self._outbox_failed = False
 
     # -- the server -------------------------------------------------------------------------------------
 
@@ -137,7 +137,9 @@ class Session:
 
     # -- commits ----------------------------------------------------------------------------------------
 
-    def keep(self, commit: Commit, failed: Callable[[SiloError], None], base: Base | None = None) -> None:
+    def keep(
+        self, commit: Commit, failed: Callable[[SiloError], None], base: DocumentOrigin | None = None
+    ) -> None:
         """Put a commit on disk, then send it. ``failed`` is called if the disk cannot be written.
 
         ``base``: the base of the document; from now on, this commit is its base.
@@ -282,7 +284,7 @@ class Session:
         """Send what waits again when its time has come; a timer calls this."""
         # A log-in by the command line ends the pause of a wrong token.
         is_refused = self.shown.connection == "refused"
-        if (self.shown.waiting or self._owed or is_refused) and self._net.idle:
+        if (self.shown.waiting or self._outbox_failed or is_refused) and self._net.idle:
             self.send(force=False)
 
     def retry(self, entry_id: int) -> None:
@@ -331,7 +333,7 @@ class Session:
         their_versions = {
             number: their_version for number, their_version in self.shown.theirs.items() if number in asked
         }
-        self._owed = False
+        self._outbox_failed = False
         self._show(waiting=waiting, pause=pause, theirs=their_versions, **more)
         left = [entry for number, entry in asked.items() if number not in their_versions]
         if not left or self._comparing:
@@ -441,7 +443,7 @@ class Session:
 
     def problem(self, error: SiloError) -> None:
         """Show a problem that belongs to nothing else that is shown."""
-        self._owed |= isinstance(error, OutboxError)
+        self._outbox_failed |= isinstance(error, OutboxError)
         if isinstance(error, PackageError):
             self._show(connection="packages", reason=str(error))
             return

@@ -7,20 +7,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from activities import activity_of, entry_text
+from activities import entry_text
 
 from silo.api.merging import NOT_ATOMIC
-from silo.api.sse import ServerEvent
 from silo.api.wire import CostTotal, Draft, Lacking, MergeDiff, MergeWarning, ProductSummary, Revision
-from silo.bom.errors import InputError, english
+from silo.bom.errors import english
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom_sync.activity_text import counts_text
 from silo.workbench import words
 from silo.workbench.activity.badges import badges
 from silo.workbench.activity.box import Do, PaneEntry
-from silo.workbench.activity.events import of_event
 from silo.workbench.activity.sent import of_sent
-from silo.workbench.activity.team import of_team
 
 if TYPE_CHECKING:
     from vault import Vault
@@ -165,73 +162,3 @@ def test_a_merge_line_by_line_is_reported(vault: Vault) -> None:
     told = replace(sent, result=sent.result.model_copy(update={"warnings": [warning]}))
     assert "written one by one" in [line.text for line in of_sent(told, page).lines]
     assert "written one by one" not in [line.text for line in of_sent(sent, page).lines]
-
-
-def test_a_page_of_another_server_is_not_offered() -> None:
-    """Events say where to look; only the server in the settings may send people anywhere."""
-
-    def refuse(path: str) -> str:
-        raise InputError(path)
-
-    event = ServerEvent("1", "item.created", {"part_number": "M01-0001", "name": "x"})
-    made = of_event(event, refuse)
-    assert made is not None
-    assert made.actions == ()
-
-
-def test_a_gap_is_reported_once() -> None:
-    """A server that counts again has forgotten what happened; the pane does not pretend to know."""
-    gaps = [of_event(ServerEvent(str(n), "reset", {"reason": "counts again"}), page, now=n) for n in range(3)]
-    activity = activity_of(gap for gap in gaps if gap is not None)
-    (entry,) = activity.entries
-    assert entry.title == "Some activity may be missing"
-
-
-@pytest.mark.parametrize("kind", ["heartbeat", "server.state", "job.done"])
-def test_what_people_need_not_see_is_no_box(kind: str) -> None:
-    """Nor is an event without an item."""
-    assert of_event(ServerEvent("1", kind, {"part_number": "M01-0001"}), page) is None
-    assert of_event(ServerEvent("1", "item.created", {}), page) is None
-
-
-def test_what_a_colleague_did_is_a_box() -> None:
-    """Items and revisions; the first revision of a new item is shown with the item."""
-
-    def titles(*events: ServerEvent) -> list[str]:
-        return [made.title for made in (of_event(event, page) for event in events) if made is not None]
-
-    data = {"part_number": "M01-0001", "user": "alice"}
-    revised = {**data, "comment": "thinner", "revision_number": 2}
-    kinds = [("item.created", data), ("revision.created", revised), ("item.deleted", data)]
-    assert titles(*(ServerEvent(kind, kind, given) for kind, given in kinds)) == [
-        "New item: M01-0001",
-        "Revision 2 of M01-0001",
-        "Archived: M01-0001",
-    ]
-    first = ServerEvent("1", "revision.created", {**data, "comment": "created", "revision_number": 1})
-    assert titles(first) == []
-    entry = of_event(ServerEvent("1", "revision.created", revised), page)
-    assert entry is not None
-    assert (entry.who, [line.text for line in entry.lines]) == ("alice", ["thinner"])
-
-
-@pytest.mark.parametrize(
-    ("wanted", "here", "said"),
-    [
-        (
-            "1.0",
-            (1, 1),
-            "that is saved here may hold objects that the FreeCAD of your colleagues does not know",
-        ),
-        ("1.1", (1, 0), "You are asked before a save removes"),
-        ("1.1", (1, 1), ""),
-        ("", (1, 1), ""),
-    ],
-)
-def test_a_team_s_freecad(wanted: str, here: tuple[int, int], said: str) -> None:
-    """Who has another is told what that means; the real Silo says nothing."""
-    entry = of_team(wanted, here)
-    assert (entry is not None) == bool(said)
-    if entry is not None:
-        assert said in entry_text(entry)
-        assert f"FreeCAD {wanted}" in entry.title
