@@ -231,7 +231,7 @@ def change_user(
 
 
 def check_lasting(tx: Tx, what: str) -> None:
-    """Raise ForbiddenError for a token that ends: it must not let anybody in for longer than itself."""
+    """Raise ForbiddenError for an expiring token: it must not grant access that outlives it."""
     if tx.actor.expires_at is not None:
         raise ForbiddenError(
             f"a token that ends on {wire_time(tx.actor.expires_at)} cannot {what}, which would last longer; "

@@ -208,10 +208,7 @@ def _glb_problem(body: bytes) -> str:
         return f"wanted nodes, meshes and materials only, got {sorted(unknown)[0][:40]!r}"
     if set(document.get("extensionsUsed", ())) - {"KHR_mesh_quantization"}:
         return "wanted no extension but KHR_mesh_quantization"
-    if any(
-        primitive.get("uri") or primitive["byteLength"] > len(blob)
-        for primitive in document.get("buffers", ())
-    ):
+    if any(buffer.get("uri") or buffer["byteLength"] > len(blob) for buffer in document.get("buffers", ())):
         return "wanted one buffer inside the GLB, got another"
     if not all(abs(number) <= MOST for number in _numbers(document)):
         return "wanted finite numbers, got NaN or infinity"
@@ -221,17 +218,17 @@ def _glb_problem(body: bytes) -> str:
         if view["buffer"] != 0 or min(start, count, stride) < 0 or start + count > len(blob) or stride > 252:
             return "a view lies outside of the buffer"
     accessors = document.get("accessors", ())
-    for primitive in accessors:
+    for accessor in accessors:
         view, count, start = (
-            _at(views, primitive["bufferView"]),
-            primitive["count"],
-            primitive.get("byteOffset", 0),
+            _at(views, accessor["bufferView"]),
+            accessor["count"],
+            accessor.get("byteOffset", 0),
         )
-        each = _SIZES[primitive["componentType"]] * _PARTS[primitive["type"]]
+        each = _SIZES[accessor["componentType"]] * _PARTS[accessor["type"]]
         end = start + (count - 1) * (view.get("byteStride") or each) + each
-        if "sparse" in primitive or count < 1 or start < 0 or end > view["byteLength"]:
+        if "sparse" in accessor or count < 1 or start < 0 or end > view["byteLength"]:
             return "an accessor lies outside of its view"
-    if sum(primitive["count"] for primitive in accessors) > MAX_VERTICES:
+    if sum(accessor["count"] for accessor in accessors) > MAX_VERTICES:
         return f"wanted at most {MAX_VERTICES} vertices and indices, got more"
     nodes, meshes = document.get("nodes", ()), document.get("meshes", ())
     primitives = [primitive for mesh in meshes for primitive in mesh["primitives"]]
@@ -313,16 +310,16 @@ def scene(tx: Tx, store: FileStore, item: Item, number: int | None) -> dict[str,
     top = files[revision.file_checksum]
     held = select(document_items.c.object).join(documents, documents.c.id == document_items.c.document_id)
     mine = tx.conn.scalars(held.where(document_items.c.item_id == item.id, document_items.c.object != ""))
-    named = [occurrence for occurrence in mine if occurrence in top.products] if item.id else []
+    named = [name for name in mine if name in top.products] if item.id else []
     root = named[0] if named else next(iter(top.roots), None)
     if not top.has_structure:
         joined.lacks("", top.name, "its file has no model yet")
     elif root is not None:
         joined.below(top, root)
     uuids = {uuid.lower() for occurrence in joined.found for uuid in occurrence["lines"] if uuid}
-    uuids |= {occurrence["part_number"].lower() for occurrence in joined.missing}
+    uuids |= {lost["part_number"].lower() for lost in joined.missing}
     items_by_uuid = items.get_by_uuids(tx, sorted(uuids - {""}), include_archived=True)
-    numbers = {occurrence.uuid: occurrence.part_number for occurrence in items_by_uuid}
+    numbers = {part.uuid: part.part_number for part in items_by_uuid}
     for occurrence in joined.found:
         occurrence["lines"] = [numbers.get(uuid.lower(), "") for uuid in occurrence["lines"]]
         occurrence["part_number"] = occurrence["lines"][-1] if occurrence["lines"] else item.part_number

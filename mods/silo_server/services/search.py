@@ -195,8 +195,8 @@ def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
                     *names.get(row.id, ()),
                     row.made_from or "",
                     *(
-                        load[k]
-                        for load in json.loads(row.supplier_parts or "[]")
+                        part[k]
+                        for part in json.loads(row.supplier_parts or "[]")
                         for k in ("supplier", "number")
                     ),
                 ],

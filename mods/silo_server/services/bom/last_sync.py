@@ -100,8 +100,8 @@ def record_merge(
     entries = [
         {"child_part_number": ids[entry.key], "components": entry.components} for entry in request.entries
     ]
-    by_child = {str(child): list(components) for child, components in before.components.items()}
-    components = remembered(by_child, entries, [str(children[number]) for number in kept])
+    components_before = {str(child): list(parts) for child, parts in before.components.items()}
+    components = remembered(components_before, entries, [str(children[number]) for number in kept])
     tx.conn.execute(delete(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id))
     row = {
         "at": tx.stamp,

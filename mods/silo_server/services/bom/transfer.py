@@ -159,7 +159,7 @@ def export(
         notes.append(f"Only what fits {asked}{' of the type ' + item_type if item_type else ''}")
     for head, field in (("Incomplete", "incomplete"), ("Open", "questions")):
         open_ones = [(bom.part_number, getattr(bom, field)) for bom in open_boms.values()]
-        sentences = sorted(f"{number} {open_lines}" for number, open_lines in open_ones if open_lines)
+        sentences = sorted(f"{number} {open_words}" for number, open_words in open_ones if open_words)
         if sentences:
             more = f"; and {len(sentences) - MOST_TOLD} more" if len(sentences) > MOST_TOLD else ""
             notes.append(f"{head}: {'; '.join(sentences[:MOST_TOLD])}{more}")
