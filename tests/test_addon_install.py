@@ -15,7 +15,7 @@ import pytest
 
 from silo.bom.errors import ConfigError, InputError
 from silo.files import shipped
-from silo.freecads import Installation, ask_freecad, install_folder, install_packages
+from silo.freecads.addon import Installation, ask_freecad, install_folder, install_packages
 
 STAND_IN = """#!{python}
 import os, runpy, sys, types

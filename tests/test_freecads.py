@@ -9,7 +9,7 @@ import pytest
 
 from silo.bom.errors import InputError
 from silo.files import documents_in
-from silo.freecads import cache_folders, commands, exchange_folder, material_folders
+from silo.freecads.places import cache_folders, commands, exchange_folder, material_folders
 
 
 def program(path: Path) -> str:

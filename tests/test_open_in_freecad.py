@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from running_freecad import UID, held, opened
 
-from silo.freecads import OpenInFreecad, open_in_others
+from silo.freecads.open_documents import OpenInFreecad, open_in_others
 
 pytestmark = pytest.mark.usefixtures("needs_locks")
 

@@ -23,7 +23,7 @@ from silo.bom.links import extract
 from silo.bom.model import Extraction, walk_entries
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.freecads import run_freecad
+from silo.freecads.run import run_freecad
 
 RESAVE = Path(__file__).parent / "freecad_cases" / "resave.py"
 VERSIONS = MOSTLY_ENDS

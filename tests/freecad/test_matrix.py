@@ -24,7 +24,7 @@ from silo.bom.findings import FindingCode
 from silo.bom.model import Extraction
 from silo.bom.report import flat_lines
 from silo.fcstd import Library
-from silo.freecads import run_freecad
+from silo.freecads.run import run_freecad
 
 pytestmark = pytest.mark.freecad
 

@@ -21,7 +21,7 @@ from silo.bom.roots import choose_assembly
 from silo.cli.main import main
 from silo.fcstd import Library
 from silo.fcstd.linked import identity_in
-from silo.freecads import run_freecad
+from silo.freecads.run import run_freecad
 from silo_server.run import running_server
 
 pytestmark = pytest.mark.freecad

@@ -24,7 +24,7 @@ from silo.bom.findings import FindingCode
 from silo.bom.model import Extraction
 from silo.bom.report import flat_lines
 from silo.fcstd import Library
-from silo.freecads import run_freecad
+from silo.freecads.run import run_freecad
 from silo.inertia.geometry.fcstd import Entries, StoredFacts, Unpacked, measured_files
 from silo.inertia.geometry.freecad import Leaf, Walk, assembled, one_by_one
 from silo.inertia.geometry.graph import ReadOptions

@@ -16,7 +16,7 @@ from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library, stamp
-from silo.freecads import run_freecad
+from silo.freecads.run import run_freecad
 
 pytestmark = pytest.mark.freecad
 

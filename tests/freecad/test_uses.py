@@ -19,7 +19,7 @@ from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import flat_lines
 from silo.bom.standard import STANDARD_PARTS
 from silo.fcstd import Library
-from silo.freecads import run_freecad
+from silo.freecads.run import run_freecad
 from silo.inertia.geometry.fcstd import Entries, StoredFacts
 from silo.inertia.geometry.freecad import Walk
 from silo.inertia.geometry.graph import Child, unfold

@@ -14,7 +14,7 @@ from freecad_cases.machines import MOSTLY_ENDS, WANTED
 
 from silo.bom.model import Extraction
 from silo.cli.main import main
-from silo.freecads import run_freecad
+from silo.freecads.run import run_freecad
 
 pytestmark = pytest.mark.freecad
 

@@ -16,7 +16,7 @@ from silo.bom.errors import ConfigError, DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import to_plain
 from silo.cli.main import main
-from silo.freecads import ask_inside, find_freecadcmd, freecad_for, run_freecad
+from silo.freecads.run import ask_inside, find_freecadcmd, freecad_for, run_freecad
 
 # A stand-in for freecadcmd: it gets the same arguments and answers in the same file. What it does with a file
 # stands in that file.

@@ -14,7 +14,7 @@ from silo.bom.items.proposal import Proposal, propose_all
 from silo.bom.model import BomEntry, Extraction
 from silo.bom_sync.resolved import resolve
 from silo.fcstd import check_stampable, stamp
-from silo.freecads import OpenInFreecad, open_in_any
+from silo.freecads.open_documents import OpenInFreecad, open_in_any
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.registering.carry_out import carry_out
 from silo.registering.control import RegisterControl

@@ -8,7 +8,7 @@ Started with its arguments in the environment (FreeCAD would open anything else 
 
 ``SILO_ARGS`` is a JSON object, or ``SILO_ARGS_FILE`` names a file with one; docs/headless.md has its keys.
 With ``lines`` the BOMs are only read, and
-written there one JSON object per line as they are finished: that is how :mod:`silo.freecads` asks.
+written there one JSON object per line as they are finished: that is how :mod:`silo.freecads.run` asks.
 Otherwise they are synced with the server of ``SILO_API_URL`` and ``SILO_API_TOKEN`` (or the configuration).
 
 Exit codes: those of the command line (:class:`silo.bom.errors.Exit`).
@@ -227,7 +227,7 @@ def _each(tops: list[str], job: HeadlessJob) -> Iterator[tuple[str, Extraction |
 
     If this program cannot start itself again, it reads the files itself.
     """
-    from silo.freecads import run_freecad
+    from silo.freecads.run import run_freecad
     from silo.workbench.freecad import host
 
     done = 0

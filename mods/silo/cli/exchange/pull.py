@@ -47,7 +47,7 @@ def add_pull(parser: argparse.ArgumentParser) -> None:
 
 def run_pull(args: argparse.Namespace) -> int:
     """Fetch an item's files into a folder. Returns 1 if a file was left alone, or is not in Silo."""
-    from silo.freecads import open_in_any
+    from silo.freecads.open_documents import open_in_any
     from silo.outbox.store import Store
     from silo.vault.pull import Rules, fetched, place, pulled_json
 

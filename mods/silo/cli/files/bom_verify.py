@@ -22,7 +22,7 @@ def verify(args: argparse.Namespace) -> int:
     from silo.bom.links import extract
     from silo.bom.roots import choose_assembly
     from silo.fcstd import FcstdDocument, Library
-    from silo.freecads import freecad_for, run_freecad
+    from silo.freecads.run import freecad_for, run_freecad
 
     if os.path.isdir(args.top):
         raise InputError("--verify is for one file; name the file.")

@@ -71,7 +71,7 @@ def _any(_path: str) -> None:
 
 
 def _closed(path: str) -> None:
-    from silo.freecads import open_in_any
+    from silo.freecads.open_documents import open_in_any
 
     if open_in_any().has_file(path):
         raise DocumentError(

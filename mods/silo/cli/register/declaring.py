@@ -13,7 +13,7 @@ from silo.bom.items.proposal import propose
 from silo.cli.connection import client_of
 from silo.cli.json_output import print_json
 from silo.cli.register.run import RegisterRun, warn_of_rules
-from silo.freecads import open_in_any
+from silo.freecads.open_documents import open_in_any
 from silo.registering.candidate import Candidate, ComponentState
 from silo.registering.closed_files import OPEN
 from silo.registering.modelled import chosen, modelled

@@ -18,7 +18,7 @@ from silo.cli.json_output import print_json
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.freecads import Installation
+    from silo.freecads.addon import Installation
 
 
 NOBODY = "00000000-0000-4000-8000-000000000000"
@@ -49,7 +49,7 @@ def run_doctor(args: argparse.Namespace) -> int:
 
 def _machine() -> Rows:
     """Describe this machine: versions, folders, extras, FreeCAD and the add-on in it."""
-    from silo.freecads import material_folders
+    from silo.freecads.places import material_folders
     from silo.platform import cache_folder, data_folder
 
     place = _tried(_freecad)
@@ -103,7 +103,9 @@ def _extra(name: str, package: str, used_by: str) -> str:
 
 
 def _freecad() -> str | tuple[str, Installation]:
-    from silo.freecads import ask_freecad, commands, find_freecadcmd
+    from silo.freecads.addon import ask_freecad
+    from silo.freecads.places import commands
+    from silo.freecads.run import find_freecadcmd
 
     if not os.environ.get("SILO_FREECADCMD") and next(commands(), None) is None:
         return "none found (files are read without it; only the add-on and bom --verify need one)"

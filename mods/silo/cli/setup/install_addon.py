@@ -25,7 +25,7 @@ def add_install_addon(parser: argparse.ArgumentParser) -> None:
 
 def run_install_addon(args: argparse.Namespace) -> int:
     """Install the add-on, and print where it is."""
-    from silo.freecads import ask_freecad, install_folder, install_packages
+    from silo.freecads.addon import ask_freecad, install_folder, install_packages
 
     place = ask_freecad(args.freecadcmd, Path(args.freecad_data) if args.freecad_data else None)
     report = {

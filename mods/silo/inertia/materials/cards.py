@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from silo.freecads import material_folders
+from silo.freecads.places import material_folders
 from silo.inertia.materials.densities import parse_density
 from silo.inertia.materials.material import Material
 

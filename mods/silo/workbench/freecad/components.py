@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from silo.freecads import open_in_others
+from silo.freecads.open_documents import open_in_others
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.workbench.documents.order import leaves_first
 from silo.workbench.freecad import host, identities, saving

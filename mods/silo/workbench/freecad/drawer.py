@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import DocumentError
-from silo.freecads import start
+from silo.freecads.places import start
 from silo.workbench.freecad import host
 
 if TYPE_CHECKING:

@@ -366,7 +366,7 @@ class InstallDock(Dock):
 
 def install() -> str:
     """Install the packages for this FreeCAD, and return their folder. Raises SiloError. Worker."""
-    from silo.freecads import ask_freecad, install_packages
+    from silo.freecads.addon import ask_freecad, install_packages
 
     return install_packages(ask_freecad(host.program(), Path(host.user_data_folder())))
 
