@@ -14,7 +14,7 @@ ADDON = ("Init.py", "InitGui.py", "package.xml", "LICENSE", "README.md")
 
 
 class BuildWithFiles(build_py):
-    """Copies them below ``silo/shipped``, where ``silo.files.shipped`` finds them."""
+    """Copies them below ``silo/shipped``, where ``silo.shipped_files.shipped`` finds them."""
 
     def run(self) -> None:
         super().run()

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from silo.bom.errors import ConfigError, InputError
-from silo.files import shipped
 from silo.freecads.addon import Installation, ask_freecad, install_folder, install_packages
+from silo.shipped_files import shipped
 
 STAND_IN = """#!{python}
 import os, runpy, sys, types

@@ -37,7 +37,7 @@ from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, diff_json, diff_rows, entry_json, finding_json, project_folder, shorten
 from silo.bom_sync.resolved import Resolved, assemblies, blocking, resolve
 from silo.bom_sync.steps import Outcome, Status, SyncApi, server_lines, sync_tree
-from silo.files import sha256_of
+from silo.checksums import sha256_of
 from silo.platform import replacing
 
 _FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)

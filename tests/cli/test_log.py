@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from silo.checksums import sha256_of
 from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
-from silo.files import sha256_of
 from silo.outbox.store import Store
 
 

@@ -17,8 +17,8 @@ from server_testing import Api
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.files import PROJECT_FILE, Project, ProjectEntry
 from silo.outbox.store import Store
+from silo.project_folder import PROJECT_FILE, Project, ProjectEntry
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from silo.bom.findings import FindingCode
 from silo.bom.links import extract
 from silo.fcstd import FcstdObject, Library, Limits, open_document
 from silo.fcstd.contents import FileContents
-from silo.files import refusal
+from silo.locator import refusal
 
 
 def problem(folder: Path, file: str, name: str = "Box", *, root: Path | None = None) -> LinkProblem:

@@ -24,8 +24,8 @@ from public_projects import ASSEMBLIES
 
 from silo.api.wire import Structure
 from silo.bom.errors import DocumentError
+from silo.checksums import content_hash
 from silo.drawing.models import LINEAR, LOST, KernelDrawer, draw, send_models
-from silo.files import content_hash
 from silo.inertia.geometry.together import Mesh, mesh_volume
 from silo.testing import FakeSilo
 

@@ -10,7 +10,7 @@ from freecad_cases.machines import NEWEST
 from gui_cases.window import Window
 
 from silo.api.files import Origin
-from silo.files import content_hash
+from silo.checksums import content_hash
 
 VERSIONS = NEWEST
 

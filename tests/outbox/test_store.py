@@ -28,7 +28,7 @@ from silo.api.revisions import standing
 from silo.api.wire import Revision
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
-from silo.files import seen_as
+from silo.checksums import seen_as
 from silo.outbox.entry import VERSION, Commit, Entry, State, new_key
 from silo.outbox.send import send_all
 from silo.outbox.store import OutboxError, Store

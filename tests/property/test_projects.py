@@ -29,20 +29,13 @@ from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
-from silo.files import FoundFile, Locator, documents_in
+from silo.files import documents_in
+from silo.locator import FoundFile, Locator
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.registering.closed_files import proposals_for, register_all
 from silo.testing import FakeSilo
-from silo.vault.project import (
-    Belonging,
-    commits,
-    compare,
-    find_project,
-    keep,
-    name_documents,
-    read_project,
-)
+from silo.vault.project import Belonging, commits, compare, find_project, keep, name_documents, read_project
 from silo.vault.pull import fetched, place
 
 PROJECTS = {

@@ -635,7 +635,7 @@ def test_who_waits_for_another_computer_says_so(tmp_path: Path, monkeypatch: pyt
     clock, told = Clock(), list[tuple[float, str]]()
     path = str(tmp_path / "a.FCStd")
     with Journal(tmp_path / "one").turn(path, "a"):
-        monkeypatch.setattr("silo.files.time", clock)
+        monkeypatch.setattr("silo.folder_lock.time", clock)
         waiting = Journal(tmp_path / "two", patience=130.0).turn(
             path, "a", lambda text: told.append((clock.now, text))
         )
@@ -681,7 +681,7 @@ def test_a_lock_whose_file_was_deleted_meanwhile_is_taken_anew(
         tries.append(path)
         return held
 
-    monkeypatch.setattr("silo.files.hold_lock", slow)
+    monkeypatch.setattr("silo.folder_lock.hold_lock", slow)
     with Journal(tmp_path / "one").turn(str(tmp_path / "a.FCStd"), "a"):
         assert (len(tries), os.path.exists(tries[0])) == (2, True)
 

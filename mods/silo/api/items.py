@@ -26,7 +26,7 @@ from silo.bom.errors import (
 from silo.bom.items.schema import Categories, categories_of, rules_of, schema_names
 from silo.bom.model import as_uuid
 from silo.bom.text import name_key
-from silo.files import bare_checksum
+from silo.checksums import bare_checksum
 
 
 class ItemBody(ItemTexts):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from silo.api.wire import Revision
 from silo.bom.errors import NewerRevisionError
-from silo.files import bare_checksum, seen_as
+from silo.checksums import bare_checksum, seen_as
 from silo.platform import no_device_name
 
 

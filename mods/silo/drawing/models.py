@@ -37,10 +37,10 @@ from silo.bom.objects import Contents, Contribution, Key, Kind, Lost, elements, 
 from silo.bom.roots import choose_assembly, find_assemblies
 from silo.bom.standard import standard_uuid
 from silo.bom.text import with_allowed_characters
+from silo.checksums import content_hash
 from silo.drawing import Glb, cube, shaded
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
-from silo.files import FoundFile, Locator, content_hash
 from silo.inertia.assembly import SolidProps
 from silo.inertia.digits import rounded
 from silo.inertia.geometry.fcstd import Entries, StoredFacts, Unpacked, located
@@ -52,6 +52,7 @@ from silo.inertia.geometry.read import python, run, say
 from silo.inertia.geometry.together import Box, Floats, Mesh, about_enclosed, combined, joined, welded
 from silo.inertia.notes import DOUBTFUL
 from silo.inertia.placements import is_rigid
+from silo.locator import FoundFile, Locator
 from silo.platform import remove_patiently, scratch_folder
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from silo.fcstd.survey import FileSurvey
 from silo.fcstd.type_tree import ancestors
 from silo.fcstd.values import ABSENT, Ref, Vector
 from silo.fcstd.xmltext import XmlText
-from silo.files import FoundFile
+from silo.locator import FoundFile
 
 if TYPE_CHECKING:
     from silo.fcstd.contents import Content

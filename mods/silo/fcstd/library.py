@@ -17,7 +17,7 @@ from silo.fcstd.errors import FcstdError
 from silo.fcstd.limits import Limits
 from silo.fcstd.objects import FcstdObject
 from silo.fcstd.values import Ref
-from silo.files import FoundFile, Locator, NotFound
+from silo.locator import FoundFile, Locator, NotFound
 
 
 class Library:

@@ -13,11 +13,13 @@ from pathlib import Path
 
 from silo.bom.errors import DocumentError
 from silo.bom.links import file_item
+from silo.checksums import content_hash
 from silo.fcstd.container import ContainerFile, document_xml
 from silo.fcstd.expat_reader import Malformed, as_utf8, start_tags
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
-from silo.files import FoundFile, Locator, Project, content_hash
+from silo.locator import FoundFile, Locator
+from silo.project_folder import Project
 
 TAGS = frozenset({"XLink", "XLinkSub"})
 """The elements of Document.xml that record another file (``src/App/PropertyLinks.cpp``)."""

@@ -19,9 +19,9 @@ from typing import Any
 
 from silo import FREECAD_PACKAGES
 from silo.bom.errors import ConfigError, InputError
-from silo.files import shipped
 from silo.freecads.run import ask_inside, find_freecadcmd
 from silo.platform import child_options, python_beside, remove_patiently
+from silo.shipped_files import shipped
 
 # The Addon Manager's name for it, so that there is only one folder; and the earlier name.
 FOLDER, OLD_FOLDER = "silo-mod", "Silo"

@@ -33,7 +33,7 @@ from uuid import uuid4
 from silo.api.pause import Pause
 from silo.bom.errors import Translate, duration, english
 from silo.bom.model import Extraction
-from silo.files import seen_as
+from silo.checksums import seen_as
 from silo.platform import Stamp
 
 

@@ -35,7 +35,8 @@ from silo.api.address import canonical
 from silo.api.pause import Pause
 from silo.bom.errors import ConflictError, DocumentError, InputError, counted
 from silo.bom.report import to_plain
-from silo.files import content_hash, folder_lock
+from silo.checksums import content_hash
+from silo.folder_lock import folder_lock
 from silo.outbox.entry import (
     ASKED,
     SAME_PART,

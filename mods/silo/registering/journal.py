@@ -24,7 +24,7 @@ from typing import Any
 
 from silo.bom.errors import InputError
 from silo.bom.model import BomEntry
-from silo.files import folder_lock
+from silo.folder_lock import folder_lock
 from silo.platform import data_folder, private_file, private_folder, remove_patiently, replacing
 
 

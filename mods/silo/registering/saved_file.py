@@ -14,7 +14,7 @@ import zipfile
 
 from silo.bom.errors import DocumentError
 from silo.bom.model import BomEntry, document_identity, meta_key, own_identity
-from silo.files import content_hash
+from silo.checksums import content_hash
 
 # What reading an entry of a file raises, if the file is no archive, is damaged, or does not have the entry.
 _NOT_IN_ZIP = (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError)

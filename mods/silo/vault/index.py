@@ -48,7 +48,7 @@ from silo.fcstd.contents import Content, FileContents
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.facts import FileFacts, Remembered
 from silo.fcstd.library import Library
-from silo.files import FoundFile, Locator, NotFound
+from silo.locator import FoundFile, Locator, NotFound
 from silo.platform import cache_folder, hold_lock, remove_patiently
 
 log = logging.getLogger("silo.vault")

@@ -43,7 +43,8 @@ from silo.bom_sync.resolved import Resolved, blocking, known_items, resolve_know
 from silo.bom_sync.steps import Outcome, Status, SyncApi, plain_lines, sync
 from silo.fcstd import Library
 from silo.fcstd.suggest import with_suggestions
-from silo.files import documents_in, folder_lock
+from silo.files import documents_in
+from silo.folder_lock import folder_lock
 from silo.vault.reading import Question, VaultReader, WalkAnswer, collecting_seldom, grouped
 
 

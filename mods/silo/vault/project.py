@@ -6,7 +6,7 @@ to inside the project's root, with themselves, if it differs from what is in Sil
 files are not files of the project; a link out of the root is reported, and so is one to nothing.
 
 The file of one item goes to that item. A file of several items or of none has a UUID of its own, which the
-project remembers (:class:`silo.files.Project`) before the first request. A file that is known by its identity
+project remembers (:class:`silo.project_folder.Project`) before the first request. A file that is known by its identity
 and lies at another place than before has moved.
 """
 
@@ -33,12 +33,15 @@ from silo.bom.errors import (
 )
 from silo.bom.links import extract, file_bom
 from silo.bom.model import Extraction, held_items
+from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
-from silo.files import FoundFile, Locator, Project, ProjectEntry, content_hash, documents_in
+from silo.files import documents_in
+from silo.locator import FoundFile, Locator
 from silo.outbox.entry import SAME_PART, UNKNOWN, Commit, InFile, new_key, on_top
 from silo.outbox.store import Store
 from silo.platform import one_path
+from silo.project_folder import Project, ProjectEntry
 from silo.vault.pull import file_revisions
 
 if TYPE_CHECKING:

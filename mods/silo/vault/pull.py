@@ -44,11 +44,13 @@ from silo.bom.items.naming import display_name
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
+from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.contents import FileContents
 from silo.fcstd.linked import identity_in, recorded_paths
-from silo.files import Project, ProjectEntry, content_hash, refusal
+from silo.locator import refusal
 from silo.platform import folded, one_path, remove_patiently, replacing, scratch_folder
+from silo.project_folder import Project, ProjectEntry
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

@@ -39,7 +39,7 @@ from silo.bom.roots import choose_assembly
 from silo.fcstd.contents import Content, FileContents
 from silo.fcstd.facts import facts_of
 from silo.fcstd.library import Library
-from silo.files import FoundFile, Locator
+from silo.locator import FoundFile, Locator
 from silo.platform import workers
 from silo.vault.index import Index, StoredAnswer, engine
 

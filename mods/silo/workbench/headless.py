@@ -35,7 +35,8 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from silo.bom.errors import ConfigError, DocumentError, Exit, InputError, SiloError, exit_of
-from silo.files import check_writable, documents_in, job_text
+from silo.files import check_writable, documents_in
+from silo.freecads.job import job_text
 
 if TYPE_CHECKING:
     from silo.batch import TopResult

@@ -12,9 +12,9 @@ import pytest
 from desk import Office
 from fcstd_writer import Doc, Raw, part
 
-from silo.files import Project
 from silo.outbox.entry import Commit
 from silo.outbox.store import Store
+from silo.project_folder import Project
 from silo.registering.journal import Journal
 from silo.registering.request import RegistrationRequest
 from silo.workbench.activity.box import Do

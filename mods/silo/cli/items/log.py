@@ -39,7 +39,7 @@ def add_log(parser: argparse.ArgumentParser) -> None:
 
 def run_log(args: argparse.Namespace) -> int:
     """Print the revisions, newest first; or what changed in the product."""
-    from silo.files import sha256_of
+    from silo.checksums import sha256_of
     from silo.outbox.store import Store
     from silo.vault.pull import RevisionBoms, file_revisions, words
 

@@ -35,9 +35,9 @@ from silo.cli.setup.demo_edits import remove_from_assembly, set_element_count
 from silo.cli.setup.server import need_server_extra
 from silo.cli.sync_display import activity_box, outcome_text
 from silo.cli.terminal import console
-from silo.files import shipped
 from silo.platform import scratch_folder
 from silo.registering.closed_files import proposals_for, register_all
+from silo.shipped_files import shipped
 
 if TYPE_CHECKING:
     from rich.console import Console

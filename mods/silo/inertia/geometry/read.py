@@ -43,7 +43,7 @@ from numpy.typing import NDArray
 from silo import platform
 from silo.bom.document import relative
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError, counted
-from silo.files import content_hash
+from silo.checksums import content_hash
 from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.geometry.graph import (
     Format,

@@ -287,7 +287,7 @@ class CommitFlow:
         """Add to the commit of a BOM alone what its document was made from, so that it does not undo the BOM
         of a colleague's newer file. ``doc``: None if the file is not open.
         """
-        from silo.files import sha256_of  # late: FreeCAD's start waits for this module
+        from silo.checksums import sha256_of
 
         if doc is None:
             return replace(commit, sha256=sha256_of(commit.path))

@@ -82,7 +82,7 @@ class DocumentOrigin:
 
 
 def _unchanged_hash(path: str, stamp: Stamp | None) -> str:
-    from silo.files import content_hash  # FreeCAD's start does not wait for it
+    from silo.checksums import content_hash
 
     try:
         content = content_hash(path)

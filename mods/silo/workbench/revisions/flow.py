@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import DocumentError, InputError, SiloError
-from silo.files import PROJECT_FILE, Project
 from silo.outbox.store import KEPT_ASIDE_DAYS
 from silo.platform import cache_folder, one_path
+from silo.project_folder import PROJECT_FILE, Project
 from silo.workbench.activity.box import own_box
 from silo.workbench.colleagues.theirs import Choice, Theirs, theirs_of
 from silo.workbench.commit.flow import CommitFlow
@@ -205,7 +205,7 @@ class RevisionFlow:
         """Put their file in the place of mine, and keep a copy of mine. ``content`` None: theirs is there
         already.
         """
-        from silo.files import content_hash
+        from silo.checksums import content_hash
         from silo.platform import remove_patiently, replacing
 
         doc, outbox, kept = self._desk.find(path), self._session.outbox, list[str]()
@@ -646,7 +646,7 @@ def left_alone(pulled: Pulled) -> Sequence[str]:
 def _not_here(path: str) -> list[str]:
     """Return the files to which a file links and that are missing."""
     from silo.fcstd.linked import recorded_paths
-    from silo.files import FoundFile, Locator
+    from silo.locator import FoundFile, Locator
 
     locator, folder = Locator(), (os.path.dirname(path),)
     try:
