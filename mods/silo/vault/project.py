@@ -6,8 +6,8 @@ to inside the project's root, with themselves, if it differs from what is in Sil
 files are not files of the project; a link out of the root is reported, and so is one to nothing.
 
 The file of one item goes to that item. A file of several items or of none has a UUID of its own, which the
-project remembers (:class:`silo.project_folder.Project`) before the first request. A file that is known by its identity
-and lies at another place than before has moved.
+project remembers (:class:`silo.project_folder.Project`) before the first request. A file that is known by its
+identity and lies at another place than before has moved.
 """
 
 from __future__ import annotations
