@@ -42,8 +42,8 @@ def cpu_ms(command: list[str | Path], runs: int) -> float:
 
 def registering(count: int) -> Callable[[], object]:
     """Return what makes the table of ``count`` files with one content."""
+    from silo.bom.entry import BomEntry
     from silo.bom.items.proposal import Proposal
-    from silo.bom.model import BomEntry
     from silo.registering.candidate import Candidate, ComponentState
     from silo.registering.offer import Offer
     from silo.registering.table import write_table
@@ -60,8 +60,8 @@ def blocking(assemblies: int, count: int) -> Callable[[], object]:
     """Return what finds the errors of each of many assemblies among ``count`` findings."""
     from dataclasses import replace
 
+    from silo.bom.entry import BomEntry
     from silo.bom.findings import Finding, FindingCode, Place, Severity
-    from silo.bom.model import BomEntry
     from silo.bom_sync.resolved import Resolved, blocking
 
     findings = tuple(

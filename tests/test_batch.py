@@ -18,10 +18,11 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from silo.batch import JUnit, Markdown, RunSummary, SyncOptions, TopResult, cell, stopped_by, sync_top
+from silo.bom.compare.bom_diff import BomChange, BomDiff, QuantityChange
 from silo.bom.compare.merge import MergePlan
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
-from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
-from silo.bom.report import diff_rows
+from silo.bom.view.diff_rows import diff_rows
 from silo.bom_sync.resolved import Resolved
 from silo.bom_sync.steps import Outcome, Status
 from silo.fcstd import Library

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from other_disk import other_disk
 
 from silo.bom.errors import DocumentError
-from silo.bom.report import bom_json
+from silo.bom.view.tree_json import bom_json
 from silo.cli.reading import read_assembly
 from silo.fcstd import Library
 from silo.platform import Spelling

@@ -60,10 +60,10 @@ from silo.bom.errors import (
     RouteMissingError,
     VersionConflictError,
 )
-from silo.bom.model import as_uuid
+from silo.bom.left_out import Reason, remembered
 from silo.bom.quantities import counts_pieces
-from silo.bom.report import Reason, remembered
 from silo.bom.text import name_key
+from silo.bom.walk.identity import as_uuid
 
 __all__ = ["FakeSilo"]
 

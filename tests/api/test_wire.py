@@ -151,7 +151,7 @@ def test_lines_and_revisions_tolerate_other_forms() -> None:
     ("module", "forbidden"),
     [
         ("silo.api", {"pydantic", "requests", "urllib3"}),
-        ("silo.api.wire", {"requests", "urllib3", "silo.bom.model", "silo.bom.objects"}),
+        ("silo.api.wire", {"requests", "urllib3", "silo.bom.entry", "silo.bom.walk"}),
         ("silo.api.config", {"requests", "pydantic"}),
     ],
 )

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from silo.bom.compare.states import ComparedAssembly
 from silo.bom.compare.three_states import compare_three
 from silo.bom.compare.two_states import changes_json, compare_assemblies
-from silo.bom.model import BomEntry
+from silo.bom.entry import BomEntry
 
 
 def entry(path: str, quantity: int = 1, uuid: str | None = None, name: str = "Body") -> BomEntry:

@@ -10,8 +10,8 @@ from fakes import Doc, edit
 
 from silo.bom import FindingCode, Severity, extract, extract_bom_links
 from silo.bom.document import LinkProblem
+from silo.bom.entry import Extraction
 from silo.bom.findings import Finding
-from silo.bom.model import Extraction
 
 BOLT = ("/v/bolt.FCStd", "Body")
 PLATE = ("/v/plate.FCStd", "Body")

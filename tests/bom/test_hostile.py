@@ -12,8 +12,9 @@ from fakes import Doc, edit
 
 from silo.bom import diff_bom, extract, resolve_part_numbers
 from silo.bom.consolidation import consolidation_findings
-from silo.bom.model import walk_entries
-from silo.bom.report import flat_counts, tree_size
+from silo.bom.entry import walk_entries
+from silo.bom.view.flat_list import flat_counts
+from silo.bom.view.tree_json import tree_size
 
 
 class EveryItem:

@@ -9,7 +9,9 @@ import pytest
 from fakes import BareDocument, BarePart, Doc, ForwardingLink
 
 from silo.bom import FindingCode, Severity, extract
-from silo.bom.model import BomEntry, identity_findings, identity_of, walk_entries
+from silo.bom.entry import BomEntry, walk_entries
+from silo.bom.walk.identity import identity_of
+from silo.bom.walk.shared_identity import identity_findings
 
 PLACES = ("object SiloItemId", "object SiloUUID", "Meta per object", "document SiloUUID", "Meta")
 

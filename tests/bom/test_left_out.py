@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from silo.bom.compare.difference import diff_bom
 from silo.bom.compare.merge import apply_merge, plan_merge
+from silo.bom.entry import BomEntry
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.model import BomEntry
-from silo.bom.report import LeftOut, Reason, components_of, in_words, left_out_of, remembered
+from silo.bom.left_out import LeftOut, Reason, components_of, in_words, left_out_of, remembered
 from silo.bom_sync.resolved import Resolved
 
 LOST = BomEntry("/v/parts/Lid.FCStd", object_name="Body", quantity=3, missing=True, instances=("L1", "L2"))

@@ -9,7 +9,7 @@ import pytest
 from fakes import BareAssembly, BareDocument, BareLink, BarePart, BareThing, Doc, ForwardingLink, edit
 
 from silo.bom import FindingCode, extract, extract_bom_links
-from silo.bom.model import BomEntry
+from silo.bom.entry import BomEntry
 
 
 def bolt_in(path: str = "/v/bolt.FCStd", **properties: Any) -> Any:

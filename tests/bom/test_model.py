@@ -20,8 +20,8 @@ from silo.bom import (
     QuantityChange,
     Severity,
 )
+from silo.bom.compare.bom_diff import rows_as_dicts
 from silo.bom.compare.merge import MergePlan
-from silo.bom.model import rows_as_dicts
 
 FINDING = Finding(FindingCode.CYCLE, Severity.ERROR, "a ring", (Place("/v/a.FCStd", "A"),))
 VALUES = [

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
+from silo.bom.entry import BomEntry
 from silo.bom.errors import ConfigError, InputError
 from silo.bom.items.categories import assembly_categories, proposed_category
 from silo.bom.items.naming import display_name, proposed_name
 from silo.bom.items.proposal import crowded_files, propose
 from silo.bom.items.schema import Categories, CategoryRule, categories_of, rules_of
-from silo.bom.model import BomEntry
 from silo.bom.text import clean_name
 from silo_server.schema import RULES, category_rules, describe, find_schema
 

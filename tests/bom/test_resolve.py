@@ -11,9 +11,10 @@ import pytest
 
 from silo.bom import FindingCode, Severity, resolve_part_numbers
 from silo.bom.consolidation import consolidation_findings, consolidation_message, one_hint_each
+from silo.bom.entry import BomEntry
 from silo.bom.findings import Finding
 from silo.bom.items.resolve import merge_lines, numbered_findings, resolve_with, unregistered_findings
-from silo.bom.model import BomEntry, identity_findings
+from silo.bom.walk.shared_identity import identity_findings
 
 
 class Silo:

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from silo import bom_sync
 from silo.api.wire import MergeRequest, MergeResult
 from silo.bom.compare.merge import apply_merge, plan_merge
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import UnreachableError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.model import BomEntry, Extraction
 from silo.bom_sync.resolved import blocking
 from silo.bom_sync.steps import Status
 

@@ -19,7 +19,7 @@ import pytest
 from fcstd_writer import Doc, locals_, part
 
 from silo.api.wire import Draft, MergeResult
-from silo.bom.model import BomEntry
+from silo.bom.entry import BomEntry
 from silo.bom_sync.resolved import Resolved
 from silo.bom_sync.steps import Outcome, Status
 from silo.cli.main import main

@@ -19,8 +19,8 @@ import pytest
 from fcstd_writer import Doc, locals_, part
 from server_testing import sqlite_database
 
+from silo.bom.entry import BomEntry
 from silo.bom.items.proposal import Proposal
-from silo.bom.model import BomEntry
 from silo.cli.reading import read_assembly
 from silo.cli.register.questions import Dialog
 from silo.fcstd import open_document

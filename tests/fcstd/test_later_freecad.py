@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from fcstd_writer import Doc, XLink, locals_, part
 
+from silo.bom.entry import Extraction
 from silo.bom.findings import FindingCode
 from silo.bom.links import extract
-from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.fcstd import open_document
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from other_disk import other_disk
 
 from silo.bom.errors import DocumentError
-from silo.bom.model import document_identity, identity_of
+from silo.bom.walk.identity import document_identity, identity_of
 from silo.fcstd import check_stampable, open_document, stamp, unstamp
 from silo.fcstd.container import ContainerFile, FileState
 from silo.fcstd.edit import replace_file

@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 from public_projects import ASSEMBLIES
 
+from silo.bom.entry import walk_entries
 from silo.bom.findings import FindingCode
 from silo.bom.links import extract
-from silo.bom.model import walk_entries
-from silo.bom.report import flat_lines
 from silo.bom.roots import choose_assembly
+from silo.bom.view.flat_list import flat_lines
 from silo.fcstd import Library
 
 TRUTHS = sorted(ASSEMBLIES.glob("*/truth/*.json"))

@@ -10,8 +10,8 @@ import pytest
 from freecad_cases import answers, machines
 from freecad_cases.machines import REPOSITORY
 
+from silo.bom.entry import Extraction
 from silo.bom.links import extract
-from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.freecads.run import run_freecad

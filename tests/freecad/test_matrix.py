@@ -19,10 +19,10 @@ from freecad_cases.corpora import Corpus
 from freecad_cases.machines import WANTED, FreeCAD
 from freecad_cases.public import FOLDER, PublicAssembly, public_assemblies
 
+from silo.bom.entry import Extraction
 from silo.bom.errors import SiloError
 from silo.bom.findings import FindingCode
-from silo.bom.model import Extraction
-from silo.bom.report import flat_lines
+from silo.bom.view.flat_list import flat_lines
 from silo.fcstd import Library
 from silo.freecads.run import run_freecad
 

@@ -14,9 +14,9 @@ from public_projects import ASSEMBLIES
 from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
+from silo.bom.entry import Extraction
 from silo.bom.findings import FindingCode
 from silo.bom.links import extract
-from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.cli.main import main
 from silo.fcstd import Library

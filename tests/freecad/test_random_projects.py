@@ -19,10 +19,10 @@ import pytest
 from freecad_cases import answers, machines
 from freecad_cases.machines import WANTED, FreeCAD
 
+from silo.bom.entry import Extraction
 from silo.bom.errors import SiloError
 from silo.bom.findings import FindingCode
-from silo.bom.model import Extraction
-from silo.bom.report import flat_lines
+from silo.bom.view.flat_list import flat_lines
 from silo.fcstd import Library
 from silo.freecads.run import run_freecad
 from silo.inertia.geometry.fcstd import Entries, StoredFacts, Unpacked, measured_files

@@ -12,7 +12,7 @@ import pytest
 from freecad_cases import corpora, machines
 from freecad_cases.machines import MOSTLY_ENDS, WANTED
 
-from silo.bom.model import Extraction
+from silo.bom.entry import Extraction
 from silo.cli.main import main
 from silo.freecads.run import run_freecad
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from fcstd_writer import Doc, locals_
 
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import ConfigError, DocumentError, InputError
-from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import to_plain
+from silo.bom.snapshot import to_plain
 from silo.cli.main import main
 from silo.freecads.run import ask_inside, find_freecadcmd, freecad_for, run_freecad
 

@@ -22,8 +22,8 @@ from fcstd_writer import Doc
 
 from silo.api.client import SiloClient
 from silo.api.policy import Retries
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.items.proposal import propose
-from silo.bom.model import BomEntry, Extraction
 from silo.fcstd import stamp
 from silo.outbox.entry import Commit, State, new_key
 from silo.outbox.send import send_all

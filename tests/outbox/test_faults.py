@@ -20,7 +20,7 @@ from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.api.policy import Retries
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.entry import BomEntry, Extraction
 from silo.outbox.entry import Commit, State
 from silo.outbox.send import send_all
 from silo.outbox.store import Store

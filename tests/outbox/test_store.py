@@ -26,8 +26,8 @@ from other_disk import other_disk
 from silo.api.pause import Pause
 from silo.api.revisions import standing
 from silo.api.wire import Revision
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, InputError
-from silo.bom.model import BomEntry, Extraction
 from silo.checksums import seen_as
 from silo.outbox.entry import VERSION, Commit, Entry, State, new_key
 from silo.outbox.send import send_all

@@ -21,10 +21,10 @@ from hypothesis import strategies as st
 
 from silo.bom import extract
 from silo.bom.document import LinkProblem
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.findings import FindingCode
-from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import flat_counts
 from silo.bom.standard import STANDARD_PARTS
+from silo.bom.view.flat_list import flat_counts
 
 Key = tuple[str, str]
 

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from public_projects import ASSEMBLIES
 
-from silo.bom.model import Extraction, walk_entries
+from silo.bom.entry import Extraction, walk_entries
 from silo.files import documents_in
 from silo.registering.closed_files import whole_folder
 from silo.vault.index import Index

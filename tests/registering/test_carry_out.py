@@ -8,9 +8,9 @@ from pathlib import Path
 from fcstd_writer import part
 
 from silo.api.wire import Item
+from silo.bom.entry import BomEntry
 from silo.bom.errors import RejectedError
 from silo.bom.items.proposal import propose
-from silo.bom.model import BomEntry
 from silo.registering.candidate import Candidate, ComponentState
 from silo.registering.carry_out import carry_out, take_back
 from silo.registering.items import Registration

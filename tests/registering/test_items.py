@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 from fcstd_writer import Doc, Raw
 
+from silo.bom.entry import BomEntry
 from silo.bom.errors import (
     AuthError,
     BusyError,
@@ -32,7 +33,6 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.bom.items.proposal import propose
-from silo.bom.model import BomEntry
 from silo.fcstd import Library, stamp
 from silo.platform import hold_lock
 from silo.registering.items import REGISTRATION_PROPERTY, Registration, finished, register

@@ -11,11 +11,11 @@ from typing import Any, NoReturn
 
 import pytest
 
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import ServerFaultError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.items.proposal import Proposal
 from silo.bom.items.schema import Categories
-from silo.bom.model import BomEntry, Extraction
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile
 from silo.registering.offer import Offer, offer
 from silo.testing import FakeSilo

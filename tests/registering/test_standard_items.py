@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.items.proposal import Proposal, crowded_files
-from silo.bom.model import BomEntry, Extraction
 from silo.bom.standard import standard_uuid
 from silo.bom_sync.memory import Memory
 from silo.bom_sync.resolved import resolve

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from silo.bom.entry import BomEntry
 from silo.bom.errors import InputError
 from silo.bom.items.proposal import Proposal
-from silo.bom.model import BomEntry
 from silo.registering.candidate import Candidate, CandidateFiles, ComponentState
 from silo.registering.offer import Offer
 from silo.registering.table import read_table, write_table

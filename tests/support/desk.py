@@ -15,9 +15,9 @@ import pytest
 
 from silo.api.transport import Cancel
 from silo.api.wire import Item, Scene
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError, NotFoundError, SiloError
 from silo.bom.findings import Finding
-from silo.bom.model import BomEntry, Extraction
 from silo.outbox.send import Sent
 from silo.platform import stamp_of
 from silo.registering.candidate import Candidate, ComponentState, OpenedFile

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from silo.api.client import SiloClient
 from silo.batch import source_document
-from silo.bom.model import walk_entries
+from silo.bom.entry import walk_entries
 from silo.bom_sync.resolved import Resolved, resolve
 from silo.bom_sync.steps import Outcome, sync_tree
 from silo.cli.reading import read_assembly

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.model import BomEntry, Extraction
 from silo.outbox.entry import Commit, Entry
 from silo.outbox.send import Report, Sent, send_all
 from silo.outbox.store import Store

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from silo.api.files import download_revision
 from silo.api.wire import FrozenFile, LinkedFile, Release
+from silo.bom.entry import Extraction
 from silo.bom.errors import DocumentError, InputError, NotFoundError, ServerFaultError
 from silo.bom.links import extract
-from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.linked import place_of, recorded_paths

@@ -24,8 +24,8 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.items.schema import Categories, categories_of, rules_of, schema_names
-from silo.bom.model import as_uuid
 from silo.bom.text import name_key
+from silo.bom.walk.identity import as_uuid
 from silo.checksums import bare_checksum
 
 

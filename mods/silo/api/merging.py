@@ -27,6 +27,7 @@ from silo.api.wire import (
     QuantityLine,
 )
 from silo.bom.compare.answer import answer_of, conflict_warning
+from silo.bom.compare.bom_diff import BomDiff, QuantityChange
 from silo.bom.compare.merge import plan_merge
 from silo.bom.compare.owner import is_manual
 from silo.bom.errors import (
@@ -39,7 +40,6 @@ from silo.bom.errors import (
     SiloError,
     listed,
 )
-from silo.bom.model import BomDiff, QuantityChange
 from silo.bom.quantities import same_quantity, says_the_same
 
 if TYPE_CHECKING:

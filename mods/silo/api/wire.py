@@ -297,7 +297,7 @@ class MergeEntry(Wire):
 
 
 class LeftOutPart(Wire):
-    """Something that the assembly holds and the request does not (:class:`silo.bom.report.LeftOut`)."""
+    """Something that the assembly holds and the request does not (:class:`silo.bom.left_out.LeftOut`)."""
 
     reason: str
     name: str = ""

@@ -10,12 +10,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from silo.bom.compare.bom_diff import BomChange, BomDiff, QuantityChange
     from silo.bom.compare.difference import diff_bom
     from silo.bom.compare.merge import MergePlan, apply_merge, plan_merge
+    from silo.bom.entry import BomEntry, Extraction
     from silo.bom.findings import Finding, FindingCode, Place, Severity
     from silo.bom.items.resolve import resolve_part_numbers
     from silo.bom.links import extract, extract_bom_links
-    from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
     from silo.bom.roots import choose_assembly
 
 _HOME = {
@@ -23,7 +24,8 @@ _HOME = {
     "compare.merge": ("MergePlan", "apply_merge", "plan_merge"),
     "findings": ("Finding", "FindingCode", "Place", "Severity"),
     "links": ("extract", "extract_bom_links"),
-    "model": ("BomChange", "BomDiff", "BomEntry", "Extraction", "QuantityChange"),
+    "compare.bom_diff": ("BomChange", "BomDiff", "QuantityChange"),
+    "entry": ("BomEntry", "Extraction"),
     "items.resolve": ("resolve_part_numbers",),
     "roots": ("choose_assembly",),
 }

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from silo.bom.entry import BomEntry, walk_entries
 from silo.bom.errors import counted, listed
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomEntry, walk_entries
 
 
 def consolidation_message(entry: BomEntry) -> str:

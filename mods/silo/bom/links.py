@@ -20,25 +20,21 @@ from dataclasses import replace
 from typing import Any
 
 from silo.bom.document import NAMELESS, label_of, own
+from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.errors import InputError, SeveralAssembliesError, did_you_mean
 from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomEntry, Extraction, identity_findings, identity_of, sole_identity, walk_entries
-from silo.bom.objects import (
-    Count,
-    Key,
-    Kind,
-    Lost,
-    chains,
-    held_by_joints,
-    is_attached,
-    is_container,
-    is_named_assembly,
-)
+from silo.bom.key import Key
 from silo.bom.roles import Canonical, Files
 from silo.bom.roots import Whole, as_it_is, beside, choose_assembly, fates, silent_reader
 from silo.bom.standard import same_articles, standard_uuid
 from silo.bom.targets import Inspect, resolve_target
+from silo.bom.walk.chains import chains
+from silo.bom.walk.contents import Count, Lost
+from silo.bom.walk.identity import identity_of, sole_identity
+from silo.bom.walk.joints import held_by_joints, is_attached
+from silo.bom.walk.kinds import Kind, is_container, is_named_assembly
+from silo.bom.walk.shared_identity import identity_findings
 
 # Real assemblies are some ten levels deep; deeper is an attack or a loop that no other guard saw.
 MAX_LEVELS = 64

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What each object of an assembly is, and what it brings: one pass, which everything else reads.
 
-Each object in an assembly has exactly one :class:`~silo.bom.objects.ObjectRole`. A component brings what it
-shows. A link brings what its target brings, once per element; a Draft array what its original brings, once
-per instance; a link group, a compound, an inline part or a folder what its members bring. That ends in an
-object of another file, in a standard part, in an object with an identity of its own, or in geometry of this
-very file: an *own part*, which is no item yet. How an object comes to bring something is kept
-(:class:`Shown`), so masses and people can follow the same chain.
+Each object in an assembly has exactly one :class:`~silo.bom.walk.contents.ObjectRole`. A component brings
+what it shows. A link brings what its target brings, once per element; a Draft array what its original brings,
+once per instance; a link group, a compound, an inline part or a folder what its members bring. That ends in
+an object of another file, in a standard part, in an object with an identity of its own, or in geometry of
+this very file: an *own part*, which is no item yet. How an object comes to bring something is kept
+(:class:`~silo.bom.walk.contents.Contribution`), so masses and people can follow the same chain.
 
 * An object counts once, however many lists of the tree name it; each link group that shows it counts.
 * What shows others is counted; the others count where they lie only if they are visible there. The original
@@ -27,32 +27,7 @@ from typing import Any
 from silo.bom.document import LinkProblem, first_of, label_of, located, object_name, own, same_document
 from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
-from silo.bom.model import Notes, document_identity, identity_of, own_identity
-from silo.bom.objects import (
-    COMPONENTS,
-    INLINE,
-    REPEATERS,
-    Contents,
-    Contribution,
-    Count,
-    CountedObjects,
-    Key,
-    Kind,
-    Lost,
-    ObjectRole,
-    Tree,
-    add,
-    consumed,
-    draft_count,
-    elements,
-    is_array,
-    is_named_assembly,
-    kind_of,
-    left_out_by,
-    no_component,
-    sources,
-    survey_of,
-)
+from silo.bom.key import Key
 from silo.bom.standard import STANDARD_PARTS, designation
 from silo.bom.targets import (
     Inspect,
@@ -63,6 +38,23 @@ from silo.bom.targets import (
     resolve_target,
     stale_copies,
 )
+from silo.bom.walk.arrays import draft_count, elements, is_array, left_out_by
+from silo.bom.walk.contents import Contents, Contribution, Count, CountedObjects, Lost, ObjectRole, add
+from silo.bom.walk.identity import document_identity, identity_of, own_identity
+from silo.bom.walk.kinds import (
+    COMPONENTS,
+    INLINE,
+    REPEATERS,
+    Kind,
+    is_named_assembly,
+    kind_of,
+    no_component,
+    sources,
+)
+from silo.bom.walk.notes import Notes
+from silo.bom.walk.operands import consumed
+from silo.bom.walk.survey import survey_of
+from silo.bom.walk.tree import Tree
 
 # Groups that link to groups: no file needs many of these, but an attack does.
 _MAX_NESTING = 32

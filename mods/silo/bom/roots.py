@@ -14,29 +14,23 @@ from typing import Any
 
 from silo.bom.document import DocumentRoot, derived, first_of, label_of, object_name, own, same_document
 from silo.bom.errors import InputError, SeveralAssembliesError
-from silo.bom.objects import (
-    COMPONENTS,
-    COPIES,
-    INLINE,
-    REPEATERS,
-    Contents,
-    Kind,
-    Lost,
-    ObjectRole,
-    Survey,
-    climbed,
-    consumed,
-    elements,
-    is_assembly3,
-    is_named_assembly,
-    is_switched_on,
-    kind_of,
-    left_out_by,
-    members,
-    survey_of,
-)
 from silo.bom.roles import SHOWING, Files, Reader, Reading
 from silo.bom.targets import Inspect, is_assembly_link
+from silo.bom.walk.arrays import elements, left_out_by
+from silo.bom.walk.contents import Contents, Lost, ObjectRole
+from silo.bom.walk.kinds import (
+    COMPONENTS,
+    INLINE,
+    REPEATERS,
+    Kind,
+    is_assembly3,
+    is_named_assembly,
+    kind_of,
+    members,
+)
+from silo.bom.walk.operands import consumed
+from silo.bom.walk.survey import Survey, survey_of
+from silo.bom.walk.tree import COPIES, climbed, is_switched_on
 
 # What to do if a document holds several assemblies. The window says it in its own words.
 NAME_ONE = "Name the right assembly (--assembly NAME)."

@@ -24,7 +24,8 @@ from silo.bom.document import (
     split_sub_name,
 )
 from silo.bom.findings import FindingCode
-from silo.bom.objects import COMPONENTS, Kind, array_count, elements, is_array, kind_of
+from silo.bom.walk.arrays import array_count, elements, is_array
+from silo.bom.walk.kinds import COMPONENTS, Kind, kind_of
 
 Inspect = Callable[[Any], "LinkProblem | None"]
 

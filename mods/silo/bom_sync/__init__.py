@@ -10,11 +10,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from silo.bom.compare.bom_diff import BomDiff
     from silo.bom.compare.difference import diff_bom
     from silo.bom.compare.merge import plan_merge
+    from silo.bom.entry import BomEntry, Extraction
     from silo.bom.items.resolve import resolve_part_numbers
     from silo.bom.links import extract, extract_bom_links
-    from silo.bom.model import BomDiff, BomEntry, Extraction
     from silo.bom_sync.resolved import Resolved, resolve
     from silo.bom_sync.steps import Outcome, Status, SyncApi, compare, sync, sync_tree
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from silo.bom.entry import BomEntry, walk_entries
 from silo.bom.errors import SiloError
-from silo.bom.model import BomEntry, walk_entries
 from silo.bom_sync.memory import Memory, server_of
 from silo.platform import data_folder
 

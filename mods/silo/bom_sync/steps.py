@@ -22,10 +22,10 @@ from typing import Any, Protocol
 
 from silo.api.wire import Component, MergeEntry, MergeRequest, MergeResult, SourceDocument
 from silo.bom.compare.merge import MergePlan
+from silo.bom.entry import BomEntry
 from silo.bom.errors import SiloError
 from silo.bom.items.lookup import ItemLookup
-from silo.bom.model import BomEntry
-from silo.bom.report import components_of
+from silo.bom.left_out import components_of
 from silo.bom_sync.memory import server_of
 from silo.bom_sync.reported_lines import is_reported, remember_reported
 from silo.bom_sync.resolved import Resolved, assemblies, blocking, left_out_parts, names_of

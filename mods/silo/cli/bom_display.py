@@ -13,12 +13,15 @@ from rich.text import Text
 from rich.tree import Tree
 
 from silo import spoken
+from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.document import relative
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import counted
 from silo.bom.findings import Finding, Severity
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomDiff, BomEntry, Extraction
-from silo.bom.report import MOST_LINES, base_of, check_tree_size, diff_rows, shorten
+from silo.bom.view.diff_rows import diff_rows
+from silo.bom.view.folders import base_of, shorten
+from silo.bom.view.tree_json import MOST_LINES, check_tree_size
 from silo.cli.terminal import plain, table_of
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import InputError, NotFoundError, RouteMissingError, SiloError, duration
-from silo.bom.model import Extraction, walk_entries
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

@@ -10,10 +10,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import respelt_findings
 from silo.bom.links import extract
-from silo.bom.model import Extraction, walk_entries
 from silo.bom.roots import choose_assembly
 from silo.cli.options import EACH
 from silo.cli.progress import count_steps

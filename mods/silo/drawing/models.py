@@ -32,11 +32,15 @@ import numpy as np
 from silo.api.wire import ModelProduct, Stated, Structure, Use
 from silo.bom.document import derived, label_of, object_name, own
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError, counted
-from silo.bom.model import identity_of
-from silo.bom.objects import Contents, Contribution, Key, Kind, Lost, elements, is_container, survey_of
+from silo.bom.key import Key
 from silo.bom.roots import choose_assembly, find_assemblies
 from silo.bom.standard import standard_uuid
 from silo.bom.text import with_allowed_characters
+from silo.bom.walk.arrays import elements
+from silo.bom.walk.contents import Contents, Contribution, Lost
+from silo.bom.walk.identity import identity_of
+from silo.bom.walk.kinds import Kind, is_container
+from silo.bom.walk.survey import survey_of
 from silo.checksums import content_hash
 from silo.drawing import Glb, cube, shaded
 from silo.fcstd import Library

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from silo.bom.document import LinkProblem as Problem
 from silo.bom.findings import FindingCode
-from silo.bom.objects import Kind
+from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import ContainerFile, Inflater, ZipEntry
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.objects import FcstdObject

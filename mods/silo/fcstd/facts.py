@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from silo.bom.objects import Kind
+from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import Directory, FileState
 from silo.fcstd.errors import FcstdError
 from silo.fcstd.properties import Properties, Text, table_of

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from silo.bom.document import own
 from silo.bom.errors import DocumentError
-from silo.bom.model import META_KEY, meta_key, own_identity
+from silo.bom.walk.identity import META_KEY, meta_key, own_identity
 from silo.fcstd import expat_reader
 from silo.fcstd.container import ContainerFile, FileState, ZipEntry
 from silo.fcstd.edit import changed, check_writable, edited_xml, in_attribute, replace_file

@@ -16,9 +16,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode
-from silo.bom.model import Extraction, identity_of, walk_entries
+from silo.bom.walk.identity import identity_of
 from silo.fcstd.document import FcstdDocument
 from silo.fcstd.library import Library
 from silo.platform import folded

@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Set
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.objects import Kind, Survey, kind_by_type, kind_of
+from silo.bom.walk.kinds import Kind, kind_by_type, kind_of
+from silo.bom.walk.survey import Survey
 from silo.fcstd.type_tree import ancestors, is_listed
 from silo.fcstd.values import LocalList
 from silo.fcstd.xmltext import XmlText

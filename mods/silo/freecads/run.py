@@ -24,9 +24,9 @@ from pathlib import Path
 from typing import IO, Any
 
 from silo import platform
+from silo.bom.entry import Extraction
 from silo.bom.errors import ConfigError, DocumentError, InputError, SiloError
-from silo.bom.model import Extraction
-from silo.bom.report import from_plain
+from silo.bom.snapshot import from_plain
 from silo.freecads.places import commands, exchange_folder, start
 from silo.platform import scratch_folder
 

@@ -31,8 +31,8 @@ from urllib.parse import urlsplit
 from uuid import uuid4
 
 from silo.api.pause import Pause
+from silo.bom.entry import Extraction
 from silo.bom.errors import Translate, duration, english
-from silo.bom.model import Extraction
 from silo.checksums import seen_as
 from silo.platform import Stamp
 

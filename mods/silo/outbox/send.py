@@ -50,7 +50,8 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
 )
-from silo.bom.report import from_plain, project_folder
+from silo.bom.snapshot import from_plain
+from silo.bom.view.folders import project_folder
 from silo.bom_sync.memory import server_of
 from silo.bom_sync.reported_lines import remember_reported
 from silo.bom_sync.resolved import Resolved, resolve

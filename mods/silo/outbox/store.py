@@ -34,7 +34,7 @@ from typing import Any, BinaryIO
 from silo.api.address import canonical
 from silo.api.pause import Pause
 from silo.bom.errors import ConflictError, DocumentError, InputError, counted
-from silo.bom.report import to_plain
+from silo.bom.snapshot import to_plain
 from silo.checksums import content_hash
 from silo.folder_lock import folder_lock
 from silo.outbox.entry import (

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from silo.bom.entry import BomEntry
 from silo.bom.items.proposal import Proposal
-from silo.bom.model import BomEntry
 from silo.registering.modelled import Modelled
 
 

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from silo.bom.entry import BomEntry
 from silo.bom.errors import SiloError
 from silo.bom.items.proposal import Proposal
-from silo.bom.model import BomEntry
 from silo.registering.candidate import Candidate
 from silo.registering.control import RegisterControl
 from silo.registering.items import Registration, RegistrationApi, register, register_standard, unclear

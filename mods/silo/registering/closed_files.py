@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding
 from silo.bom.items.proposal import Proposal, propose_all
-from silo.bom.model import BomEntry, Extraction
 from silo.bom_sync.resolved import resolve
 from silo.fcstd import check_stampable, stamp
 from silo.freecads.open_documents import OpenInFreecad, open_in_any

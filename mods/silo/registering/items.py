@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Protocol
 
+from silo.bom.entry import BomEntry
 from silo.bom.errors import (
     BusyError,
     ConflictError,
@@ -33,7 +34,7 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.bom.items.proposal import Proposal
-from silo.bom.model import BomEntry, as_uuid
+from silo.bom.walk.identity import as_uuid
 from silo.bom_sync.memory import Memory, server_of
 from silo.bom_sync.standard_items import by_description, standard_item_memory
 from silo.registering.journal import Journal, RegistrationRecord, Turn, component_key

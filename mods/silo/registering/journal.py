@@ -22,8 +22,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from silo.bom.entry import BomEntry
 from silo.bom.errors import InputError
-from silo.bom.model import BomEntry
 from silo.folder_lock import folder_lock
 from silo.platform import data_folder, private_file, private_folder, remove_patiently, replacing
 

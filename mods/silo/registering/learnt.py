@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from silo.bom.entry import BomEntry
 from silo.bom.items.stems import stems
-from silo.bom.model import BomEntry
 from silo.platform import data_folder, one_path, read_memory, write_memory
 
 # Of a folder, the newest choices.

@@ -16,12 +16,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from silo.bom.document import label_of, located, object_name, own
+from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.bom.items.naming import is_generic
-from silo.bom.model import BomEntry, document_identity, own_identity
-from silo.bom.objects import survey_of
 from silo.bom.roles import DECLARABLE
 from silo.bom.roots import choose_assembly, silent_reader
+from silo.bom.walk.identity import document_identity, own_identity
+from silo.bom.walk.survey import survey_of
 from silo.fcstd import Library
 from silo.fcstd.objects import FcstdObject
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from silo.api.revisions import other_name
+from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.errors import (
     CancelledError,
     NotFoundError,
@@ -19,7 +20,6 @@ from silo.bom.errors import (
 )
 from silo.bom.findings import FindingCode
 from silo.bom.items.proposal import crowded_files, propose
-from silo.bom.model import BomEntry, Extraction, walk_entries
 from silo.registering.candidate import Candidate, CandidateFiles, ComponentState, OpenedFile, Similar
 from silo.registering.control import RegisterControl
 from silo.registering.journal import component_key

@@ -12,8 +12,9 @@ import os
 import re
 import zipfile
 
+from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError
-from silo.bom.model import BomEntry, document_identity, meta_key, own_identity
+from silo.bom.walk.identity import document_identity, meta_key, own_identity
 from silo.checksums import content_hash
 
 # What reading an entry of a file raises, if the file is no archive, is damaged, or does not have the entry.

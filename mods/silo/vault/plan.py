@@ -31,14 +31,16 @@ from silo.api.wire import SourceDocument
 from silo.batch import SyncOptions, TopResult, source_document, suggest_by_identity
 from silo.bom.compare.states import ComparedAssembly
 from silo.bom.document import relative
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import CancelledError, DocumentError, InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.items.lookup import Known
 from silo.bom.links import MAX_LEVELS, Rings, extract
-from silo.bom.model import BomEntry, Extraction, copied_identity
-from silo.bom.report import shorten, whole_row
 from silo.bom.roots import choose_assembly, find_assemblies
+from silo.bom.snapshot import whole_row
 from silo.bom.standard import standard_uuid
+from silo.bom.view.folders import shorten
+from silo.bom.walk.shared_identity import copied_identity
 from silo.bom_sync.resolved import Resolved, blocking, known_items, resolve_known
 from silo.bom_sync.steps import Outcome, Status, SyncApi, plain_lines, sync
 from silo.fcstd import Library

@@ -24,6 +24,7 @@ from uuid import uuid4
 from silo.api.files import DocumentId
 from silo.api.revisions import checksum_of
 from silo.api.wire import Revision
+from silo.bom.entry import Extraction
 from silo.bom.errors import (
     DocumentError,
     InputError,
@@ -32,7 +33,7 @@ from silo.bom.errors import (
     SeveralAssembliesError,
 )
 from silo.bom.links import extract, file_bom
-from silo.bom.model import Extraction, held_items
+from silo.bom.walk.identity import held_items
 from silo.checksums import content_hash
 from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths

@@ -39,10 +39,10 @@ from silo.api.wire import Item, LinkedFile, Release, Revision
 from silo.bom.compare.states import ComparedAssembly
 from silo.bom.compare.three_states import ThreeLines, compare_three
 from silo.bom.compare.two_states import LineChange, compare_assemblies
+from silo.bom.entry import Extraction
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError, listed
 from silo.bom.items.naming import display_name
 from silo.bom.links import extract
-from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.checksums import content_hash
 from silo.fcstd import Library

@@ -30,12 +30,12 @@ from itertools import islice
 from typing import Any, NamedTuple, TypeVar
 from uuid import uuid4
 
+from silo.bom.entry import Extraction
 from silo.bom.errors import DocumentError, InputError, SeveralAssembliesError, SiloError
 from silo.bom.findings import respelt_findings
 from silo.bom.links import extract
-from silo.bom.model import Extraction
-from silo.bom.report import from_plain, to_plain
 from silo.bom.roots import choose_assembly
+from silo.bom.snapshot import from_plain, to_plain
 from silo.fcstd.contents import Content, FileContents
 from silo.fcstd.facts import facts_of
 from silo.fcstd.library import Library
@@ -338,7 +338,7 @@ class WalkAnswer:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """Return what :mod:`silo.bom.report` wrote of an extraction; or an error, as its only key."""
+        """Return what :mod:`silo.bom.snapshot` wrote of an extraction; or an error, as its only key."""
         if self._plain is None:
             self._plain = json.loads(self.known.answer)
         return self._plain

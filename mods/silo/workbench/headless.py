@@ -40,7 +40,7 @@ from silo.freecads.job import job_text
 
 if TYPE_CHECKING:
     from silo.batch import TopResult
-    from silo.bom.model import Extraction
+    from silo.bom.entry import Extraction
     from silo.bom_sync.steps import Outcome
     from silo.workbench.freecad.witness import SolidCount
 
@@ -135,7 +135,7 @@ def _extractions(
 
 def _write_lines(job: HeadlessJob, out: TextIO) -> int:
     """Write one line when a file is begun and one when it is done, which shows where FreeCAD crashed."""
-    from silo.bom.report import to_plain
+    from silo.bom.snapshot import to_plain
 
     fine = True
     tops = documents_in(job.tops)
@@ -252,7 +252,7 @@ def _client() -> Any:
 
 def _without_server(job: HeadlessJob, error: ImportError) -> int:
     """Write the BOMs without the packages for a server, and say what to do."""
-    from silo.bom.report import bom_json
+    from silo.bom.view.tree_json import bom_json
 
     config_error = ConfigError(
         f"FreeCAD's Python has no package {error.name!r}, so nothing was synced. `silo-mod install-addon` "

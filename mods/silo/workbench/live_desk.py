@@ -30,8 +30,8 @@ from silo.workbench.freecad.relink import relink
 from silo.workbench.gui import qt
 
 if TYPE_CHECKING:
-    from silo.bom.model import Extraction
-    from silo.bom.objects import Key
+    from silo.bom.entry import Extraction
+    from silo.bom.key import Key
     from silo.workbench.colleagues.theirs import Theirs
     from silo.workbench.freecad.overlay import Overlay
     from silo.workbench.freecad.witness import SolidCount

@@ -21,8 +21,8 @@ from sqlalchemy.exc import IntegrityError
 
 from silo.api.wire import FACTS, FactSource, ItemTexts, Stated
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
-from silo.bom.model import as_uuid
 from silo.bom.text import REFUSED_CHARACTERS, character_problem
+from silo.bom.walk.identity import as_uuid
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.db.rows import one_of
 from silo_server.db.tables import items, number_counters

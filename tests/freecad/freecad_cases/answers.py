@@ -10,12 +10,12 @@ from typing import Any
 
 from freecad_cases.truth import Truth
 
+from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, Place
 from silo.bom.links import extract
-from silo.bom.model import BomEntry, Extraction, walk_entries
-from silo.bom.report import to_plain
 from silo.bom.roots import choose_assembly
+from silo.bom.snapshot import to_plain
 from silo.fcstd import Library
 
 

@@ -13,8 +13,8 @@ from typing import Any
 from freecad_cases.machines import REPOSITORY, FreeCAD
 from freecad_cases.truth import CONTROL
 
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.links import extract
-from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 

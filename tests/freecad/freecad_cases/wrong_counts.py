@@ -21,7 +21,8 @@ import Part
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "mods"))
 
-from silo.bom import links, objects, roles, roots, targets
+from silo.bom import links, roles, roots, targets
+from silo.bom.walk import arrays, joints, kinds, tree
 from silo.workbench.freecad import host, live, witness
 
 
@@ -137,22 +138,26 @@ def always(answer: Any) -> Any:
 # A fault: where a routine is broken, its name, and what makes the broken one of the right one.
 EITHER = {
     "an array counts one more": ((targets,), "array_count", one_more),
-    "all counts twice": ((objects.Tree,), "times", lambda old: lambda one, name: 2 * old(one, name)),
+    "all counts twice": ((tree.Tree,), "times", lambda old: lambda one, name: 2 * old(one, name)),
     "links are construction": ((roles,), "no_component", always("a joint")),
 }
 FAULTS: dict[Any, dict[str, Any]] = {
     with_everything: {
         **EITHER,
         "a Draft array counts one more": ((roles,), "draft_count", one_more),
-        "hidden sources count": ((objects.Tree,), "visible", always(True)),
+        "hidden sources count": ((tree.Tree,), "visible", always(True)),
         "operands count": ((roles,), "consumed", always({})),
-        "excluded ones count": ((roles, objects, targets), "left_out_by", always("")),
+        "excluded ones count": ((roles, arrays, tree, targets), "left_out_by", always("")),
         "hidden screws beside count": ((roots,), "is_switched_on", always(True)),
         "screws beside do not count": ((links,), "silent_reader", without_beside),
     },
     assembly3: {
         **EITHER,
-        "its last group counts": ((objects,), "members", lambda _old: lambda one: one.Group[-1].Group),
+        "its last group counts": (
+            (kinds, joints, tree),
+            "members",
+            lambda _old: lambda one: one.Group[-1].Group,
+        ),
     },
 }
 LINES: dict[str, Any] = {
@@ -171,7 +176,7 @@ def said(path: str, change: Any = lambda lines: lines) -> list[dict[str, Any]]:
 
 def main() -> None:
     answers = {}
-    by_mark = objects.left_out_by
+    by_mark = arrays.left_out_by
     # FreeCAD's own view asks the right routine, whatever is broken.
     host.Pieces._left_out_by = property(lambda _pieces: by_mark, lambda _pieces, _other: None)
     for build, faults in FAULTS.items():

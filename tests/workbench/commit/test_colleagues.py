@@ -18,8 +18,8 @@ from fcstd_writer import locals_, part
 from silo.api.files import Origin
 from silo.api.wire import Revision
 from silo.bom.compare.three_states import ThreeLines
+from silo.bom.entry import BomEntry
 from silo.bom.errors import ServerFaultError
-from silo.bom.model import BomEntry
 from silo.outbox.entry import State
 from silo.workbench.activity.box import Action, Do, EntryLine, PaneEntry
 from silo.workbench.colleagues.announced import Newer

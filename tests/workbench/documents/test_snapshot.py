@@ -10,7 +10,7 @@ from fakes import Doc, edit
 
 from silo.bom.findings import FindingCode
 from silo.bom.links import file_item
-from silo.bom.model import sole_identity
+from silo.bom.walk.identity import sole_identity
 from silo.workbench.documents.snapshot import Snapshot, take
 
 

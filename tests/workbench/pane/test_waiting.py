@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from silo.bom.compare.three_states import ThreeLines
-from silo.bom.model import BomEntry
+from silo.bom.entry import BomEntry
 from silo.outbox.entry import Commit, Entry, State
 from silo.outbox.store import Store
 from silo.workbench.activity.box import Do

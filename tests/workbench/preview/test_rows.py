@@ -16,7 +16,7 @@ from server_testing import sqlite_database
 
 from silo.api.client import SiloClient
 from silo.api.wire import MergeEntry, MergeRequest
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom_sync.resolved import resolve
 from silo.bom_sync.steps import sync
 from silo.cli.main import main

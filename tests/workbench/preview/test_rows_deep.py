@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.entry import BomEntry, Extraction
 from silo.testing import FakeSilo
 from silo.workbench.documents.snapshot import Snapshot
 from silo.workbench.preview.flow import MOST_ROWS, PreviewRow, RowKind, ask, rows

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import pytest
 
+from silo.bom.entry import BomEntry
 from silo.bom.items.proposal import Proposal
 from silo.bom.items.schema import Categories
-from silo.bom.model import BomEntry
 from silo.registering.candidate import Candidate, ComponentState, Similar
 from silo.registering.offer import Offer
 from silo.workbench.register.flow import (

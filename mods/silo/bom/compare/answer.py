@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
-from silo.bom.model import BomChange, BomDiff, QuantityChange
+from silo.bom.compare.bom_diff import BomChange, BomDiff, QuantityChange
 from silo.bom.quantities import plain
 
 

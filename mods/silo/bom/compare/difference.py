@@ -20,8 +20,9 @@ from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from silo.bom.compare.bom_diff import BomChange, BomDiff, QuantityChange
 from silo.bom.compare.owner import is_component, is_manual
-from silo.bom.model import BomChange, BomDiff, BomEntry, QuantityChange
+from silo.bom.entry import BomEntry
 from silo.bom.quantities import as_number, counts_pieces, exact_sum, plain, same_quantity, says_the_same
 
 # (file, object) of a component; the file relative to the assembly's, as a merge names it.

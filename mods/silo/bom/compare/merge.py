@@ -19,9 +19,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.compare.difference import Component, diff_bom, local_quantities
 from silo.bom.compare.owner import is_component, is_manual
-from silo.bom.model import BomDiff, BomEntry
+from silo.bom.entry import BomEntry
 from silo.bom.quantities import same_quantity
 
 

@@ -13,9 +13,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from silo.bom.model import BomEntry
-
-Key = tuple[str, str]
+from silo.bom.entry import BomEntry
+from silo.bom.key import Key
 
 T = TypeVar("T")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from silo.bom.compare.states import ComparedAssembly, ComponentMatch, first_state
-from silo.bom.model import BomEntry
+from silo.bom.entry import BomEntry
 
 
 @dataclass(frozen=True, slots=True)

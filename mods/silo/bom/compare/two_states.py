@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from silo.bom.compare.states import ComparedAssembly, ComponentMatch, first_state
+from silo.bom.entry import BomEntry
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomEntry
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from silo.bom.entry import BomEntry
 from silo.bom.items.standard_kind import OTHER_NAMES, standard_kind
 from silo.bom.items.stems import stems
-from silo.bom.model import BomEntry
 
 SURE = 0.5
 """From this confidence on, a category is proposed without a question."""

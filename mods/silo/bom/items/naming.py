@@ -6,7 +6,7 @@ from __future__ import annotations
 import os.path
 import re
 
-from silo.bom.model import BomEntry
+from silo.bom.entry import BomEntry
 from silo.bom.text import clean_name
 
 # Labels that FreeCAD or an import gives by itself say nothing of the part.

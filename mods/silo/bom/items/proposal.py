@@ -10,9 +10,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from silo.bom.entry import BomEntry, walk_entries
 from silo.bom.items.categories import proposed_category
 from silo.bom.items.naming import proposed_name
-from silo.bom.model import BomEntry, walk_entries
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from silo.bom.entry import BomEntry, walk_entries
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.items.lookup import ItemLookup, Known, look_up
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomEntry, walk_entries
 
 
 def resolve_part_numbers(

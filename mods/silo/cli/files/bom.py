@@ -11,10 +11,12 @@ from dataclasses import replace
 
 from silo.bom.consolidation import consolidation_findings, one_hint_each
 from silo.bom.document import relative
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import BusyError, Exit, InputError
 from silo.bom.findings import FindingCode
-from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import base_of, bom_json, flat_json
+from silo.bom.view.flat_list import flat_json
+from silo.bom.view.folders import base_of
+from silo.bom.view.tree_json import bom_json
 from silo.cli.connection import client_of, reach
 from silo.cli.files.bom_table import table_rows, write_csv, write_xlsx
 from silo.cli.files.bom_verify import verify

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from silo import spoken
+from silo.bom.entry import BomEntry
 from silo.bom.errors import Exit, InputError
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomEntry
-from silo.bom.report import finding_json, shorten
+from silo.bom.view.folders import shorten
+from silo.bom.view.tree_json import finding_json
 from silo.cli.json_output import json_text, print_json
 from silo.cli.options import add_options
 from silo.files import check_writable

@@ -9,11 +9,12 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from silo.bom.entry import Extraction
 from silo.bom.errors import ConfigError
 from silo.bom.headers import safe_cell
-from silo.bom.model import Extraction
-from silo.bom.report import PIECES, bom_json, flat_json
 from silo.bom.text import with_allowed_characters
+from silo.bom.view.flat_list import PIECES, flat_json
+from silo.bom.view.tree_json import bom_json
 from silo.platform import replacing
 
 

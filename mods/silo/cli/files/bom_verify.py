@@ -9,7 +9,8 @@ import sys
 from typing import Any
 
 from silo.bom.errors import InputError, SiloError
-from silo.bom.report import base_of, bom_json
+from silo.bom.view.folders import base_of
+from silo.bom.view.tree_json import bom_json
 from silo.cli.json_output import print_json
 
 

@@ -8,11 +8,13 @@ import os
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.document import relative
 from silo.bom.errors import Exit
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomDiff
-from silo.bom.report import base_of, diff_json, finding_json
+from silo.bom.view.diff_rows import diff_json
+from silo.bom.view.folders import base_of
+from silo.bom.view.tree_json import finding_json
 from silo.cli.connection import client_of, reach
 from silo.cli.json_output import print_json
 from silo.cli.options import add_top

@@ -26,7 +26,7 @@ from silo.cli.options import add_each, only_with
 from silo.cli.reading import read_tops
 
 if TYPE_CHECKING:
-    from silo.bom.model import BomEntry
+    from silo.bom.entry import BomEntry
     from silo.inertia.report import InertiaReport
 
 
@@ -85,7 +85,7 @@ def _push(args: argparse.Namespace, report: InertiaReport) -> int:
     """Push the masses to the items with the part numbers of the documents' identities; --item replaces that
     of the top assembly.
     """
-    from silo.bom.report import base_of
+    from silo.bom.view.folders import base_of
     from silo.bom_sync.resolved import resolve
     from silo.inertia.geometry.freecad import product_key
 

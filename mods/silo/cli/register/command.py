@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.bom.document import relative
+from silo.bom.entry import Extraction, walk_entries
 from silo.bom.errors import Exit, InputError
-from silo.bom.model import Extraction, walk_entries
-from silo.bom.report import base_of
+from silo.bom.view.folders import base_of
 from silo.cli.connection import client_of
 from silo.cli.options import add_options, add_top, not_with, only_with
 from silo.cli.reading import plan_of, read_tops

@@ -22,9 +22,9 @@ from urllib.parse import quote
 from silo import spoken
 from silo.batch import source_document
 from silo.bom.consolidation import consolidation_findings
+from silo.bom.entry import Extraction
 from silo.bom.errors import Exit, InputError, ServerFaultError
-from silo.bom.model import Extraction
-from silo.bom.report import base_of
+from silo.bom.view.folders import base_of
 from silo.bom_sync.activity_text import activity_text
 from silo.bom_sync.resolved import resolve
 from silo.bom_sync.steps import Outcome, Status, sync_tree

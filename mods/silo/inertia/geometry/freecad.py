@@ -25,27 +25,17 @@ from typing import Any, Protocol
 import numpy as np
 
 from silo.bom.document import LinkProblem, derived, first_of, label_of, object_name, own, relative
+from silo.bom.entry import BomEntry
 from silo.bom.errors import DocumentError, InputError, listed
 from silo.bom.findings import FindingCode
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomEntry
-from silo.bom.objects import (
-    REPEATERS,
-    Contents,
-    Contribution,
-    Count,
-    Key,
-    Kind,
-    Lost,
-    elements,
-    is_container,
-    is_named_assembly,
-    kind_of,
-    left_out_by,
-)
+from silo.bom.key import Key
 from silo.bom.roots import choose_assembly, seen_beside, silent_reader
 from silo.bom.standard import STANDARD_PARTS
 from silo.bom.targets import Step, is_assembly_link, is_link
+from silo.bom.walk.arrays import elements, left_out_by
+from silo.bom.walk.contents import Contents, Contribution, Count, Lost
+from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of
 from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.geometry import measured as checks
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, ReadOptions, Report, in_metres, unfold

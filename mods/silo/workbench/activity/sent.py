@@ -7,10 +7,10 @@ import os
 import time
 
 from silo.api.merging import unusual
+from silo.bom.entry import BomEntry, walk_entries
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomEntry, walk_entries
-from silo.bom.report import shorten
+from silo.bom.view.folders import shorten
 from silo.bom_sync.activity_text import (
     draft_text,
     headline,

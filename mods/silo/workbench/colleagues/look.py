@@ -93,7 +93,7 @@ def look_held(
     Raises SiloError if the server does not answer, or a file cannot be read.
     """
     from silo.api.address import canonical
-    from silo.bom.report import from_plain
+    from silo.bom.snapshot import from_plain
     from silo.vault.pull import top_of
 
     extraction = outbox.bom(entry.id)[0]

@@ -10,8 +10,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
+from silo.bom.entry import Extraction, walk_entries
 from silo.bom.findings import Finding, FindingCode
-from silo.bom.model import Extraction, walk_entries
 from silo.platform import data_folder, read_memory, write_memory
 
 

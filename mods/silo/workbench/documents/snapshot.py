@@ -11,11 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from silo.bom.entry import Extraction
 from silo.bom.errors import SeveralAssembliesError
 from silo.bom.links import extract, file_bom
-from silo.bom.model import Extraction, held_items, sole_identity
-from silo.bom.report import to_plain
 from silo.bom.roots import NAME_ONE
+from silo.bom.snapshot import to_plain
+from silo.bom.walk.identity import held_items, sole_identity
 from silo.platform import one_path
 from silo.workbench.words import translate
 

@@ -115,7 +115,7 @@ class Pieces:
     """
 
     def __init__(self, own_shapes: dict[tuple[str, str], int], top: Any = None) -> None:
-        from silo.bom.objects import left_out_by
+        from silo.bom.walk.arrays import left_out_by
 
         self._left_out_by = left_out_by
         self._own_shapes = own_shapes

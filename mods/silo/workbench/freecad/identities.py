@@ -18,10 +18,10 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
         ``Name`` of the component's object; "" for the document itself.
     whole_document
         the document is this one component, so it carries the identity as well. Otherwise only the object has
-        the identity (:mod:`silo.bom.model` says where it is looked for).
+        the identity (:mod:`silo.bom.walk.identity` says where it is looked for).
     """
     from silo.bom.errors import DocumentError
-    from silo.bom.model import meta_key
+    from silo.bom.walk.identity import meta_key
 
     obj = doc.getObject(name) if name else None
     if name and obj is None:
@@ -46,7 +46,7 @@ def remove_identity(doc: Any, name: str, *, no_part: bool = False, whole_documen
     whole_document
         the document's own identity is removed too; otherwise it stays.
     """
-    from silo.bom.model import meta_key
+    from silo.bom.walk.identity import meta_key
 
     obj = doc.getObject(name)
     with others_unmarked(doc):

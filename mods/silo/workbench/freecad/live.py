@@ -15,11 +15,11 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from silo.bom.document import LinkProblem, object_name
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.key import Key
 from silo.bom.links import extract, why
-from silo.bom.model import BomEntry, Extraction
-from silo.bom.objects import Key
 from silo.bom.roots import choose_assembly
 from silo.bom.targets import is_assembly_link, is_link
 from silo.platform import Spelling, one_path

@@ -18,7 +18,7 @@ from silo.workbench.gui import qt
 from silo.workbench.words import translate
 
 if TYPE_CHECKING:
-    from silo.bom.model import BomEntry
+    from silo.bom.entry import BomEntry
 
 
 # For more objects, the property editor shows only what they have in common.

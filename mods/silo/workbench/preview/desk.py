@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 from silo.workbench.desk import Desk
 
 if TYPE_CHECKING:
+    from silo.bom.entry import Extraction
     from silo.bom.findings import Finding
-    from silo.bom.model import Extraction
-    from silo.bom.objects import Key
+    from silo.bom.key import Key
     from silo.workbench.preview.flow import PreviewFlow, PreviewWindow
 
 

@@ -14,12 +14,13 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Protocol
 
+from silo.bom.compare.bom_diff import BomDiff
 from silo.bom.document import relative
+from silo.bom.entry import BomEntry, Extraction
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.items.naming import display_name
-from silo.bom.model import BomDiff, BomEntry, Extraction
-from silo.bom.report import shorten
+from silo.bom.view.folders import shorten
 from silo.outbox.entry import new_key
 from silo.workbench.commit.flow import CommitFlow, commit_of
 from silo.workbench.documents.snapshot import Snapshot
@@ -29,7 +30,7 @@ from silo.workbench.session.worker import Control
 from silo.workbench.words import MOST_TIP, counted, plain, quantity, spoken, translate
 
 if TYPE_CHECKING:
-    from silo.bom.objects import Key
+    from silo.bom.key import Key
     from silo.bom_sync.resolved import Resolved
 
 

@@ -22,8 +22,8 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any, Protocol
 
+from silo.bom.entry import BomEntry, Extraction, walk_entries
 from silo.bom.errors import SiloError
-from silo.bom.model import BomEntry, Extraction, walk_entries
 from silo.bom_sync.activity_text import rules_text
 from silo.registering.candidate import Candidate, ComponentState, Similar
 from silo.registering.carry_out import carry_out, take_back

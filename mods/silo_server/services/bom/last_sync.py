@@ -14,7 +14,7 @@ from typing import Any
 
 from sqlalchemy import delete, insert, select, update
 
-from silo.bom.report import Reason, in_words, remembered
+from silo.bom.left_out import Reason, in_words, remembered
 from silo_server.db.rows import one_of
 from silo_server.db.tables import bom_last_syncs
 from silo_server.db.transaction import Tx
@@ -30,7 +30,7 @@ class LastSync:
     """What is known of an assembly's last sync. ``at`` None: it was never synced.
 
     left_out
-        what the assembly holds and the BOM does not: the fields of :class:`silo.bom.report.LeftOut`.
+        what the assembly holds and the BOM does not: the fields of :class:`silo.bom.left_out.LeftOut`.
     refused_at
         when the server refused a later merge, None if it did not; ``refusal`` says why.
     """

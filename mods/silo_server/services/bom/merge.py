@@ -15,10 +15,10 @@ from typing import Any
 from sqlalchemy import delete, select
 
 from silo.bom.compare.answer import answer_of, summary
+from silo.bom.compare.bom_diff import BomDiff, QuantityChange
 from silo.bom.compare.merge import MergePlan, plan_merge
 from silo.bom.compare.owner import is_manual
 from silo.bom.errors import RejectedError
-from silo.bom.model import BomDiff, QuantityChange
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.db.rows import insert_rows, one_of
 from silo_server.db.tables import bom_conflicts, items

@@ -13,8 +13,8 @@ from decimal import Decimal
 from typing import Any
 
 from silo.bom.errors import RejectedError
+from silo.bom.left_out import Reason
 from silo.bom.quantities import LARGEST_QUANTITY, as_decimal
-from silo.bom.report import Reason
 from silo_server.errors import TooLargeError
 from silo_server.services.field_checks import quantity_problem, sha256_or_none, shortened, text_problem
 

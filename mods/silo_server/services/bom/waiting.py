@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from sqlalchemy import ColumnElement, func, or_, select, text, true, union
 
-from silo.bom.report import Reason
+from silo.bom.left_out import Reason
 from silo_server.db.rows import one_of
 from silo_server.db.tables import INCOMPLETE, UNREFERENCED, assignees, bom_last_syncs, bom_lines, items, users
 from silo_server.db.transaction import Tx
