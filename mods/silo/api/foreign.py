@@ -148,7 +148,7 @@ TABLE |= {
     OSError: _BROKEN,
 }
 
-# Wrappers that say less than the error inside them.
+# Wrappers less informative than their cause.
 _WRAPPERS = (rq.ConnectionError, rq.ChunkedEncodingError, u3.MaxRetryError, u3.ProtocolError)
 
 

@@ -65,7 +65,7 @@ class Timeouts:
 class ApiCall:
     """One request. ``body`` makes the content again for each attempt.
 
-    ``endless`` answers (downloads) may take as long as they come at all.
+    ``endless`` answers (downloads) have no overall time limit.
     """
 
     method: str

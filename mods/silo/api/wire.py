@@ -413,7 +413,7 @@ class MergeEvent(_Merged):
     summary: str = ""
 
 
-class Lacking(Answer):
+class MissingValues(Answer):
     """How many parts lack a value, and the first of them."""
 
     count: int = 0
@@ -442,13 +442,14 @@ class ProductSummary(Answer):
     parts: int = 0
     total_mass_kg: Number | None = None
     totals: list[CostTotal] = Field(default_factory=list)
-    mass_missing: Lacking = Lacking()
-    cost_missing: Lacking = Lacking()
+    mass_missing: MissingValues = MissingValues()
+    cost_missing: MissingValues = MissingValues()
 
 
-class Happened(Answer):
+class ProductChange(Answer):
     """One thing that changed in a product: ``what`` is added, removed, quantity or line (of the BOM
-    ``within``), data or file. Two frozen revisions do not say when, and who it was."""
+    ``within``), data or file. ``at`` and ``username`` are empty for two
+    frozen revisions."""
 
     what: str
     within: str = ""
@@ -466,7 +467,7 @@ class ProductChanges(Answer):
     part_number: str
     since: Time = Field(default=None, validation_alias="from")
     to: Time = None
-    changes: list[Happened] = Field(default_factory=list)
+    changes: list[ProductChange] = Field(default_factory=list)
 
 
 class ErrorBody(Answer):

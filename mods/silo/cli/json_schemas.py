@@ -342,7 +342,7 @@ Changed = _shape(
     to=str,
     changes=_many(
         _shape(
-            "Happened",
+            "ProductChange",
             what=Literal["added", "removed", "quantity", "line", "data", "file"],
             within=_described(str, "the part number of the BOM; empty for an item's data and file"),
             part_number=str,

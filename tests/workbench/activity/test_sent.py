@@ -10,7 +10,7 @@ import pytest
 from activities import entry_text
 
 from silo.api.merging import NOT_ATOMIC
-from silo.api.wire import CostTotal, Draft, Lacking, MergeDiff, MergeWarning, ProductSummary, Revision
+from silo.api.wire import CostTotal, Draft, MergeDiff, MergeWarning, MissingValues, ProductSummary, Revision
 from silo.bom.errors import english
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom_sync.activity_text import counts_text
@@ -80,7 +80,7 @@ def test_a_commit_says_what_is_open_in_its_product(vault: Vault) -> None:
         parts=28,
         total_mass_kg=12.4,
         totals=[CostTotal(currency="EUR", total_cost=8)],
-        mass_missing=Lacking(count=2, first=["P"]),
+        mass_missing=MissingValues(count=2, first=["P"]),
     )
     shown = entry_text(of_sent(replace(vault.told[-1], summary=kept), page, now=0.0)).splitlines()
     opened = [line for line in shown if line.startswith("Open in")]
