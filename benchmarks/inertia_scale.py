@@ -39,9 +39,11 @@ import json, resource, sys, time
 from pathlib import Path
 begin = time.perf_counter()
 from silo.inertia.bom.parser import BOMParser
-from silo.inertia.calculator import Task, calculate, read_geometry
+from silo.inertia.calculation import calculate
+from silo.inertia.calculator import read_geometry
+from silo.inertia.task import Task
 from silo.inertia.geometry import ReadOptions
-from silo.inertia.materials import load_materials
+from silo.inertia.materials.table import load_materials
 options = ReadOptions(
     cache=sys.argv[2] == "cache", cache_dir=Path(sys.argv[3]), processes=int(sys.argv[4]), timeout_s=3000
 )

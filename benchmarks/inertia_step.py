@@ -35,12 +35,13 @@ OURS = """
 import json, resource, sys, time
 from pathlib import Path
 import numpy as np
-from silo.inertia.assembly import combine_arrays, place
+from silo.inertia.placements import place
+from silo.inertia.rigid import combine_arrays
 from silo.inertia.geometry import kernel as occt
-from silo.inertia.geometry.graph import ReadOptions
+from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.geometry.helpers import Helpers
 from silo.inertia.geometry.step import read_step
-from silo.inertia.geometry.read import without
+from silo.inertia.geometry.worker import without
 without("scipy", "networkx")
 import trimesh.triangles
 occt.quiet()

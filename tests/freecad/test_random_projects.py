@@ -27,8 +27,8 @@ from silo.fcstd import Library
 from silo.freecads.run import run_freecad
 from silo.inertia.geometry.fcstd import Entries, StoredFacts, Unpacked, measured_files
 from silo.inertia.geometry.freecad import Leaf, Walk, assembled, one_by_one
-from silo.inertia.geometry.graph import ReadOptions
 from silo.inertia.geometry.measured import Measured
+from silo.inertia.geometry.options import ReadOptions
 
 pytestmark = pytest.mark.freecad
 

@@ -16,7 +16,7 @@ from public_projects import ASSEMBLIES
 from silo.bom.errors import InputError
 from silo.inertia.assembly import Assembly
 from silo.inertia.geometry import ReadOptions, read
-from silo.inertia.geometry.read import load
+from silo.inertia.geometry.stored import load
 from silo.inertia.notes import GeometryCode
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]

@@ -14,7 +14,8 @@ from silo.inertia.assembly import Assembly
 from silo.inertia.codes import Source
 from silo.inertia.masses import Options
 from silo.inertia.notes import GeometryCode
-from silo.inertia.output import snippets, writable
+from silo.inertia.output.accepted import writable
+from silo.inertia.output.snippets import snippets
 from silo.inertia.products import leaf_products
 
 Fixture = Callable[..., Any]

@@ -30,10 +30,10 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound
 
 from silo.inertia.geometry import kernel as occt
-from silo.inertia.geometry.graph import ReadOptions
 from silo.inertia.geometry.helpers import Helpers
 from silo.inertia.geometry.kernel.solids import measure_all
 from silo.inertia.geometry.measured import Measured
+from silo.inertia.geometry.options import ReadOptions
 
 OPTIONS = ReadOptions(isolate=False, cache=False)
 

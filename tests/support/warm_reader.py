@@ -19,10 +19,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 NAME = "SILO_WARM_READER"
-WORK = ("from silo.inertia.geometry.read import main; main()", "from silo.drawing.models import main; main()")
+WORK = (
+    "from silo.inertia.geometry.worker import main; main()",
+    "from silo.drawing.models import main; main()",
+)
 COMMAND = "from silo.cli.main import main; raise SystemExit(main())"
 LOADED = """
-from silo.inertia.geometry.read import without
+from silo.inertia.geometry.worker import without
 without("scipy", "networkx")
 import silo.drawing.models, silo.inertia.geometry.step, silo.inertia.geometry.meshes
 import silo.api.client, silo.bom_sync, silo.cli.main

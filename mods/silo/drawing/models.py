@@ -47,13 +47,15 @@ from silo.fcstd import Library
 from silo.fcstd.linked import recorded_paths
 from silo.inertia.assembly import SolidProps
 from silo.inertia.digits import rounded
+from silo.inertia.geometry.child import python, run
 from silo.inertia.geometry.fcstd import Entries, StoredFacts, Unpacked, located
 from silo.inertia.geometry.freecad import NOTHING, Leaf, ShapeRef, ShapeSource, StatedMaterial, Walk, file_of
-from silo.inertia.geometry.graph import Progress, ReadOptions, in_metres
+from silo.inertia.geometry.graph import in_metres
 from silo.inertia.geometry.measured import Measured
-from silo.inertia.geometry.read import main as read_main
-from silo.inertia.geometry.read import python, run, say
+from silo.inertia.geometry.options import Progress, ReadOptions
 from silo.inertia.geometry.together import Box, Floats, Mesh, about_enclosed, combined, joined, welded
+from silo.inertia.geometry.worker import main as read_main
+from silo.inertia.geometry.worker import say
 from silo.inertia.notes import DOUBTFUL
 from silo.inertia.placements import is_rigid
 from silo.locator import FoundFile, Locator

@@ -27,7 +27,7 @@ from silo.drawing import Glb, Shape, shaded
 from silo.inertia.assembly import Assembly, Instance
 from silo.inertia.codes import Source
 from silo.inertia.geometry.together import Floats, Mesh
-from silo.inertia.output import NOISE, SOURCE_WORDS, how, material_of
+from silo.inertia.output.words import NOISE, SOURCE_WORDS, how, material_of
 from silo.inertia.report import InertiaReport, LinkResult, PartResult
 from silo.inertia.rigid import MassProps
 

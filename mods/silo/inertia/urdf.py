@@ -23,7 +23,8 @@ from silo.bom.errors import InputError
 from silo.inertia.arrays import Floats
 from silo.inertia.links.claims import ROOT_LINK
 from silo.inertia.links.frames import MOST_RAD, origin_frame
-from silo.inertia.output import inertial, write_whole
+from silo.inertia.output.snippets import inertial
+from silo.inertia.output.whole_file import write_whole
 from silo.inertia.rigid import MassProps
 
 MAX_BYTES = 64 * 1024 * 1024

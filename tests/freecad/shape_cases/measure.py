@@ -10,8 +10,8 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.environ["SILO_MODS"])
 
-from silo.inertia.geometry.graph import ReadOptions  # noqa: E402
-from silo.inertia.geometry.read import save  # noqa: E402
+from silo.inertia.geometry.options import ReadOptions  # noqa: E402
+from silo.inertia.geometry.stored import save  # noqa: E402
 from silo.workbench.freecad import shapes  # noqa: E402
 from silo.workbench.freecad.opening import open_fully  # noqa: E402
 

@@ -15,17 +15,8 @@ from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from silo.bom.errors import DocumentError, InputError
 from silo.inertia.assembly import Assembly, Instance, Prototype
 from silo.inertia.geometry import Mesh, ReadOptions, read
-from silo.inertia.geometry.read import (
-    FORMAT,
-    Cache,
-    default_folder,
-    fingerprint,
-    key_of,
-    key_parts,
-    load,
-    measured_by,
-    save,
-)
+from silo.inertia.geometry.cache import Cache, default_folder, fingerprint, key_of, key_parts, measured_by
+from silo.inertia.geometry.stored import FORMAT, load, save
 from silo.inertia.notes import Note
 from silo.platform import cache_folder
 

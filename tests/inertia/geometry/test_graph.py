@@ -9,17 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
-from silo.inertia.geometry.graph import (
-    Child,
-    Node,
-    bottom_up,
-    clean,
-    count_instances,
-    is_generic,
-    lost_characters,
-    unfold,
-    unique_names,
-)
+from silo.inertia.geometry.graph import Child, Node, bottom_up, count_instances, unfold, unique_names
+from silo.inertia.geometry.names import clean, is_generic, lost_characters
 from silo.inertia.geometry.part21 import WANTED, EntityRef, Typed, decoded, scan
 
 

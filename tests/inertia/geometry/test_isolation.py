@@ -14,7 +14,7 @@ import pytest
 
 from silo.bom.errors import CancelledError, ConfigError, DocumentError
 from silo.inertia.geometry import Progress, ReadOptions, read
-from silo.inertia.geometry.read import run
+from silo.inertia.geometry.child import run
 from silo.inertia.notes import GeometryCode
 
 

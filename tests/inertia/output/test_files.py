@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from silo.bom.errors import InputError
-from silo.inertia.output import write_whole
+from silo.inertia.output.whole_file import write_whole
 
 
 @pytest.mark.usefixtures("needs_modes")

@@ -24,20 +24,12 @@ from silo.cli.terminal import console
 from silo.inertia.digits import number
 from silo.inertia.links.frames import ASSEMBLY_FRAME, origin_frame
 from silo.inertia.links.link_map import link_map
-from silo.inertia.output import (
-    CSV_COLUMNS,
-    MAX_PART_ROWS,
-    SNIPPETS,
-    document,
-    report_csv,
-    report_data,
-    report_json,
-    report_markdown,
-    report_tables,
-    settled,
-    snippets,
-    writable,
-)
+from silo.inertia.output.accepted import settled, writable
+from silo.inertia.output.csv import CSV_COLUMNS, report_csv
+from silo.inertia.output.json import report_data, report_json
+from silo.inertia.output.markdown import report_markdown
+from silo.inertia.output.snippets import SNIPPETS, document, snippets
+from silo.inertia.output.terminal import MAX_PART_ROWS, report_tables
 from silo.inertia.report import LinkResult
 from silo.inertia.rigid import MassProps, combine
 

@@ -80,6 +80,6 @@ def test_values_that_are_not_finite_are_no_zero(page: str, assemble: Fixture, co
 def test_every_source_has_a_colour() -> None:
     """A new source of masses must not break the page."""
     from silo.drawing.page import _SOURCE_COLOURS
-    from silo.inertia.output import SOURCE_WORDS
+    from silo.inertia.output.words import SOURCE_WORDS
 
     assert set(SOURCE_WORDS) == set(_SOURCE_COLOURS) == set(Source)

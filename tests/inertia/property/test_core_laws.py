@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.inertia.links.frames import origin_frame
-from silo.inertia.output import settled
+from silo.inertia.output.accepted import settled
 from silo.inertia.placements import place
 from silo.inertia.rigid import MassProps, combine
 

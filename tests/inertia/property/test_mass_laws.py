@@ -20,7 +20,7 @@ from silo.inertia.bom.structure import with_structure
 from silo.inertia.bom.table import BOMEntry, BomTable
 from silo.inertia.codes import Source
 from silo.inertia.names import bare, plain
-from silo.inertia.output import report_json
+from silo.inertia.output.json import report_json
 
 Compute = Callable[..., Any]
 NAMES = (

@@ -142,7 +142,7 @@ def _task(args: argparse.Namespace) -> Task:
 
 
 def _write_urdf(args: argparse.Namespace, report: InertiaReport, urdf: Urdf) -> None:
-    from silo.inertia.output import writable
+    from silo.inertia.output.accepted import writable
     from silo.inertia.urdf import write_urdf
 
     links = writable(report.links.values())
@@ -167,7 +167,8 @@ def _write_urdf(args: argparse.Namespace, report: InertiaReport, urdf: Urdf) -> 
 
 def _print_snippet(kind: str, report: InertiaReport) -> None:
     from silo.cli.terminal import plain
-    from silo.inertia.output import document, writable
+    from silo.inertia.output.accepted import writable
+    from silo.inertia.output.snippets import document
 
     text = document(writable(report.links.values()), kind, report.assembly)
     # A file that says nothing of its encoding is UTF-8; a pipe of another code page gets ASCII.

@@ -42,7 +42,7 @@ def run_links(args: argparse.Namespace) -> int:
     check_outputs(args)
     from silo.inertia.links.claims import ROOT_LINK, claim
     from silo.inertia.links.starting_map import as_map, as_yaml, starting_map
-    from silo.inertia.output import write_whole
+    from silo.inertia.output.whole_file import write_whole
     from silo.inertia.urdf import read_urdf
 
     urdf = read_urdf(args.urdf) if args.urdf else None

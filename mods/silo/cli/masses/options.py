@@ -162,7 +162,7 @@ def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
 
 def check_outputs(args: argparse.Namespace) -> None:
     """Raise InputError for files that cannot be written, or must not be: an input file, or one file twice."""
-    from silo.inertia.geometry.graph import is_model_name
+    from silo.inertia.geometry.formats import is_model_name
 
     report: list[str] = getattr(args, "report", [])
     single = [getattr(args, name) for name in ("urdf_out", "out") if getattr(args, name, None)]

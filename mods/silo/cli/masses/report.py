@@ -24,23 +24,23 @@ def show_report(
 
     _write_files(args, report, assembly)
     if quiet:
-        from silo.inertia.output import report_warnings
+        from silo.inertia.output.terminal import report_warnings
 
         console(sys.stderr).print(report_warnings(report, whole=not sys.stderr.isatty(), say=spoken))
         return
     if args.json:
-        from silo.inertia.output import report_json
+        from silo.inertia.output.json import report_json
 
         # A pipe on Windows takes the country's code page: names must not turn into question marks there.
         sys.stdout.write(report_json(report, sys.stdout.encoding or "ascii"))
         return
-    from silo.inertia.output import report_tables
+    from silo.inertia.output.terminal import report_tables
 
     console().print(report_tables(report, whole=not sys.stdout.isatty(), say=spoken))
 
 
 def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:
-    from silo.inertia.output import write_whole
+    from silo.inertia.output.whole_file import write_whole
 
     for name in args.preview:
         from silo.drawing.page import views_of, write_glb
@@ -48,7 +48,9 @@ def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Asse
         write_whole(name, write_glb(assembly, views_of(report, assembly)))
     for name in args.report:
         from silo.drawing.page import report_html
-        from silo.inertia.output import report_csv, report_json, report_markdown
+        from silo.inertia.output.csv import report_csv
+        from silo.inertia.output.json import report_json
+        from silo.inertia.output.markdown import report_markdown
 
         writers = {
             ".html": lambda inertia_report: report_html(inertia_report, assembly),

@@ -4,7 +4,7 @@
 Light to import: the geometry kernel and trimesh are loaded where a file is read, which is in a child process.
 """
 
-from silo.inertia.geometry.graph import Progress, ReadOptions
+from silo.inertia.geometry.options import Progress, ReadOptions
 from silo.inertia.geometry.read import read
 from silo.inertia.geometry.together import Mesh
 

@@ -34,9 +34,11 @@ from silo.inertia.geometry.freecad import (
     file_of,
     linked_material,
 )
-from silo.inertia.geometry.graph import Floats, GeometryReading, ReadOptions, Report
+from silo.inertia.geometry.graph import Floats
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers, Task
 from silo.inertia.geometry.measured import Measured
+from silo.inertia.geometry.options import ReadOptions, Report
+from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.placements import is_rigid
 from silo.platform import remove_patiently, scratch_folder
 

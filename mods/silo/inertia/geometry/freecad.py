@@ -38,8 +38,9 @@ from silo.bom.walk.contents import Contents, Contribution, Count, Lost
 from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of
 from silo.inertia.assembly import Assembly, Prototype
 from silo.inertia.geometry import measured as checks
-from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, ReadOptions, Report, in_metres, unfold
+from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, in_metres, unfold
 from silo.inertia.geometry.measured import Measured
+from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.materials.cards import card_of
 from silo.inertia.materials.densities import DENSEST, LIGHTEST, parse_density
 from silo.inertia.notes import GeometryCode, Note

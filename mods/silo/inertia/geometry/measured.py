@@ -14,7 +14,8 @@ import numpy as np
 
 from silo.bom.errors import counted, listed
 from silo.inertia.assembly import Assembly, Instance, Prototype, SolidProps
-from silo.inertia.geometry.graph import Unfolded, lost_characters
+from silo.inertia.geometry.graph import Unfolded
+from silo.inertia.geometry.names import lost_characters
 from silo.inertia.geometry.together import Body, Mesh, Together, about_enclosed, combined
 from silo.inertia.notes import GeometryCode, Note
 from silo.inertia.placements import rigid_mask

@@ -27,19 +27,11 @@ from numpy.typing import ArrayLike
 
 from silo.bom.errors import ConfigError, DocumentError, counted
 from silo.inertia.assembly import Prototype
-from silo.inertia.geometry.graph import (
-    MAX_DEPTH,
-    MESH_UNITS,
-    Child,
-    Format,
-    GeometryReading,
-    Node,
-    ReadOptions,
-    Report,
-    in_metres,
-    unfold,
-)
+from silo.inertia.geometry.formats import Format
+from silo.inertia.geometry.graph import MAX_DEPTH, Child, Node, in_metres, unfold
 from silo.inertia.geometry.measured import Measured, assembled, implausible_size
+from silo.inertia.geometry.options import MESH_UNITS, ReadOptions, Report
+from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.geometry.together import Floats, Mesh, enclosed, welded, without
 from silo.inertia.notes import GeometryCode, Note
 

@@ -22,7 +22,8 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from silo.bom.errors import InputError
-from silo.inertia.geometry.graph import IDENTITY, Child, Node, bare_stem, bottom_up, count_instances
+from silo.inertia.geometry.graph import IDENTITY, Child, Node, bottom_up, count_instances
+from silo.inertia.geometry.part_files import bare_stem
 
 Buffer: TypeAlias = bytes | mmap.mmap
 

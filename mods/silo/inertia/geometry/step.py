@@ -55,26 +55,16 @@ from OCP.XCAFDoc import XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
 from silo.bom.errors import DocumentError, InputError, counted, listed
 from silo.inertia.assembly import Prototype
 from silo.inertia.geometry import kernel as occt
-from silo.inertia.geometry.graph import (
-    Child,
-    GeometryReading,
-    Node,
-    ReadOptions,
-    Report,
-    bare_stem,
-    bottom_up,
-    clean,
-    file_key,
-    in_metres,
-    is_generic,
-    step_files,
-    unfold,
-)
+from silo.inertia.geometry.graph import Child, Node, bottom_up, in_metres, unfold
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
 from silo.inertia.geometry.kernel import MM, trsf_matrix, xyz
 from silo.inertia.geometry.kernel.solids import measure, measure_all
 from silo.inertia.geometry.measured import Measured, assembled, implausible_size
+from silo.inertia.geometry.names import clean, is_generic
+from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.geometry.part21 import ProductFacts, Products
+from silo.inertia.geometry.part_files import bare_stem, file_key, step_files
+from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.geometry.step_text import MARK, Prepared, prepare
 from silo.inertia.geometry.together import Floats, combined
 from silo.inertia.notes import GeometryCode, Note

@@ -21,8 +21,8 @@ from itertools import islice
 from pathlib import Path
 
 from silo.bom.errors import DocumentError, InputError
-from silo.inertia.geometry.graph import ReadOptions, file_key, step_files
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
+from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.geometry.part21 import (
     HIDING,
     WANTED,
@@ -35,6 +35,7 @@ from silo.inertia.geometry.part21 import (
     refs,
     scan,
 )
+from silo.inertia.geometry.part_files import file_key, step_files
 
 MANY_FACES = 3000
 """From so many on, measuring takes so long that a second processor is worth its start."""

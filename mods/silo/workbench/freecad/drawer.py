@@ -130,7 +130,7 @@ def _stored(path: Path, named: str, place: Floats) -> Any:
     """Read a shape, with its placement in its product. Raises DocumentError."""
     import Part
 
-    from silo.inertia.geometry.graph import is_binary_brep
+    from silo.inertia.geometry.formats import is_binary_brep
     from silo.inertia.placements import is_rigid
 
     if not is_rigid(place):

@@ -48,7 +48,7 @@ from silo.inertia.geometry.freecad import (
     one_by_one,
     told_material,
 )
-from silo.inertia.geometry.graph import ReadOptions, Report, in_metres
+from silo.inertia.geometry.graph import in_metres
 from silo.inertia.geometry.measured import (
     INVALID,
     NO_VOLUME,
@@ -60,6 +60,7 @@ from silo.inertia.geometry.measured import (
     loose_notes,
     shell_note,
 )
+from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.geometry.together import Body, Mesh, mesh_volume, together
 from silo.inertia.notes import GeometryCode, Note
 from silo.inertia.placements import place

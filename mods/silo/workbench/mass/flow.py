@@ -62,7 +62,7 @@ class MassFlow:
 
     def _measured(self, doc: Any) -> Any:
         from silo.inertia.calculation import calculate
-        from silo.inertia.geometry.graph import ReadOptions
+        from silo.inertia.geometry.options import ReadOptions
         from silo.inertia.links.link_map import Link, LinkMap
         from silo.inertia.masses import Options
         from silo.inertia.materials.table import load_materials

@@ -84,7 +84,8 @@ from silo.inertia.geometry.exact import (
     Turned,
     integrate,
 )
-from silo.inertia.geometry.graph import GeometryReading, ReadOptions, Report, in_metres, is_binary_brep
+from silo.inertia.geometry.formats import is_binary_brep
+from silo.inertia.geometry.graph import in_metres
 from silo.inertia.geometry.helpers import Helpers, Task
 from silo.inertia.geometry.kernel import (
     MM,
@@ -112,6 +113,8 @@ from silo.inertia.geometry.measured import (
     open_note,
     shell_note,
 )
+from silo.inertia.geometry.options import ReadOptions, Report
+from silo.inertia.geometry.reading import GeometryReading
 from silo.inertia.geometry.together import (
     NOTHING,
     PICTURE_TRIANGLES,
