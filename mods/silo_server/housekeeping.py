@@ -1,56 +1,30 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What a server does beside its requests, and how it is: for Prometheus and for people.
+"""Housekeeping: what is old is thrown away, at each start and every ten minutes by the clock.
 
-:func:`tidy` throws away what is old, at each start and every ten minutes by the clock, however busy the
-server. Each step deletes a bounded number of rows in a transaction of its own, so that nobody waits long
-for it. Of the processes of a server one does it; what the last run did is kept in the database and shown
-(``/metrics``, the page of the users, ``GET /api/admin/housekeeping``).
-
-:class:`Later` writes down when tokens were used, and keeps summaries of products. :class:`Probe` looks
-whether the database and the file store are there, so that ``/health`` and ``/ready`` answer while every other
-thread and connection is taken. Each has a thread of its own: nobody waits for it, it waits for nobody.
-
-:class:`Metrics` counts requests by route. With several worker processes prometheus-client adds up what each
-of them writes to a shared folder (``PROMETHEUS_MULTIPROC_DIR``, which ``run`` sets before they start).
+It runs however busy the server is. Each step deletes a bounded number of rows in a transaction of its own, so
+that no request waits long for it. Of the processes of a server one does it; what the last run did is kept in
+the database and shown (``/metrics``, the page of the users, ``GET /api/admin/housekeeping``).
 """
 
 from __future__ import annotations
 
 import asyncio
-import importlib.metadata
 import json
 import logging
-import math
-import os
-import shutil
-import threading
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from datetime import datetime, timedelta
 from functools import partial
-from pathlib import Path
-from typing import Any
 
-from prometheus_client import (
-    CollectorRegistry,
-    Counter,
-    Gauge,
-    Histogram,
-    generate_latest,
-    multiprocess,
-)
-from prometheus_client.core import GaugeMetricFamily, Metric
-from sqlalchemy import ColumnElement, Table, delete, func, insert, select, text, update
+from sqlalchemy import ColumnElement, Table, delete, func, insert, select, update
 from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import SiloError
-from silo_server.backup import BACKED_UP
 from silo_server.db.database import Database
 from silo_server.db.sizes import beyond, bytes_of
-from silo_server.db.state import get_state, mode_of, put_state
+from silo_server.db.state import get_state, put_state
 from silo_server.db.tables import (
     FILE_REFERENCES,
     answers,
@@ -58,27 +32,19 @@ from silo_server.db.tables import (
     audit,
     bom_change_lines,
     bom_changes,
-    items,
     login_attempts,
     login_links,
     models,
-    product_summaries,
     revisions,
     sessions,
-    users,
 )
 from silo_server.db.transaction import Tx
-from silo_server.db.turnstile import Turnstile
 from silo_server.errors import cause_of
 from silo_server.events import log
-from silo_server.events.hub import Hub
-from silo_server.schema import find_schema
 from silo_server.services import items as item_service
-from silo_server.services.access import START_TOKEN, note_token_uses
+from silo_server.services.access import START_TOKEN
 from silo_server.services.bom.history import state_at
 from silo_server.services.bom.lines import ChangeKind, LineRecord, history_row
-from silo_server.services.bom.summary import keep_summaries
-from silo_server.services.looks import keep_looks
 from silo_server.services.revisions import FileStore
 from silo_server.times import stamp
 from silo_server.user_json import dumps
@@ -295,220 +261,3 @@ def _remove_orphans(db: Database, store: FileStore) -> int:
         for place in FILE_REFERENCES:
             used.update(tx.conn.scalars(select(place).distinct().where(place.is_not(None))))
     return sum(store.remove_old(path, before) for path in old if path.name not in used)
-
-
-LATER_SECONDS = 1.0
-# [s] How long /health and /ready wait for a probe.
-HEALTH_SECONDS, READY_SECONDS = 0.2, 2.0
-# [bytes] With less, a database soon cannot write what is asked of it.
-MIN_FREE = 64 * 1024 * 1024
-
-
-class Later:
-    """The thread that writes down what no request waits for: uses of tokens, summaries of products."""
-
-    def __init__(self, db: Database) -> None:
-        self._db = db
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="silo-later", daemon=True)
-
-    def start(self) -> None:
-        """Start the thread."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Write the rest down, and end; does not wait long for a database that hangs."""
-        self._stopping.set()
-        self._thread.join(timeout=2)
-
-    def _run(self) -> None:
-        ending = False
-        while not ending:
-            ending = self._stopping.wait(LATER_SECONDS)
-            for keep in note_token_uses, partial(keep_summaries, ended=self._stopping.is_set), keep_looks:
-                try:
-                    keep(self._db)
-                except (SQLAlchemyError, SiloError) as error:
-                    logger.debug("what no request waits for is kept later: %s", cause_of(error))
-                except Exception:  # the thread must live on
-                    logger.exception("what no request waits for cannot be kept")
-
-
-@dataclass(frozen=True, slots=True)
-class ServerStanding:
-    """How a server is. ``files``: ok, unwritable or full (so is ``database``, or unreachable)."""
-
-    mode: str
-    database: str
-    files: str
-
-    @property
-    def ready(self) -> bool:
-        """Return True if the server can do all of its work."""
-        return self.database == self.files == "ok"
-
-
-class Probe:
-    """Looks at the database and the store on a thread of its own, one look at a time."""
-
-    def __init__(self, db: Database, files: FileStore) -> None:
-        self._db = db
-        self._files = files
-        self._executor = ThreadPoolExecutor(1, "silo-probe")
-        self._running: asyncio.Future[ServerStanding] | None = None
-        self.last = ServerStanding("normal", "ok", "ok")
-
-    async def look(self, seconds: float) -> ServerStanding | None:
-        """Look at database and store; None if that takes longer than ``seconds``."""
-        if self._running is None or self._running.done():
-            self._running = asyncio.get_running_loop().run_in_executor(self._executor, self._look)
-        running = self._running  # while this one waits, another caller may begin the next look
-        done, _ = await asyncio.wait({running}, timeout=seconds)
-        return running.result() if done else None
-
-    def stop(self) -> None:
-        """Begin no more looks."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
-
-    def _look(self) -> ServerStanding:
-        files = self._files.state(MIN_FREE)
-        database = "ok"
-        path = self._db.settings.sqlite_path
-        if path is not None and not has_space(path.parent, MIN_FREE):
-            database = "full"
-        try:
-            with self._db.read() as tx:
-                mode = mode_of(tx)
-        except SQLAlchemyError:
-            mode, database = "degraded", "unreachable"
-        self.last = ServerStanding(mode if files == database == "ok" else "degraded", database, files)
-        return self.last
-
-
-def has_space(folder: Path, wanted: int) -> bool:
-    """Check if the disk of a folder has ``wanted`` bytes free; True if that is unknown."""
-    try:
-        return shutil.disk_usage(folder).free >= wanted
-    except OSError:
-        return True
-
-
-BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
-SHARED = "PROMETHEUS_MULTIPROC_DIR"
-
-
-class Metrics:
-    """The numbers of one process."""
-
-    def __init__(self) -> None:
-        self._registry = CollectorRegistry()
-        self._seconds = Histogram(
-            "silo_request_seconds",
-            "Time from a request to the end of its answer, by route",
-            ["method", "route"],
-            buckets=BUCKETS,
-            registry=self._registry,
-        )
-        self._answers = Counter(
-            "silo_requests",
-            "Answers by route and status",
-            ["method", "route", "status"],
-            registry=self._registry,
-        )
-        self._listeners = self._gauge("silo_event_listeners", "Open event streams")
-        self._connections = self._gauge("silo_database_connections", "Database connections in use")
-
-    def _gauge(self, name: str, text: str) -> Gauge:
-        return Gauge(name, text, registry=self._registry, multiprocess_mode="livesum")
-
-    def request(self, method: str, route: str, status: int, seconds: float) -> None:
-        """Count an answer, and its time; ``status`` 0: there was none."""
-        # A method may be any word that a client sends; routes are ours.
-        method_name = (
-            method if method in ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS") else "other"
-        )
-        self._answers.labels(method_name, route, str(status)).inc()
-        self._seconds.labels(method_name, route).observe(seconds)
-
-    def render(self, db: Database, hub: Hub, files: FileStore) -> bytes:
-        """Write the numbers of this process, or of all workers, and of the database, for Prometheus."""
-        self._listeners.set(hub.listeners)
-        self._connections.set(db.connections)
-        now = CollectorRegistry()
-        with db.read() as tx:
-            mode, run = mode_of(tx), last_run(tx)
-            horizon, head = log.bounds(tx)
-        gauges: list[Metric] = [
-            GaugeMetricFamily("silo_read_only", "1 while the server takes no changes", mode != "normal"),
-            GaugeMetricFamily("silo_events_kept", "Events in the log", head - horizon),
-            GaugeMetricFamily("silo_event_newest_id", "Id of the newest event", head),
-            GaugeMetricFamily("silo_files_free_bytes", "Free space on the disk of the uploads", files.free()),
-        ]
-        path = db.settings.sqlite_path
-        if path is not None:
-            wal = path.with_name(path.name + "-wal")
-            size = wal.stat().st_size if wal.exists() else 0
-            gauges += [
-                GaugeMetricFamily("silo_database_bytes", "Size of the SQLite database", path.stat().st_size),
-                GaugeMetricFamily("silo_database_wal_bytes", "Size of the SQLite write-ahead log", size),
-            ]
-        if run is not None:
-            age = db.clock().timestamp() - datetime.fromisoformat(run.at).timestamp()
-            gauges += [
-                GaugeMetricFamily("silo_housekeeping_age_seconds", "Since the last run", max(0.0, age)),
-                GaugeMetricFamily(
-                    "silo_housekeeping_failed", "1 where it could not do all", run.problem is not None
-                ),
-            ]
-        now.register(_Gauges(gauges))
-        counted = self._registry
-        if os.environ.get(SHARED):
-            counted = CollectorRegistry()
-            multiprocess.MultiProcessCollector(counted)  # type: ignore[no-untyped-call]
-        return generate_latest(counted) + generate_latest(now)
-
-
-def standing(db: Database, hub: Hub, files: FileStore, large_reads: Turnstile) -> dict[str, Any]:
-    """Collect the state of this server for an administrator; the queues are those of one process."""
-    with db.read() as tx:
-        row = sessions.c
-        counts = {
-            "users": select(func.count()).select_from(users).where(users.c.active),
-            "sessions": select(func.count()).select_from(sessions).where(row.expires_at > tx.stamp),
-            "items": select(func.count()).select_from(items),
-            "summaries": select(func.count()).select_from(product_summaries),
-        }
-        state: dict[str, Any] = {name: tx.conn.scalar(query) or 0 for name, query in counts.items()}
-        run, saved = last_run(tx), get_state(tx, BACKED_UP)
-        schema, mode = tx.conn.scalar(text("SELECT version_num FROM alembic_version")), mode_of(tx)
-        size = tx.conn.scalar(text("SELECT pg_database_size(current_database())")) if tx.postgres else None
-    path = db.settings.sqlite_path
-    return state | {
-        "version": importlib.metadata.version("silo-mod"),
-        "mode": mode,
-        "database": "PostgreSQL" if path is None else str(path),
-        "database_bytes": size if path is None else path.stat().st_size,
-        "schema": schema,
-        "storage": str(db.settings.storage),
-        "free_bytes": None if math.isnan(free := files.free()) else int(free),
-        "backup": None if saved is None else json.loads(saved),
-        "housekeeping": None if run is None else asdict(run),
-        "queues": {
-            "changes": db.turn.here,
-            "exports and large reads": large_reads.here,
-            "event streams": hub.listeners,
-            "summaries to be kept": len(db.built),
-        },
-        "categories": len(find_schema(None).categories),
-        "warnings": list(db.settings.warnings),
-    }
-
-
-class _Gauges:
-    """Numbers of this moment."""
-
-    def __init__(self, gauges: Sequence[Metric]) -> None:
-        self._gauges = gauges
-
-    def collect(self) -> Sequence[Metric]:
-        return self._gauges

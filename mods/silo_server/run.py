@@ -36,7 +36,6 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from silo.bom.errors import ConfigError
 from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port, scratch_folder
-from silo_server import http
 from silo_server.actors import Role
 from silo_server.db.database import WRITERS_WAITING, Database
 from silo_server.db.migrate import upgrade
@@ -44,8 +43,15 @@ from silo_server.db.tables import events, users
 from silo_server.db.transaction import MIGRATION_LOCK, Tx
 from silo_server.errors import cause_of
 from silo_server.events.hub import Hub
-from silo_server.housekeeping import SHARED, Later, Metrics, Probe, keep_tidy, tidy
-from silo_server.http import BodyLimit, Compressed, Observed, SecurityHeaders, log_to_stderr
+from silo_server.housekeeping import keep_tidy, tidy
+from silo_server.http import errors
+from silo_server.http.body_limit import BodyLimit
+from silo_server.http.compression import Compressed
+from silo_server.http.headers import SecurityHeaders
+from silo_server.http.request_log import Observed, log_to_stderr
+from silo_server.later import Later
+from silo_server.metrics import SHARED, Metrics
+from silo_server.probe import Probe
 from silo_server.services import access, search
 from silo_server.services.revisions import FileStore
 from silo_server.settings import MIB, Settings, settings_from_environment
@@ -117,13 +123,17 @@ READING_THREADS = 40
 
 def routers() -> tuple[APIRouter, ...]:
     """Import and return all routers; late, as this takes half of the import, and a backup needs none."""
-    from silo_server.routes import items, orders, releases, scene, system
+    from silo_server.routes import items, orders, releases, scene, sessions, streams, system, tokens
+    from silo_server.routes import users as user_routes
     from silo_server.routes.bom import changes, exports, history, imports, lines, merge, review, summary, tree
     from silo_server.web import pages
 
     return (
         system.router,
-        system.auth_router,
+        streams.router,
+        sessions.router,
+        tokens.router,
+        user_routes.router,
         items.router,
         items.revisions_router,
         items.by_uuid,
@@ -146,7 +156,7 @@ def routers() -> tuple[APIRouter, ...]:
 
 def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     """Make the server as an ASGI application; :func:`prepare` has brought the database up to date."""
-    from silo_server.routes.context import Server
+    from silo_server.routes.call import Server
 
     db = Database(settings, clock)
 
@@ -181,7 +191,7 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     )
     for router in routers():
         app.include_router(router)
-    http.install(app)
+    errors.install(app)
     from silo_server.web import pages
 
     pages.install(app)
@@ -209,7 +219,7 @@ def observed(app: FastAPI, settings: Settings) -> Observed:
 
 def _openapi(app: FastAPI) -> dict[str, Any]:
     if app.openapi_schema is None:
-        from silo_server.routes.context import complete
+        from silo_server.routes.openapi import complete
 
         app.openapi_schema = complete(get_openapi(title=app.title, version=app.version, routes=app.routes))
     return app.openapi_schema

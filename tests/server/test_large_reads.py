@@ -21,7 +21,7 @@ from silo.bom.errors import BusyError
 from silo_server.actors import SYSTEM
 from silo_server.db.transaction import Tx
 from silo_server.db.turnstile import Turnstile
-from silo_server.routes.context import Call, Server
+from silo_server.routes.call import Call, Server
 from silo_server.routes.made_files import file_of
 from silo_server.run import RunningServer, running_server
 from silo_server.services.bom.transfer import Export, Row, View, to_csv, to_json, to_xlsx

@@ -22,7 +22,7 @@ from silo_server.db.database import Database
 from silo_server.db.migrate import upgrade
 from silo_server.events.hub import Hub
 from silo_server.events.stream import EventResponse
-from silo_server.http import _database_error, _disk_error
+from silo_server.http.errors import _database_error, _disk_error
 from silo_server.run import running_server, start_warnings
 from silo_server.settings import MIB, Settings
 

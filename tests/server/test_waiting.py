@@ -24,7 +24,8 @@ from sqlalchemy import make_url
 from silo.bom.errors import RejectedError
 from silo_server.db.database import WRITERS_WAITING, Database
 from silo_server.db.transaction import Tx
-from silo_server.housekeeping import Later, Probe
+from silo_server.later import Later
+from silo_server.probe import Probe
 from silo_server.run import running_server
 from silo_server.services import access
 from silo_server.services.revisions import FileStore
@@ -155,7 +156,7 @@ def test_what_no_request_waits_for_is_tried_again_after_any_error(
     db: Database, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its thread lives on, also after an error that nobody thought of."""
-    monkeypatch.setattr("silo_server.housekeeping.LATER_SECONDS", 0.0)
+    monkeypatch.setattr("silo_server.later.LATER_SECONDS", 0.0)
     busy = Meanwhile(db.settings)
     tried: list[int] = []
 

@@ -26,19 +26,9 @@ from silo.bom.numbers import whole_number
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
 from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
-from silo_server.routes import context
-from silo_server.routes.context import (
-    READ_ERRORS,
-    WRITE_ERRORS,
-    Call,
-    Editor,
-    ExpectedVersion,
-    Viewer,
-    etag_of,
-    idempotency_key,
-    json_answer,
-    json_body,
-)
+from silo_server.routes import openapi
+from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, etag_of, json_answer
+from silo_server.routes.call import Call, Editor, Viewer
 from silo_server.routes.models import (
     DocumentsOut,
     ItemChangeBody,
@@ -55,6 +45,7 @@ from silo_server.routes.models import (
     Text,
     UuidsBody,
 )
+from silo_server.routes.requests import ExpectedVersion, idempotency_key, json_body
 from silo_server.schema import describe, describe_form, find_schema, schemas
 from silo_server.services import items, revisions, scene, search
 from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
@@ -70,7 +61,7 @@ PATCH_BODY = {
     "requestBody": {
         "required": True,
         "content": {
-            media_type: {"schema": context.JSON_OBJECT}
+            media_type: {"schema": openapi.JSON_OBJECT}
             for media_type in ("application/merge-patch+json", "application/json")
         },
     }
@@ -291,18 +282,18 @@ BINARY: dict[int | str, dict[str, Any]] = {
     304: {"description": "The file is still the one that If-None-Match names"},
     416: {"description": "The file has no such range"},
 }
-_FORM: context.Schema = {
+_FORM: openapi.Schema = {
     "file": {"type": "string", "format": "binary"},
-    "comment": context.text(10_000),
+    "comment": openapi.text(10_000),
     "properties": {"type": "string", "description": "a JSON object"},
-    "sha256": {**context.SHA256, "description": "of the file; another content is refused"},
+    "sha256": {**openapi.SHA256, "description": "of the file; another content is refused"},
     "base_revision": {
         "type": "integer",
         "minimum": 0,
         "maximum": 1_000_000,
         "description": "what the file was made from; 409 if there is a newer file",
     },
-    "path": context.text(1000, description="where the file is in its project, with /"),
+    "path": openapi.text(1000, description="where the file is in its project, with /"),
     "links": {
         "type": "string",
         "description": "a JSON list of the linked files: path, item (UUID), sha256, document (UUID)",
@@ -313,7 +304,7 @@ _FORM: context.Schema = {
     },
 }
 UPLOAD = {
-    **context.refused(
+    **openapi.refused(
         "properties that are no JSON object, links or items that are no such list, "
         "and a sha256 that is not that of the file"
     ),
@@ -466,7 +457,7 @@ def thumbnail(call: Viewer, part_number: str, key: Annotated[str, Query(max_leng
 
 _PNG = {"image/png": {"schema": {"type": "string", "format": "binary", "minLength": 57}}}
 _DRAWN = {
-    **context.refused("what is no PNG, too large a PNG"),
+    **openapi.refused("what is no PNG, too large a PNG"),
     "requestBody": {"required": True, "content": _PNG},
 }
 

@@ -12,7 +12,7 @@ from typing import IO, Any, cast
 from starlette.responses import Response, StreamingResponse
 
 from silo_server.db.transaction import Tx
-from silo_server.routes.context import Call
+from silo_server.routes.call import Call
 from silo_server.services.bom import transfer
 
 SPOOL_BYTES = 1024 * 1024

@@ -20,7 +20,7 @@ from silo.api import wire
 from silo.bom.numbers import read_quantity
 from silo.bom.quantities import LARGEST_QUANTITY
 from silo.bom.text import character_problem
-from silo_server.routes import context
+from silo_server.routes import openapi
 from silo_server.schema import text_hints
 from silo_server.services.bom.line_edit import REL_TYPES, SOURCES
 from silo_server.services.field_checks import quantity_problem
@@ -37,21 +37,21 @@ Text = Annotated[
     str,
     StringConstraints(max_length=10_000),
     AfterValidator(_characters),
-    WithJsonSchema(context.text(10_000)),
+    WithJsonSchema(openapi.text(10_000)),
 ]
 Short = Annotated[
-    str, StringConstraints(max_length=200), AfterValidator(_characters), WithJsonSchema(context.text(200))
+    str, StringConstraints(max_length=200), AfterValidator(_characters), WithJsonSchema(openapi.text(200))
 ]
 # The services check these values; the schemas here are for the OpenAPI document.
-ItemUuid = Annotated[Short, WithJsonSchema(context.UUID)]
-ItemType = Annotated[Short, WithJsonSchema(context.ITEM_TYPE)]
+ItemUuid = Annotated[Short, WithJsonSchema(openapi.UUID)]
+ItemType = Annotated[Short, WithJsonSchema(openapi.ITEM_TYPE)]
 RelType = Annotated[Short, WithJsonSchema({"type": "string", "enum": list(REL_TYPES)})]
 Source = Annotated[Short, WithJsonSchema({"type": "string", "enum": list(SOURCES)})]
-Brief = Annotated[Short, WithJsonSchema(context.text(32))]
+Brief = Annotated[Short, WithJsonSchema(openapi.text(32))]
 
 
 # What may be in it is one rule for all ways in, which the services keep (silo_server.user_json).
-Properties = Annotated[dict[str, Any], WithJsonSchema(context.JSON_OBJECT)]
+Properties = Annotated[dict[str, Any], WithJsonSchema(openapi.JSON_OBJECT)]
 
 
 def _amount(value: object) -> object:
@@ -124,12 +124,12 @@ class NewItemBody(_ItemTexts):
         extra="ignore",
         protected_namespaces=(),
         populate_by_name=True,
-        json_schema_extra=context.NUMBER_OR_CATEGORY,
+        json_schema_extra=openapi.NUMBER_OR_CATEGORY,
     )
 
     schema_name: Short | None = Field(None, alias="schema")
-    category: Annotated[Short, WithJsonSchema(context.CATEGORY_OR_EMPTY)] | None = None
-    part_number: Annotated[Short, WithJsonSchema(context.part_number(or_empty=True))] | None = None
+    category: Annotated[Short, WithJsonSchema(openapi.CATEGORY_OR_EMPTY)] | None = None
+    part_number: Annotated[Short, WithJsonSchema(openapi.part_number(or_empty=True))] | None = None
     id: ItemUuid | None = None
     name: Short | None = None
     description: Text | None = None
@@ -140,11 +140,11 @@ class NewItemBody(_ItemTexts):
 class ItemChangeBody(_ItemTexts):
     """``PUT /api/items/{pn}``: what is absent or null stays. ``properties`` make a new revision."""
 
-    part_number: Annotated[Short, WithJsonSchema(context.part_number())] | None = None
+    part_number: Annotated[Short, WithJsonSchema(openapi.part_number())] | None = None
     name: Short | None = None
     description: Text | None = None
     item_type: ItemType | None = None
-    category: Annotated[Short, WithJsonSchema(context.CATEGORY_OR_EMPTY)] | None = None
+    category: Annotated[Short, WithJsonSchema(openapi.CATEGORY_OR_EMPTY)] | None = None
     properties: Properties | None = None
     comment: Text = ""
     source: wire.FactSource = "hand"
@@ -181,7 +181,7 @@ class NumberBody(RequestBody):
     model_config = ConfigDict(extra="ignore", protected_namespaces=(), populate_by_name=True)
 
     schema_name: Short | None = Field(None, alias="schema")
-    category: Annotated[Short, WithJsonSchema(context.CATEGORY)]
+    category: Annotated[Short, WithJsonSchema(openapi.CATEGORY)]
 
 
 class NumberOut(BaseModel):

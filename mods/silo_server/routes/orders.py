@@ -18,21 +18,13 @@ from silo.bom.numbers import LONGEST, read_number
 from silo.bom.quantities import as_decimal
 from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
-from silo_server.routes import context
+from silo_server.routes import openapi
+from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, etag_of, json_answer
 from silo_server.routes.bom.imports import IMPORT_BODY, uploaded
-from silo_server.routes.context import (
-    READ_ERRORS,
-    WRITE_ERRORS,
-    Admin,
-    Call,
-    Editor,
-    ExpectedVersion,
-    Viewer,
-    etag_of,
-    json_answer,
-)
+from silo_server.routes.call import Admin, Call, Editor, Viewer
 from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.routes.models import Brief, RequestBody, Short, Text
+from silo_server.routes.requests import ExpectedVersion
 from silo_server.services import orders, suppliers
 from silo_server.services.bom import imports, transfer
 from silo_server.services.items import get_item
@@ -127,7 +119,7 @@ def get_suppliers(call: Viewer, part_number: str) -> Response:
 @router.put(
     "/items/{part_number}/suppliers",
     responses=WRITE_ERRORS,
-    openapi_extra=context.refused(
+    openapi_extra=openapi.refused(
         "two supplier parts of one number, two preferred ones, and unusable values"
     ),
 )

@@ -12,7 +12,8 @@ from starlette.responses import Response
 from silo.api import wire
 from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
-from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Call, Editor, Viewer, json_answer
+from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, json_answer
+from silo_server.routes.call import Call, Editor, Viewer
 from silo_server.routes.models import RequestBody, Text
 from silo_server.services import releases
 from silo_server.services.bom import frozen

@@ -12,8 +12,9 @@ from starlette.responses import FileResponse, Response
 
 from silo.api import wire
 from silo.bom.errors import RejectedError
-from silo_server.routes import context
-from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Call, Editor, Viewer, json_answer
+from silo_server.routes import openapi
+from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, json_answer
+from silo_server.routes.call import Call, Editor, Viewer
 from silo_server.routes.models import RequestBody
 from silo_server.services import items, scene
 
@@ -34,10 +35,10 @@ def _binary(kind: str) -> dict[int | str, dict[str, Any]]:
     return {200: media, 304: {"description": "Still what If-None-Match names"}}
 
 
-def _sent(kind: str, schema: context.Schema) -> context.Schema:
+def _sent(kind: str, schema: openapi.Schema) -> openapi.Schema:
     wanted = {"required": True, "content": {kind: {"schema": schema}}}
     return {
-        **context.refused("a GLB of more than meshes, a structure that lacks what it names"),
+        **openapi.refused("a GLB of more than meshes, a structure that lacks what it names"),
         "requestBody": wanted,
     }
 

@@ -22,24 +22,25 @@ from silo.bom.errors import AuthError, ConflictError, ForbiddenError, RejectedEr
 from silo_server.actors import Actor, Role, Scope
 from silo_server.db.state import mode_of
 from silo_server.errors import TooManyAttemptsError
-from silo_server.housekeeping import last_run, standing
-from silo_server.routes.context import (
-    FORM_TYPES,
+from silo_server.housekeeping import last_run
+from silo_server.routes.call import (
     SAFE_METHODS,
     SESSION_COOKIE,
     Call,
     FormSecretError,
     Guard,
-    PageFrom,
     ServerDep,
     client_address,
     find_actor,
-    form_of,
     server_of,
 )
-from silo_server.routes.system import login_path, revoke, set_session_cookie
+from silo_server.routes.requests import FORM_TYPES, PageFrom, form_of
+from silo_server.routes.sessions import set_session_cookie
+from silo_server.routes.tokens import revoke
+from silo_server.routes.users import login_path
 from silo_server.services import access
 from silo_server.services.mode import change_mode
+from silo_server.standing import standing
 from silo_server.web.forms import (
     MOST_KEPT,
     Form,

@@ -22,7 +22,8 @@ from silo.bom.errors import NotFoundError, RejectedError, VersionConflictError
 from silo_server.errors import ArchivedPartsError
 from silo_server.events import log
 from silo_server.events.log import EventQuery, LoggedEvent
-from silo_server.routes.context import Call, PageFrom
+from silo_server.routes.call import Call
+from silo_server.routes.requests import PageFrom
 from silo_server.services import revisions
 from silo_server.services.bom import history, tree
 from silo_server.services.bom.frozen import changes_of

@@ -22,7 +22,8 @@ from silo.bom.errors import RejectedError, SiloError
 from silo.bom.numbers import parse_number, read_quantity, whole_number
 from silo.bom.quantities import plain
 from silo.bom.text import character_problem
-from silo_server.routes.context import form_of, server_of
+from silo_server.routes.call import server_of
+from silo_server.routes.requests import form_of
 from silo_server.services.access import MAX_PASSWORD
 from silo_server.web.render import NOTICE, NOTICE_COOKIE, _
 

@@ -22,7 +22,7 @@ from silo.bom.errors import RejectedError, SiloError, VersionConflictError
 from silo.bom.headers import Heading
 from silo.bom.numbers import Mark
 from silo_server.errors import TooLargeError
-from silo_server.routes.context import Call
+from silo_server.routes.call import Call
 from silo_server.schema import find_schema
 from silo_server.services.bom import imports
 from silo_server.services.bom.imports import NOTHING, Allowed, Layout

@@ -23,7 +23,7 @@ from silo.bom.errors import NewerRevisionError, RejectedError, SiloError
 from silo.bom.numbers import read_number
 from silo.bom.quantities import plain
 from silo_server.db.transaction import Tx
-from silo_server.routes.context import Call
+from silo_server.routes.call import Call
 from silo_server.routes.items import numbered, store_file
 from silo_server.schema import ITEM_TYPES, Category, find_schema, text_hints
 from silo_server.services import items as service

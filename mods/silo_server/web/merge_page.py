@@ -26,7 +26,7 @@ from silo.bom.numbers import whole_number
 from silo_server.db.transaction import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.events import log
-from silo_server.routes.context import Call
+from silo_server.routes.call import Call
 from silo_server.schema import text_hints
 from silo_server.services.bom import history, line_edit, review
 from silo_server.services.bom.assignees import assignee_of, editors

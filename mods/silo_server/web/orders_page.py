@@ -15,7 +15,7 @@ from starlette.datastructures import FormData
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
-from silo_server.routes.context import Call
+from silo_server.routes.call import Call
 from silo_server.routes.orders import OrderedBody, asked_of, record_all, records_of
 from silo_server.services import items as item_service
 from silo_server.services import orders, releases, suppliers

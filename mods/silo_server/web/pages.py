@@ -20,8 +20,8 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from silo_server.actors import Actor
-from silo_server.http import SECURITY_HEADERS
-from silo_server.routes.context import SAFE_METHODS, find_actor
+from silo_server.http.headers import SECURITY_HEADERS
+from silo_server.routes.call import SAFE_METHODS, find_actor
 from silo_server.web import (
     accounts,
     activity_page,

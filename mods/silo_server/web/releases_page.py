@@ -15,7 +15,7 @@ from silo.bom.errors import ConflictError, SiloError
 from silo.bom.quantities import as_decimal
 from silo_server.db.transaction import Tx
 from silo_server.errors import TooLargeError
-from silo_server.routes.context import Call
+from silo_server.routes.call import Call
 from silo_server.routes.releases import frozen_now
 from silo_server.services import releases
 from silo_server.services.access import get_user

@@ -40,7 +40,8 @@ from silo.bom.numbers import whole_number
 from silo.bom.quantities import as_decimal
 from silo_server.actors import Actor, Role
 from silo_server.db.state import mode_of
-from silo_server.routes.context import Call, masked, server_of
+from silo_server.routes.call import Call, server_of
+from silo_server.routes.masked_secret import masked
 from silo_server.services.badge import badge
 from silo_server.services.bom.waiting import waiting_count
 from silo_server.times import wire_time

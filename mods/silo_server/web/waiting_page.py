@@ -18,7 +18,7 @@ from starlette.responses import Response
 from silo.bom.errors import SiloError, VersionConflictError
 from silo.bom.numbers import whole_number
 from silo_server.db.transaction import Tx
-from silo_server.routes.context import Call
+from silo_server.routes.call import Call
 from silo_server.services import following
 from silo_server.services.bom import assignees, history
 from silo_server.services.bom.assignees import editors

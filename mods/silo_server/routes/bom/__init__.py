@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from silo_server.routes.context import READ_ERRORS
+from silo_server.routes.answers import READ_ERRORS
 
 
 def bom_router(tag: str) -> APIRouter:

@@ -10,9 +10,9 @@ from fastapi import Query
 from pydantic import WithJsonSchema
 from starlette.responses import Response
 
-from silo_server.routes import context
+from silo_server.routes import openapi
 from silo_server.routes.bom import bom_router
-from silo_server.routes.context import Viewer
+from silo_server.routes.call import Viewer
 from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.services.bom import transfer
 from silo_server.services.bom.frozen import changes_of
@@ -21,9 +21,9 @@ from silo_server.times import wire_time
 
 router = bom_router("bom transfer")
 
-_NOW: context.Schema = {"type": "string", "maxLength": 0}
-Moment = Annotated[str, Query(max_length=40), WithJsonSchema({"anyOf": [context.MOMENT, _NOW]})]
-Since = Annotated[str, Query(alias="from", min_length=1, max_length=40), WithJsonSchema(context.MOMENT)]
+_NOW: openapi.Schema = {"type": "string", "maxLength": 0}
+Moment = Annotated[str, Query(max_length=40), WithJsonSchema({"anyOf": [openapi.MOMENT, _NOW]})]
+Since = Annotated[str, Query(alias="from", min_length=1, max_length=40), WithJsonSchema(openapi.MOMENT)]
 
 
 @router.get("/changes")

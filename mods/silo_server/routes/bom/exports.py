@@ -13,7 +13,7 @@ from starlette.responses import Response
 
 from silo_server.db.transaction import Tx
 from silo_server.routes.bom import bom_router
-from silo_server.routes.context import Call, Viewer
+from silo_server.routes.call import Call, Viewer
 from silo_server.routes.made_files import CSV, XLSX, content_of, file_of
 from silo_server.services.bom import transfer
 from silo_server.services.bom.transfer import View

@@ -14,18 +14,12 @@ from silo.bom.errors import RejectedError
 from silo.bom.numbers import whole_number
 from silo_server.db.transaction import Tx
 from silo_server.fields import to_wire
-from silo_server.routes import context, models
+from silo_server.routes import models, openapi
+from silo_server.routes.answers import WRITE_ERRORS, etag_of, json_answer
 from silo_server.routes.bom import bom_router
-from silo_server.routes.context import (
-    WRITE_ERRORS,
-    Editor,
-    ExpectedVersion,
-    PageFrom,
-    Viewer,
-    etag_of,
-    json_answer,
-)
+from silo_server.routes.call import Editor, Viewer
 from silo_server.routes.models import RequestBody, Text
+from silo_server.routes.requests import ExpectedVersion, PageFrom
 from silo_server.services.bom import history
 from silo_server.services.bom.lines import line_state_to_wire, state_to_json
 from silo_server.services.items import get_item
@@ -100,14 +94,14 @@ def get_past_bom(call: Viewer, part_number: str, change_id: ChangeId) -> list[di
     ]
 
 
-Point = Annotated[str, Query(max_length=40), WithJsonSchema(context.POINT)]
+Point = Annotated[str, Query(max_length=40), WithJsonSchema(openapi.POINT)]
 
 
 @router.get("/compare")
 def compare(
     call: Viewer,
     part_number: str,
-    from_point: Annotated[str, Query(alias="from", max_length=40), WithJsonSchema(context.POINT)] = "0",
+    from_point: Annotated[str, Query(alias="from", max_length=40), WithJsonSchema(openapi.POINT)] = "0",
     to: Point = "now",
 ) -> dict[str, Any]:
     """Compare a BOM at two points of time side by side; each is a change id, a time, or ``now``."""

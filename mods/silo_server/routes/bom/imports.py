@@ -13,20 +13,13 @@ from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
 from silo_server.db.answers import KeptAnswer, KeyedRequest, earlier_answer, keep_answer
-from silo_server.routes import context
+from silo_server.routes import openapi
+from silo_server.routes.answers import WRITE_ERRORS, etag_of, json_answer, raw_json
 from silo_server.routes.bom import bom_router
 from silo_server.routes.bom.history import state_to_wire
-from silo_server.routes.context import (
-    FORM_TYPES,
-    WRITE_ERRORS,
-    Editor,
-    ExpectedVersion,
-    etag_of,
-    idempotency_key,
-    json_answer,
-    raw_json,
-)
+from silo_server.routes.call import Editor
 from silo_server.routes.made_files import XLSX
+from silo_server.routes.requests import FORM_TYPES, ExpectedVersion, idempotency_key
 from silo_server.services.bom import imports
 from silo_server.services.bom.lines import locked_parent
 from silo_server.services.revisions import clean_name
@@ -35,7 +28,7 @@ from silo_server.user_json import dumps
 router = bom_router("bom transfer")
 
 IMPORT_BODY = {
-    **context.refused(
+    **openapi.refused(
         "what is no table with a header row (part number, quantity), and rows that name unknown parts or "
         "unusable values; without dry_run a wrong row refuses the whole file"
     ),

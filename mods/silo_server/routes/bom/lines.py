@@ -11,17 +11,9 @@ from starlette.responses import Response
 
 from silo.bom.quantities import plain
 from silo_server.db.transaction import Tx
+from silo_server.routes.answers import READ_ERRORS, WRITE_ERRORS, etag_of, json_answer
 from silo_server.routes.bom import bom_router
-from silo_server.routes.context import (
-    READ_ERRORS,
-    WRITE_ERRORS,
-    Call,
-    Editor,
-    ExpectedVersion,
-    Viewer,
-    etag_of,
-    json_answer,
-)
+from silo_server.routes.call import Call, Editor, Viewer
 from silo_server.routes.models import (
     BomsOut,
     LineChangeBody,
@@ -29,6 +21,7 @@ from silo_server.routes.models import (
     NewLineBody,
     NumbersBody,
 )
+from silo_server.routes.requests import ExpectedVersion
 from silo_server.services.bom import line_edit
 from silo_server.services.bom.last_sync import NEVER, last_syncs
 from silo_server.services.bom.line_edit import Edited

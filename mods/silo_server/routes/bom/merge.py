@@ -8,17 +8,11 @@ from starlette.responses import Response
 
 from silo.api.wire import MergeResult
 from silo.bom.errors import CycleError, RejectedError
-from silo_server.routes import context
+from silo_server.routes import openapi
+from silo_server.routes.answers import WRITE_ERRORS, etag_of, raw_json
 from silo_server.routes.bom import bom_router
-from silo_server.routes.context import (
-    WRITE_ERRORS,
-    Call,
-    Editor,
-    ExpectedVersion,
-    etag_of,
-    json_body,
-    raw_json,
-)
+from silo_server.routes.call import Call, Editor
+from silo_server.routes.requests import ExpectedVersion, json_body
 from silo_server.services.bom.last_sync import record_refusal
 from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merge
 from silo_server.services.bom.merge_request import MergeRequestIn, read_merge_request
@@ -27,7 +21,7 @@ from silo_server.services.items import get_item
 router = bom_router("bom")
 
 MERGE_BODY = {
-    **context.refused(
+    **openapi.refused(
         "an entry whose part number no item has, an assembly as its own child, and entries of one child that "
         "add up to more than 1e9; all of them are listed and nothing is changed"
     ),

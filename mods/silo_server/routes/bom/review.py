@@ -9,11 +9,13 @@ from pydantic import Field
 from starlette.responses import Response
 
 from silo.bom.quantities import plain
-from silo_server.routes import context
+from silo_server.routes import openapi
+from silo_server.routes.answers import WRITE_ERRORS, etag_of, json_answer
 from silo_server.routes.bom import bom_router
 from silo_server.routes.bom.history import change_to_wire, changed_answer
-from silo_server.routes.context import WRITE_ERRORS, Editor, ExpectedVersion, Viewer, etag_of, json_answer
+from silo_server.routes.call import Editor, Viewer
 from silo_server.routes.models import RequestBody, Short, Text
+from silo_server.routes.requests import ExpectedVersion
 from silo_server.services.bom import decisions, review
 from silo_server.services.bom.decisions import Decision, ReviewAction
 from silo_server.services.bom.lines import line_to_wire
@@ -72,7 +74,7 @@ def get_review(call: Viewer, part_number: str) -> Response:
 @router.post(
     "/resolve",
     responses=WRITE_ERRORS,
-    openapi_extra=context.refused(
+    openapi_extra=openapi.refused(
         "a decision that does not fit its line, such as keep for one that is referenced, or a line that the "
         "BOM does not have; all of them are listed and nothing is changed"
     ),

@@ -12,9 +12,10 @@ from starlette.responses import Response
 
 from silo.bom.quantities import plain
 from silo_server.fields import to_wire
+from silo_server.routes.answers import json_answer, raw_json
 from silo_server.routes.bom import bom_router
 from silo_server.routes.bom.summary import open_to_wire
-from silo_server.routes.context import Viewer, json_answer, raw_json
+from silo_server.routes.call import Viewer
 from silo_server.routes.models import LineOut
 from silo_server.services.bom import tree
 from silo_server.services.bom.lines import child_to_wire, line_state_to_wire, revisions_to_wire

@@ -4,6 +4,184 @@
     <context>
         <name>Silo</name>
         <message>
+            <location filename="../../activity/box.py" />
+            <location filename="../../colleagues/theirs.py" />
+            <source>… and {n} more line</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/box.py" />
+            <source>… and {n} more lines; the preview shows all</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>The server no longer has the events since then. See its own activity page.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>Some activity may be missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>Revision {n} of {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>New item: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>Archived: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/feed.py" />
+            <source>{n} items committed</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/feed.py" />
+            <source>{n} new items</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/feed.py" />
+            <source>{n} new revisions</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/links.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>View in Silo →</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>BOM not synced: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Committed: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>BOM unchanged</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Revision {n} uploaded</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>The file is in Silo already</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>{n} item in the Silo BOM is not referenced by components in this assembly.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>{n} items in the Silo BOM are not referenced by components in this assembly.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Incomplete: {n} component is missing; its known line stays as it is.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Incomplete: {n} components are missing; their known lines stay as they are.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>The file is in Silo. The BOM waits until these are mended:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Sync without it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Sync without them</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Relink…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Show all…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Open in {bom}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>Same part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>New part…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <location filename="../../pane/waiting.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>Show</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>{number}: the assembly has {cad}, a manual line in Silo says {silo}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <location filename="../../commit/flow.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>Register Parts…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/team.py" />
+            <source>A file that is saved here may hold objects that the FreeCAD of your colleagues does not know and does not load.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/team.py" />
+            <source>Files of your colleagues may hold objects that this FreeCAD does not know. You are asked before a save removes such objects from a file.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity/team.py" />
+            <source>Your team works with FreeCAD {team}; this is {here}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../addon.py" />
             <source>Looking at the server</source>
             <translation type="unfinished" />
@@ -29,43 +207,120 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>Save a copy</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>This document is not open any more.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] This document is not open: </source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] Not opened, for it is not on the Silo server in use: </source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>No browser could be opened. The address was copied.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] No browser could be opened; the address was copied: </source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] These objects are not in the document any more.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] The first {n} of {all} objects are selected.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>leave out</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>open theirs beside mine</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>take theirs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>commit mine on top</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>the file on disk was changed since you opened it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>a file that is no revision in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>revision {n}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../pane/banner.py" />
+            <source>Somebody</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{who} committed revision {n}; yours was made from {base}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {theirs} in theirs, {mine} in yours</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {base} → {mine} by both of you</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {base} → {theirs} by them, {mine} by you</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {base} → {theirs} by them, as before in yours</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {base} → {mine} by you, as before in theirs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>… and {n} more lines</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -184,13 +439,6 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <location filename="../../commit/flow.py" />
-            <location filename="../../pane/activity.py" />
-            <source>Somebody</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/dialog.py" />
             <source>Commit to Silo – {who} committed since you opened</source>
             <translation type="unfinished" />
         </message>
@@ -202,82 +450,6 @@
         <message>
             <location filename="../../commit/dialog.py" />
             <source>Do it</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>leave out</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>open theirs beside mine</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>take theirs</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>commit mine on top</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>the file on disk was changed since you opened it</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>a file that is no revision in Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>revision {n}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{who} committed revision {n}; yours was made from {base}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {theirs} in theirs, {mine} in yours</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {base} → {mine} by both of you</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {base} → {theirs} by them, {mine} by you</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {base} → {theirs} by them, as before in yours</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {base} → {mine} by you, as before in theirs</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <location filename="../../pane/activity.py" />
-            <source>… and {n} more line</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>… and {n} more lines</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -318,19 +490,7 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
-            <location filename="../../pane/entries.py" />
-            <location filename="../../preview/dialog.py" />
-            <source>Register Parts…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
             <source>Saved, but not in Silo: {name}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/plan.py" />
-            <source>Make the right assembly active: double-click it in the tree.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -379,8 +539,13 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit/plan.py" />
+            <location filename="../../commit/take.py" />
             <source>It was closed before it was saved: open it and commit it again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../documents/snapshot.py" />
+            <source>Make the right assembly active: double-click it in the tree.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -595,181 +760,82 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} items committed</source>
+            <location filename="../../packages.py" />
+            <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} new items</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} new revisions</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>… and {n} more lines; the preview shows all</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{who} committed {name} (revision {n}) since you opened it.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <location filename="../../pane/boxes.py" />
             <location filename="../../preview/flow.py" />
             <source>… and {n} more</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>Settings…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <location filename="../../settings/page.py" />
             <source>Try again</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <location filename="../../settings/page.py" />
             <source>Install What Silo Needs…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>No Silo server is set up yet.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>Connected to {host}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} is read-only now. Commits wait here until it takes changes again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} works only in part. What cannot be sent waits here.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>No connection to {host}. Commits wait here and are sent later.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} does not accept the token.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>Connecting to {host}…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} sends no live events; what you commit is shown anyway.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} (live events are off)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} thing waits to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} things wait to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} thing waits for your choice</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} things wait for your choice</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>, {urgent} of them for your choice</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <location filename="../../pane/entries.py" />
-            <location filename="../../preview/dialog.py" />
-            <source>Show</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Send to {host}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <location filename="../../pane/entries.py" />
-            <source>Same part</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Retry</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Open theirs beside mine</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Compare with revision {n}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Take theirs</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Commit mine on top</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <location filename="../../pane/entries.py" />
-            <source>New part…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Save a copy…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Discard</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -809,134 +875,68 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/dock.py" />
-            <source>Silo Project</source>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} thing waits to be sent</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>A file that is saved here may hold objects that the FreeCAD of your colleagues does not know and does not load.</source>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} things wait to be sent</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Files of your colleagues may hold objects that this FreeCAD does not know. You are asked before a save removes such objects from a file.</source>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} thing waits for your choice</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Your team works with FreeCAD {team}; this is {here}</source>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} things wait for your choice</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>BOM not synced: {number}</source>
+            <location filename="../../pane/waiting.py" />
+            <source>, {urgent} of them for your choice</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Committed: {number}</source>
+            <location filename="../../pane/waiting.py" />
+            <source>Send to {host}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>BOM unchanged</source>
+            <location filename="../../pane/waiting.py" />
+            <source>Retry</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Revision {n} uploaded</source>
+            <location filename="../../pane/waiting.py" />
+            <source>Open theirs beside mine</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>The file is in Silo already</source>
+            <location filename="../../pane/waiting.py" />
+            <source>Compare with revision {n}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>{n} item in the Silo BOM is not referenced by components in this assembly.</source>
+            <location filename="../../pane/waiting.py" />
+            <source>Take theirs</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>{n} items in the Silo BOM are not referenced by components in this assembly.</source>
+            <location filename="../../pane/waiting.py" />
+            <source>Commit mine on top</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Incomplete: {n} component is missing; its known line stays as it is.</source>
+            <location filename="../../pane/waiting.py" />
+            <source>Save a copy…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Incomplete: {n} components are missing; their known lines stay as they are.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>The file is in Silo. The BOM waits until these are mended:</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Sync without it</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Sync without them</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Relink…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Show all…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Open in {bom}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>{number}: the assembly has {cad}, a manual line in Silo says {silo}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>The server no longer has the events since then. See its own activity page.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Some activity may be missing</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Revision {n} of {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>New item: {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Archived: {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <location filename="../../preview/dialog.py" />
-            <source>View in Silo →</source>
+            <location filename="../../pane/waiting.py" />
+            <source>Discard</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1888,6 +1888,11 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../revisions/dock.py" />
+            <source>Silo Project</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../revisions/flow.py" />
             <source>The ghost is removed.</source>
             <translation type="unfinished" />
@@ -2379,67 +2384,62 @@ They are installed in {folder}.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../start.py" />
-            <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
             <location filename="../../words.py" />
             <source>en</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>BOM Updated: {number}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>+{n} added</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>~{n} qty changed</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>⚠{n} unreferenced</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>⚡{n} in conflict</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>no changes</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>{n} component has no Silo part number</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>{n} components have no Silo part number</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>This is part of draft {draft}. Revision {released} stays released as it is.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>{value} for {n} of {all} parts</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>The category rules of this Silo are not used until they are mended: {problem}</source>
             <translation type="unfinished" />
         </message>
@@ -2520,6 +2520,141 @@ They are installed in {folder}.</source>
         </message>
     </context>
     <context>
+        <name>Origin_Commit</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Commit to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Save this document and its changed sub-assemblies, upload them as new revisions, and bring the BOM to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Saves this document and the edited ones below it, uploads each as a new revision with your comment, and brings the BOM to Silo. Nothing is ever deleted there.</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_BOM</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Compare BOM with Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Show how the BOM of this assembly differs from the one in Silo</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_RegisterParts</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Register Parts…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Give part numbers to the components of this assembly that have none</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Mass</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Mass of the Assembly…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Mass and centre of mass from the parts' shapes and materials, with what is missing</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Activity</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Database Activity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Show events in Silo, and commits that wait to be sent</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Open</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Open from Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Find an item in Silo and open its file with all that it links to</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Project</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Project</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>All files of the project, which of them Silo has, and Commit All</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_History</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>History…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>The revisions of this document: who, when, and what changed in the BOM</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Settings</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Silo Settings…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Server, token, and what a commit does</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
+        <name>Silo_Help</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Help on Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Open the page that explains the commands, the pane and the messages</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+    <context>
         <name>Silo_InstallPackages</name>
         <message>
             <location filename="../../settings/page.py" />
@@ -2529,141 +2664,6 @@ They are installed in {folder}.</source>
         <message>
             <location filename="../../settings/page.py" />
             <source>Install the Python packages that Silo needs</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Origin_Commit</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Commit to Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Save this document and its changed sub-assemblies, upload them as new revisions, and bring the BOM to Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Saves this document and the edited ones below it, uploads each as a new revision with your comment, and brings the BOM to Silo. Nothing is ever deleted there.</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_BOM</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Compare BOM with Silo…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Show how the BOM of this assembly differs from the one in Silo</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_RegisterParts</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Register Parts…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Give part numbers to the components of this assembly that have none</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_Mass</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Mass of the Assembly…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Mass and centre of mass from the parts' shapes and materials, with what is missing</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_Activity</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Database Activity</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Show events in Silo, and commits that wait to be sent</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_Open</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Open from Silo…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Find an item in Silo and open its file with all that it links to</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_Project</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Project</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>All files of the project, which of them Silo has, and Commit All</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_History</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>History…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>The revisions of this document: who, when, and what changed in the BOM</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_Settings</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Silo Settings…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Server, token, and what a commit does</source>
-            <translation type="unfinished" />
-        </message>
-    </context>
-    <context>
-        <name>Silo_Help</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Help on Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Open the page that explains the commands, the pane and the messages</source>
             <translation type="unfinished" />
         </message>
     </context>

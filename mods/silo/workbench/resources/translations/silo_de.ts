@@ -4,6 +4,184 @@
     <context>
         <name>Silo</name>
         <message>
+            <location filename="../../activity/box.py" />
+            <location filename="../../colleagues/theirs.py" />
+            <source>… and {n} more line</source>
+            <translation>… und {n} weitere Zeile</translation>
+        </message>
+        <message>
+            <location filename="../../activity/box.py" />
+            <source>… and {n} more lines; the preview shows all</source>
+            <translation>… und {n} weitere Zeilen; der Vergleich zeigt alle</translation>
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>The server no longer has the events since then. See its own activity page.</source>
+            <translation>Der Server weiß nicht mehr, was seither geschah. Seine eigene Seite zeigt die Aktivität.</translation>
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>Some activity may be missing</source>
+            <translation>Ein Teil der Aktivität fehlt vielleicht</translation>
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>Revision {n} of {number}</source>
+            <translation>Revision {n} von {number}</translation>
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>New item: {number}</source>
+            <translation>Neuer Artikel: {number}</translation>
+        </message>
+        <message>
+            <location filename="../../activity/events.py" />
+            <source>Archived: {number}</source>
+            <translation>Archiviert: {number}</translation>
+        </message>
+        <message>
+            <location filename="../../activity/feed.py" />
+            <source>{n} items committed</source>
+            <translation>{n} Artikel eingecheckt</translation>
+        </message>
+        <message>
+            <location filename="../../activity/feed.py" />
+            <source>{n} new items</source>
+            <translation>{n} neue Artikel</translation>
+        </message>
+        <message>
+            <location filename="../../activity/feed.py" />
+            <source>{n} new revisions</source>
+            <translation>{n} neue Revisionen</translation>
+        </message>
+        <message>
+            <location filename="../../activity/links.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>View in Silo →</source>
+            <translation>In Silo ansehen →</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>BOM not synced: {number}</source>
+            <translation>Stückliste nicht abgeglichen: {number}</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Committed: {number}</source>
+            <translation>Eingecheckt: {number}</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>BOM unchanged</source>
+            <translation>Stückliste unverändert</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Revision {n} uploaded</source>
+            <translation>Revision {n} hochgeladen</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>The file is in Silo already</source>
+            <translation>Die Datei ist schon in Silo</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>{n} item in the Silo BOM is not referenced by components in this assembly.</source>
+            <translation>{n} Artikel der Stückliste in Silo wird von keiner Komponente dieser Baugruppe verwendet.</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>{n} items in the Silo BOM are not referenced by components in this assembly.</source>
+            <translation>{n} Artikel der Stückliste in Silo werden von keiner Komponente dieser Baugruppe verwendet.</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Incomplete: {n} component is missing; its known line stays as it is.</source>
+            <translation>Unvollständig: {n} Komponente fehlt; ihre bekannte Position bleibt, wie sie ist.</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Incomplete: {n} components are missing; their known lines stay as they are.</source>
+            <translation>Unvollständig: {n} Komponenten fehlen; ihre bekannten Positionen bleiben, wie sie sind.</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>The file is in Silo. The BOM waits until these are mended:</source>
+            <translation>Die Datei ist in Silo. Die Stückliste wartet, bis dies behoben ist:</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Sync without it</source>
+            <translation>Ohne sie abgleichen</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Sync without them</source>
+            <translation>Ohne diese abgleichen</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Relink…</source>
+            <translation>Neu verknüpfen…</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Show all…</source>
+            <translation>Alle zeigen…</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>Open in {bom}</source>
+            <translation>In {bom} öffnen</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>Same part</source>
+            <translation>Gleiches Teil</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>New part…</source>
+            <translation>Neues Teil…</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <location filename="../../pane/waiting.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>Show</source>
+            <translation>Zeigen</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <source>{number}: the assembly has {cad}, a manual line in Silo says {silo}</source>
+            <translation>{number}: Die Baugruppe hat {cad}, eine manuelle Position in Silo sagt {silo}</translation>
+        </message>
+        <message>
+            <location filename="../../activity/sent.py" />
+            <location filename="../../commit/flow.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>Register Parts…</source>
+            <translation>Teile registrieren…</translation>
+        </message>
+        <message>
+            <location filename="../../activity/team.py" />
+            <source>A file that is saved here may hold objects that the FreeCAD of your colleagues does not know and does not load.</source>
+            <translation>Eine hier gespeicherte Datei kann Objekte enthalten, die das FreeCAD der anderen nicht kennt und nicht lädt.</translation>
+        </message>
+        <message>
+            <location filename="../../activity/team.py" />
+            <source>Files of your colleagues may hold objects that this FreeCAD does not know. You are asked before a save removes such objects from a file.</source>
+            <translation>Dateien der anderen können Objekte enthalten, die dieses FreeCAD nicht kennt. Bevor Speichern solche Objekte aus einer Datei entfernt, werden Sie gefragt.</translation>
+        </message>
+        <message>
+            <location filename="../../activity/team.py" />
+            <source>Your team works with FreeCAD {team}; this is {here}</source>
+            <translation>Ihr Team arbeitet mit FreeCAD {team}; dies ist {here}</translation>
+        </message>
+        <message>
             <location filename="../../addon.py" />
             <source>Looking at the server</source>
             <translation>Server wird abgefragt</translation>
@@ -29,44 +207,121 @@
             <translation>{name} hat noch keine Silo-Teilenummer. Bitte zuerst registrieren.</translation>
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>Save a copy</source>
             <translation>Kopie speichern</translation>
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>This document is not open any more.</source>
             <translation>Dieses Dokument ist nicht mehr offen.</translation>
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] This document is not open: </source>
             <translation>[Silo] Dieses Dokument ist nicht offen: </translation>
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] Not opened, for it is not on the Silo server in use: </source>
             <translation>[Silo] Nicht geöffnet, denn es liegt nicht auf dem verwendeten Silo-Server: </translation>
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>No browser could be opened. The address was copied.</source>
             <translation>Kein Browser ließ sich öffnen. Die Adresse wurde kopiert.</translation>
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] No browser could be opened; the address was copied: </source>
             <translation>[Silo] Kein Browser ließ sich öffnen; die Adresse wurde kopiert: </translation>
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] These objects are not in the document any more.</source>
             <translation>[Silo] Diese Objekte sind nicht mehr im Dokument.</translation>
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] The first {n} of {all} objects are selected.</source>
             <translation>[Silo] Die ersten {n} von {all} Objekten sind ausgewählt.</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>leave out</source>
+            <translation>weglassen</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>open theirs beside mine</source>
+            <translation>fremde neben meiner öffnen</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>take theirs</source>
+            <translation>fremde übernehmen</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>commit mine on top</source>
+            <translation>meine darüber einchecken</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>the file on disk was changed since you opened it</source>
+            <translation>die Datei auf der Platte wurde geändert, seit Sie sie geöffnet haben</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>a file that is no revision in Silo</source>
+            <translation>einer Datei, die keine Revision in Silo ist</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>revision {n}</source>
+            <translation>Revision {n}</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../pane/banner.py" />
+            <source>Somebody</source>
+            <translation>Jemand</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{who} committed revision {n}; yours was made from {base}</source>
+            <translation>{who} hat Revision {n} eingecheckt; Ihre entstand aus {base}</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {theirs} in theirs, {mine} in yours</source>
+            <translation>{name}: {theirs} in der fremden, {mine} in Ihrer</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {base} → {mine} by both of you</source>
+            <translation>{name}: {base} → {mine} von beiden</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {base} → {theirs} by them, {mine} by you</source>
+            <translation>{name}: {base} → {theirs} von anderen, {mine} von Ihnen</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {base} → {theirs} by them, as before in yours</source>
+            <translation>{name}: {base} → {theirs} von anderen, bei Ihnen wie zuvor</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>{name}: {base} → {mine} by you, as before in theirs</source>
+            <translation>{name}: {base} → {mine} von Ihnen, bei anderen wie zuvor</translation>
+        </message>
+        <message>
+            <location filename="../../colleagues/theirs.py" />
+            <source>… and {n} more lines</source>
+            <translation>… und {n} weitere Zeilen</translation>
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
@@ -184,13 +439,6 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <location filename="../../commit/flow.py" />
-            <location filename="../../pane/activity.py" />
-            <source>Somebody</source>
-            <translation>Jemand</translation>
-        </message>
-        <message>
-            <location filename="../../commit/dialog.py" />
             <source>Commit to Silo – {who} committed since you opened</source>
             <translation>In Silo einchecken – {who} hat eingecheckt, seit Sie geöffnet haben</translation>
         </message>
@@ -203,82 +451,6 @@
             <location filename="../../commit/dialog.py" />
             <source>Do it</source>
             <translation>Ausführen</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>leave out</source>
-            <translation>weglassen</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>open theirs beside mine</source>
-            <translation>fremde neben meiner öffnen</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>take theirs</source>
-            <translation>fremde übernehmen</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>commit mine on top</source>
-            <translation>meine darüber einchecken</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>the file on disk was changed since you opened it</source>
-            <translation>die Datei auf der Platte wurde geändert, seit Sie sie geöffnet haben</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>a file that is no revision in Silo</source>
-            <translation>einer Datei, die keine Revision in Silo ist</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>revision {n}</source>
-            <translation>Revision {n}</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{who} committed revision {n}; yours was made from {base}</source>
-            <translation>{who} hat Revision {n} eingecheckt; Ihre entstand aus {base}</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {theirs} in theirs, {mine} in yours</source>
-            <translation>{name}: {theirs} in der fremden, {mine} in Ihrer</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {base} → {mine} by both of you</source>
-            <translation>{name}: {base} → {mine} von beiden</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {base} → {theirs} by them, {mine} by you</source>
-            <translation>{name}: {base} → {theirs} von anderen, {mine} von Ihnen</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {base} → {theirs} by them, as before in yours</source>
-            <translation>{name}: {base} → {theirs} von anderen, bei Ihnen wie zuvor</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>{name}: {base} → {mine} by you, as before in theirs</source>
-            <translation>{name}: {base} → {mine} von Ihnen, bei anderen wie zuvor</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <location filename="../../pane/activity.py" />
-            <source>… and {n} more line</source>
-            <translation>… und {n} weitere Zeile</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
-            <source>… and {n} more lines</source>
-            <translation>… und {n} weitere Zeilen</translation>
         </message>
         <message>
             <location filename="../../commit/flow.py" />
@@ -318,20 +490,8 @@
         </message>
         <message>
             <location filename="../../commit/flow.py" />
-            <location filename="../../pane/entries.py" />
-            <location filename="../../preview/dialog.py" />
-            <source>Register Parts…</source>
-            <translation>Teile registrieren…</translation>
-        </message>
-        <message>
-            <location filename="../../commit/flow.py" />
             <source>Saved, but not in Silo: {name}</source>
             <translation>Gespeichert, aber nicht in Silo: {name}</translation>
-        </message>
-        <message>
-            <location filename="../../commit/plan.py" />
-            <source>Make the right assembly active: double-click it in the tree.</source>
-            <translation>Aktivieren Sie die gemeinte Baugruppe: Doppelklick im Baum.</translation>
         </message>
         <message>
             <location filename="../../commit/plan.py" />
@@ -379,9 +539,14 @@
             <translation>{name} hat noch keine Datei. Bitte zuerst unter einem Namen speichern.</translation>
         </message>
         <message>
-            <location filename="../../commit/plan.py" />
+            <location filename="../../commit/take.py" />
             <source>It was closed before it was saved: open it and commit it again.</source>
             <translation>Vor dem Speichern geschlossen: Bitte öffnen und noch einmal einchecken.</translation>
+        </message>
+        <message>
+            <location filename="../../documents/snapshot.py" />
+            <source>Make the right assembly active: double-click it in the tree.</source>
+            <translation>Aktivieren Sie die gemeinte Baugruppe: Doppelklick im Baum.</translation>
         </message>
         <message>
             <location filename="../../freecad/loss_guard.py" />
@@ -596,182 +761,83 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <translation>kein Werkstoff mit Dichte</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} items committed</source>
-            <translation>{n} Artikel eingecheckt</translation>
+            <location filename="../../packages.py" />
+            <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
+            <translation>Silo braucht die Python-Pakete {names}. Installieren Sie sie mit silo-mod install-addon oder mit: {command} – und starten Sie FreeCAD neu.</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} new items</source>
-            <translation>{n} neue Artikel</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} new revisions</source>
-            <translation>{n} neue Revisionen</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>… and {n} more lines; the preview shows all</source>
-            <translation>… und {n} weitere Zeilen; der Vergleich zeigt alle</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{who} committed {name} (revision {n}) since you opened it.</source>
             <translation>{who} hat {name} eingecheckt (Revision {n}), seit Sie geöffnet haben.</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <location filename="../../pane/boxes.py" />
             <location filename="../../preview/flow.py" />
             <source>… and {n} more</source>
             <translation>… und {n} weitere</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>Settings…</source>
             <translation>Einstellungen…</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <location filename="../../settings/page.py" />
             <source>Try again</source>
             <translation>Noch einmal versuchen</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <location filename="../../settings/page.py" />
             <source>Install What Silo Needs…</source>
             <translation>Installieren, was Silo braucht…</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>No Silo server is set up yet.</source>
             <translation>Noch ist kein Silo-Server eingerichtet.</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>Connected to {host}</source>
             <translation>Verbunden mit {host}</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} is read-only now. Commits wait here until it takes changes again.</source>
             <translation>{host} nimmt zurzeit keine Änderungen an. Eingechecktes wartet hier so lange.</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} works only in part. What cannot be sent waits here.</source>
             <translation>{host} arbeitet nur teilweise. Was nicht gesendet werden kann, wartet hier.</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>No connection to {host}. Commits wait here and are sent later.</source>
             <translation>Keine Verbindung zu {host}. Eingechecktes wartet hier und wird später gesendet.</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} does not accept the token.</source>
             <translation>{host} nimmt das Token nicht an.</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>Connecting to {host}…</source>
             <translation>Verbindung zu {host} wird aufgebaut…</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} sends no live events; what you commit is shown anyway.</source>
             <translation>{host} meldet nichts live; was Sie einchecken, wird trotzdem angezeigt.</translation>
         </message>
         <message>
-            <location filename="../../pane/activity.py" />
+            <location filename="../../pane/banner.py" />
             <source>{host} (live events are off)</source>
             <translation>{host} (Live-Meldungen sind aus)</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} thing waits to be sent</source>
-            <translation>{n} Eintrag wartet auf das Senden</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} things wait to be sent</source>
-            <translation>{n} Einträge warten auf das Senden</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} thing waits for your choice</source>
-            <translation>{n} Eintrag wartet auf Ihre Entscheidung</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>{n} things wait for your choice</source>
-            <translation>{n} Einträge warten auf Ihre Entscheidung</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>, {urgent} of them for your choice</source>
-            <translation>, {urgent} davon auf Ihre Entscheidung</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <location filename="../../pane/entries.py" />
-            <location filename="../../preview/dialog.py" />
-            <source>Show</source>
-            <translation>Zeigen</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Send to {host}</source>
-            <translation>An {host} senden</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <location filename="../../pane/entries.py" />
-            <source>Same part</source>
-            <translation>Gleiches Teil</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Retry</source>
-            <translation>Wiederholen</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Open theirs beside mine</source>
-            <translation>Fremde daneben öffnen</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Compare with revision {n}</source>
-            <translation>Mit Revision {n} vergleichen</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Take theirs</source>
-            <translation>Fremde übernehmen</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Commit mine on top</source>
-            <translation>Meine darüber einchecken</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <location filename="../../pane/entries.py" />
-            <source>New part…</source>
-            <translation>Neues Teil…</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Save a copy…</source>
-            <translation>Kopie speichern…</translation>
-        </message>
-        <message>
-            <location filename="../../pane/activity.py" />
-            <source>Discard</source>
-            <translation>Verwerfen</translation>
         </message>
         <message>
             <location filename="../../pane/boxes.py" />
@@ -810,135 +876,69 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <translation>Datenbank-Aktivität</translation>
         </message>
         <message>
-            <location filename="../../pane/dock.py" />
-            <source>Silo Project</source>
-            <translation>Silo-Projekt</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} thing waits to be sent</source>
+            <translation>{n} Eintrag wartet auf das Senden</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>A file that is saved here may hold objects that the FreeCAD of your colleagues does not know and does not load.</source>
-            <translation>Eine hier gespeicherte Datei kann Objekte enthalten, die das FreeCAD der anderen nicht kennt und nicht lädt.</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} things wait to be sent</source>
+            <translation>{n} Einträge warten auf das Senden</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Files of your colleagues may hold objects that this FreeCAD does not know. You are asked before a save removes such objects from a file.</source>
-            <translation>Dateien der anderen können Objekte enthalten, die dieses FreeCAD nicht kennt. Bevor Speichern solche Objekte aus einer Datei entfernt, werden Sie gefragt.</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} thing waits for your choice</source>
+            <translation>{n} Eintrag wartet auf Ihre Entscheidung</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Your team works with FreeCAD {team}; this is {here}</source>
-            <translation>Ihr Team arbeitet mit FreeCAD {team}; dies ist {here}</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} things wait for your choice</source>
+            <translation>{n} Einträge warten auf Ihre Entscheidung</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>BOM not synced: {number}</source>
-            <translation>Stückliste nicht abgeglichen: {number}</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>, {urgent} of them for your choice</source>
+            <translation>, {urgent} davon auf Ihre Entscheidung</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Committed: {number}</source>
-            <translation>Eingecheckt: {number}</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>Send to {host}</source>
+            <translation>An {host} senden</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>BOM unchanged</source>
-            <translation>Stückliste unverändert</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>Retry</source>
+            <translation>Wiederholen</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Revision {n} uploaded</source>
-            <translation>Revision {n} hochgeladen</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>Open theirs beside mine</source>
+            <translation>Fremde daneben öffnen</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>The file is in Silo already</source>
-            <translation>Die Datei ist schon in Silo</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>Compare with revision {n}</source>
+            <translation>Mit Revision {n} vergleichen</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>{n} item in the Silo BOM is not referenced by components in this assembly.</source>
-            <translation>{n} Artikel der Stückliste in Silo wird von keiner Komponente dieser Baugruppe verwendet.</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>Take theirs</source>
+            <translation>Fremde übernehmen</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>{n} items in the Silo BOM are not referenced by components in this assembly.</source>
-            <translation>{n} Artikel der Stückliste in Silo werden von keiner Komponente dieser Baugruppe verwendet.</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>Commit mine on top</source>
+            <translation>Meine darüber einchecken</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Incomplete: {n} component is missing; its known line stays as it is.</source>
-            <translation>Unvollständig: {n} Komponente fehlt; ihre bekannte Position bleibt, wie sie ist.</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>Save a copy…</source>
+            <translation>Kopie speichern…</translation>
         </message>
         <message>
-            <location filename="../../pane/entries.py" />
-            <source>Incomplete: {n} components are missing; their known lines stay as they are.</source>
-            <translation>Unvollständig: {n} Komponenten fehlen; ihre bekannten Positionen bleiben, wie sie sind.</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>The file is in Silo. The BOM waits until these are mended:</source>
-            <translation>Die Datei ist in Silo. Die Stückliste wartet, bis dies behoben ist:</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Sync without it</source>
-            <translation>Ohne sie abgleichen</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Sync without them</source>
-            <translation>Ohne diese abgleichen</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Relink…</source>
-            <translation>Neu verknüpfen…</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Show all…</source>
-            <translation>Alle zeigen…</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Open in {bom}</source>
-            <translation>In {bom} öffnen</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>{number}: the assembly has {cad}, a manual line in Silo says {silo}</source>
-            <translation>{number}: Die Baugruppe hat {cad}, eine manuelle Position in Silo sagt {silo}</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>The server no longer has the events since then. See its own activity page.</source>
-            <translation>Der Server weiß nicht mehr, was seither geschah. Seine eigene Seite zeigt die Aktivität.</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Some activity may be missing</source>
-            <translation>Ein Teil der Aktivität fehlt vielleicht</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Revision {n} of {number}</source>
-            <translation>Revision {n} von {number}</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>New item: {number}</source>
-            <translation>Neuer Artikel: {number}</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>Archived: {number}</source>
-            <translation>Archiviert: {number}</translation>
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <location filename="../../preview/dialog.py" />
-            <source>View in Silo →</source>
-            <translation>In Silo ansehen →</translation>
+            <location filename="../../pane/waiting.py" />
+            <source>Discard</source>
+            <translation>Verwerfen</translation>
         </message>
         <message>
             <location filename="../../preview/dialog.py" />
@@ -1889,6 +1889,11 @@ Was bis dahin nicht kopiert ist, muss vielleicht noch einmal eingecheckt werden.
             <translation>Ordner wählen</translation>
         </message>
         <message>
+            <location filename="../../revisions/dock.py" />
+            <source>Silo Project</source>
+            <translation>Silo-Projekt</translation>
+        </message>
+        <message>
             <location filename="../../revisions/flow.py" />
             <source>The ghost is removed.</source>
             <translation>Der Schatten ist entfernt.</translation>
@@ -2381,67 +2386,62 @@ Sie werden in {folder} installiert.</translation>
             <translation>Hält die Stückliste einer Baugruppe mit Silo im Gleichstand</translation>
         </message>
         <message>
-            <location filename="../../start.py" />
-            <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
-            <translation>Silo braucht die Python-Pakete {names}. Installieren Sie sie mit silo-mod install-addon oder mit: {command} – und starten Sie FreeCAD neu.</translation>
-        </message>
-        <message>
             <location filename="../../words.py" />
             <source>en</source>
             <translation>de</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>BOM Updated: {number}</source>
             <translation>Stückliste aktualisiert: {number}</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>+{n} added</source>
             <translation>+{n} hinzugefügt</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>~{n} qty changed</source>
             <translation>~{n} Mengen geändert</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>⚠{n} unreferenced</source>
             <translation>⚠{n} nicht verwendet</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>⚡{n} in conflict</source>
             <translation>⚡{n} im Konflikt</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>no changes</source>
             <translation>keine Änderungen</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>{n} component has no Silo part number</source>
             <translation>{n} Komponente hat keine Silo-Teilenummer</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>{n} components have no Silo part number</source>
             <translation>{n} Komponenten haben keine Silo-Teilenummer</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>This is part of draft {draft}. Revision {released} stays released as it is.</source>
             <translation>Dies gehört zum Entwurf {draft}. Revision {released} bleibt freigegeben, wie sie ist.</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>{value} for {n} of {all} parts</source>
             <translation>{value} für {n} von {all} Teilen</translation>
         </message>
         <message>
-            <location filename="../../../bom_sync.py" />
+            <location filename="../../../bom_sync/activity_text.py" />
             <source>The category rules of this Silo are not used until they are mended: {problem}</source>
             <translation>Die Kategorieregeln dieses Silo gelten nicht, bis sie berichtigt sind: {problem}</translation>
         </message>
@@ -2522,6 +2522,141 @@ Sie werden in {folder} installiert.</translation>
         </message>
     </context>
     <context>
+        <name>Origin_Commit</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Commit to Silo</source>
+            <translation>In Silo einchecken</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Save this document and its changed sub-assemblies, upload them as new revisions, and bring the BOM to Silo</source>
+            <translation>Dieses Dokument und seine geänderten Unterbaugruppen speichern, als neue Revisionen hochladen und die Stückliste mit Silo abgleichen</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Saves this document and the edited ones below it, uploads each as a new revision with your comment, and brings the BOM to Silo. Nothing is ever deleted there.</source>
+            <translation>Speichert dieses Dokument und die geänderten darunter, lädt jedes mit Ihrem Kommentar als neue Revision hoch und gleicht die Stückliste mit Silo ab. Dort wird nie etwas gelöscht.</translation>
+        </message>
+    </context>
+    <context>
+        <name>Silo_BOM</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Compare BOM with Silo…</source>
+            <translation>Stückliste mit Silo vergleichen…</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Show how the BOM of this assembly differs from the one in Silo</source>
+            <translation>Zeigt, wie die Stückliste dieser Baugruppe von der in Silo abweicht</translation>
+        </message>
+    </context>
+    <context>
+        <name>Silo_RegisterParts</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Register Parts…</source>
+            <translation>Teile registrieren…</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Give part numbers to the components of this assembly that have none</source>
+            <translation>Den Komponenten dieser Baugruppe Teilenummern geben, die noch keine haben</translation>
+        </message>
+    </context>
+    <context>
+        <name>Silo_Mass</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Mass of the Assembly…</source>
+            <translation>Masse der Baugruppe…</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Mass and centre of mass from the parts' shapes and materials, with what is missing</source>
+            <translation>Masse und Schwerpunkt aus Formen und Werkstoffen der Teile, und was dafür fehlt</translation>
+        </message>
+    </context>
+    <context>
+        <name>Silo_Activity</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Database Activity</source>
+            <translation>Datenbank-Aktivität</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Show events in Silo, and commits that wait to be sent</source>
+            <translation>Zeigt, was in Silo geschieht und was auf das Senden wartet</translation>
+        </message>
+    </context>
+    <context>
+        <name>Silo_Open</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Open from Silo…</source>
+            <translation>Aus Silo öffnen…</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Find an item in Silo and open its file with all that it links to</source>
+            <translation>Einen Artikel in Silo finden und seine Datei mit allem öffnen, was verknüpft ist</translation>
+        </message>
+    </context>
+    <context>
+        <name>Silo_Project</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Project</source>
+            <translation>Projekt</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>All files of the project, which of them Silo has, and Commit All</source>
+            <translation>Alle Dateien des Projekts, welche davon in Silo sind, und „Alle einchecken“</translation>
+        </message>
+    </context>
+    <context>
+        <name>Silo_History</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>History…</source>
+            <translation>Verlauf…</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>The revisions of this document: who, when, and what changed in the BOM</source>
+            <translation>Die Revisionen dieses Dokuments: wer, wann, und was sich in der Stückliste änderte</translation>
+        </message>
+    </context>
+    <context>
+        <name>Silo_Settings</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Silo Settings…</source>
+            <translation>Silo-Einstellungen…</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Server, token, and what a commit does</source>
+            <translation>Server, Token, und was beim Einchecken geschieht</translation>
+        </message>
+    </context>
+    <context>
+        <name>Silo_Help</name>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Help on Silo</source>
+            <translation>Hilfe zu Silo</translation>
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Open the page that explains the commands, the pane and the messages</source>
+            <translation>Die Seite öffnen, die Befehle, Fenster und Meldungen erklärt</translation>
+        </message>
+    </context>
+    <context>
         <name>Silo_InstallPackages</name>
         <message>
             <location filename="../../settings/page.py" />
@@ -2532,141 +2667,6 @@ Sie werden in {folder} installiert.</translation>
             <location filename="../../settings/page.py" />
             <source>Install the Python packages that Silo needs</source>
             <translation>Die Python-Pakete installieren, die Silo braucht</translation>
-        </message>
-    </context>
-    <context>
-        <name>Origin_Commit</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Commit to Silo</source>
-            <translation>In Silo einchecken</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Save this document and its changed sub-assemblies, upload them as new revisions, and bring the BOM to Silo</source>
-            <translation>Dieses Dokument und seine geänderten Unterbaugruppen speichern, als neue Revisionen hochladen und die Stückliste mit Silo abgleichen</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Saves this document and the edited ones below it, uploads each as a new revision with your comment, and brings the BOM to Silo. Nothing is ever deleted there.</source>
-            <translation>Speichert dieses Dokument und die geänderten darunter, lädt jedes mit Ihrem Kommentar als neue Revision hoch und gleicht die Stückliste mit Silo ab. Dort wird nie etwas gelöscht.</translation>
-        </message>
-    </context>
-    <context>
-        <name>Silo_BOM</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Compare BOM with Silo…</source>
-            <translation>Stückliste mit Silo vergleichen…</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Show how the BOM of this assembly differs from the one in Silo</source>
-            <translation>Zeigt, wie die Stückliste dieser Baugruppe von der in Silo abweicht</translation>
-        </message>
-    </context>
-    <context>
-        <name>Silo_RegisterParts</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Register Parts…</source>
-            <translation>Teile registrieren…</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Give part numbers to the components of this assembly that have none</source>
-            <translation>Den Komponenten dieser Baugruppe Teilenummern geben, die noch keine haben</translation>
-        </message>
-    </context>
-    <context>
-        <name>Silo_Mass</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Mass of the Assembly…</source>
-            <translation>Masse der Baugruppe…</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Mass and centre of mass from the parts' shapes and materials, with what is missing</source>
-            <translation>Masse und Schwerpunkt aus Formen und Werkstoffen der Teile, und was dafür fehlt</translation>
-        </message>
-    </context>
-    <context>
-        <name>Silo_Activity</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Database Activity</source>
-            <translation>Datenbank-Aktivität</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Show events in Silo, and commits that wait to be sent</source>
-            <translation>Zeigt, was in Silo geschieht und was auf das Senden wartet</translation>
-        </message>
-    </context>
-    <context>
-        <name>Silo_Open</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Open from Silo…</source>
-            <translation>Aus Silo öffnen…</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Find an item in Silo and open its file with all that it links to</source>
-            <translation>Einen Artikel in Silo finden und seine Datei mit allem öffnen, was verknüpft ist</translation>
-        </message>
-    </context>
-    <context>
-        <name>Silo_Project</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Project</source>
-            <translation>Projekt</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>All files of the project, which of them Silo has, and Commit All</source>
-            <translation>Alle Dateien des Projekts, welche davon in Silo sind, und „Alle einchecken“</translation>
-        </message>
-    </context>
-    <context>
-        <name>Silo_History</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>History…</source>
-            <translation>Verlauf…</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>The revisions of this document: who, when, and what changed in the BOM</source>
-            <translation>Die Revisionen dieses Dokuments: wer, wann, und was sich in der Stückliste änderte</translation>
-        </message>
-    </context>
-    <context>
-        <name>Silo_Settings</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Silo Settings…</source>
-            <translation>Silo-Einstellungen…</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Server, token, and what a commit does</source>
-            <translation>Server, Token, und was beim Einchecken geschieht</translation>
-        </message>
-    </context>
-    <context>
-        <name>Silo_Help</name>
-        <message>
-            <location filename="../../start.py" />
-            <source>Help on Silo</source>
-            <translation>Hilfe zu Silo</translation>
-        </message>
-        <message>
-            <location filename="../../start.py" />
-            <source>Open the page that explains the commands, the pane and the messages</source>
-            <translation>Die Seite öffnen, die Befehle, Fenster und Meldungen erklärt</translation>
         </message>
     </context>
 </TS>
